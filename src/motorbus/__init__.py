@@ -1,0 +1,83 @@
+"""motorbus: drive, simulate and diagnose motors on a bus.
+
+The names a user needs are here and are loaded when first used, so that `import motorbus` costs nothing:
+
+    open, open_async    a bus by its address, blocking or async     motorbus.open("feetech:/dev/ttyACM0")
+    simulate            a simulated bus in this process             motorbus.simulate("feetech", ids="1-6")
+    the errors          motorbus.NoReply and all others             see `motorbus.errors`
+    the families        motorbus.feetech …                          device classes and driver functions
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from motorbus.errors import (
+    ChecksumError,
+    DeviceError,
+    FramingError,
+    Interrupted,
+    LimitExceeded,
+    LinkError,
+    LinkLost,
+    MotionError,
+    MotorbusError,
+    NoReply,
+    NotHomed,
+    OutcomeUnknown,
+    PortBusy,
+    PortNotFound,
+    RequestError,
+    Stalled,
+    UnexpectedReply,
+    VerificationFailed,
+    WireError,
+)
+
+if TYPE_CHECKING:
+    from motorbus.families import feetech
+    from motorbus.session import open, open_async, simulate
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ChecksumError",
+    "DeviceError",
+    "FramingError",
+    "Interrupted",
+    "LimitExceeded",
+    "LinkError",
+    "LinkLost",
+    "MotionError",
+    "MotorbusError",
+    "NoReply",
+    "NotHomed",
+    "OutcomeUnknown",
+    "PortBusy",
+    "PortNotFound",
+    "RequestError",
+    "Stalled",
+    "UnexpectedReply",
+    "VerificationFailed",
+    "WireError",
+    "feetech",
+    "open",
+    "open_async",
+    "simulate",
+]
+
+_LAZY = {"open": "motorbus.session", "open_async": "motorbus.session", "simulate": "motorbus.session"}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
+    if name.startswith("_"):
+        raise AttributeError(name)
+    try:
+        return import_module(f"motorbus.families.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"motorbus.families.{name}":
+            raise
+        raise AttributeError(f"module 'motorbus' has no attribute {name!r}") from None

@@ -1,0 +1,181 @@
+"""One typed row per register, object or parameter, and the row says everything.
+
+Docs, completion, forms, recorder columns and the simulator's memory are derived from rows; a later model is an
+earlier table plus differences. Rows know how their bytes are made, never who sends them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from enum import Enum
+from typing import TypeAlias
+
+from motorbus.core.operation import Effect
+from motorbus.errors import RequestError
+
+Value: TypeAlias = int | float
+
+
+class Access(Enum):
+    """Who may do what with a row."""
+
+    READ = "r"
+    WRITE = "w"
+    READ_WRITE = "rw"
+
+
+class Storage(Enum):
+    """What a power cycle does to the value: EEPROM keeps it, RAM forgets it, FACTORY is the maker's own."""
+
+    EEPROM = "EEPROM"
+    RAM = "RAM"
+    FACTORY = "factory"
+
+
+class Coding(Enum):
+    """How a negative number is written; the sign bit of sign-magnitude is `Entry.sign_bit`."""
+
+    UNSIGNED = "unsigned"
+    SIGN_MAGNITUDE = "sign-magnitude"
+    TWOS_COMPLEMENT = "two's complement"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One addressable value of a device.
+
+    `address` is the register number (or the CANopen index, then with `subindex`); `size` is in bytes; `low` and
+    `high` bound the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single
+    values, `bits` names single bits. `default` is the shipped raw value, where known. `source` says where each
+    fact comes from and `note` where sources conflict.
+    """
+
+    name: str
+    address: int
+    size: int
+    access: Access
+    storage: Storage
+    source: str
+    subindex: int | None = None
+    order: str = "little"
+    coding: Coding = Coding.UNSIGNED
+    sign_bit: int | None = None
+    unit: str = ""
+    scale: float = 1.0
+    low: int = 0
+    high: int = 0
+    default: int | None = None
+    choices: Mapping[int, str] = field(default_factory=dict)
+    bits: Mapping[int, str] = field(default_factory=dict)
+    effect: Effect = Effect.NONE
+    protected: bool = False
+    note: str = ""
+
+    @property
+    def readable(self) -> bool:
+        return self.access is not Access.WRITE
+
+    @property
+    def writable(self) -> bool:
+        return self.access is not Access.READ
+
+    def encode(self, raw: int) -> bytes:
+        """Raw value -> bytes. Raises RequestError when it is outside the row's range or does not fit its coding."""
+        if not self.low <= raw <= self.high:
+            raise RequestError(
+                f"{self.name}: raw value {raw} is out of range {self.low}..{self.high}",
+                expected=f"{self._shown(self.low)} to {self._shown(self.high)}",
+                advice="give a value inside the range; nothing was sent",
+            )
+        return self._code(raw).to_bytes(self.size, "little" if self.order == "little" else "big")
+
+    def _code(self, raw: int) -> int:
+        if self.coding is Coding.UNSIGNED or raw >= 0:
+            return raw
+        if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
+            return -raw | 1 << self.sign_bit
+        return raw & (1 << 8 * self.size) - 1
+
+    def decode(self, data: bytes) -> int:
+        """Bytes -> raw value; a negative zero is 0. Any bytes of the right size have a raw value."""
+        code = int.from_bytes(data, "little" if self.order == "little" else "big")
+        if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
+            magnitude = code & ~(1 << self.sign_bit)
+            return -magnitude if code >> self.sign_bit & 1 else magnitude
+        if self.coding is Coding.TWOS_COMPLEMENT and code >> (8 * self.size - 1):
+            return code - (1 << 8 * self.size)
+        return code
+
+    def to_value(self, raw: int) -> Value:
+        """Raw value -> value in the row's unit (the raw number itself where the row has none)."""
+        return raw * self.scale if self.unit else raw
+
+    def to_raw(self, value: Value) -> int:
+        """Value in the row's unit -> nearest raw value. Raises RequestError when it is not a finite number."""
+        if not math.isfinite(value):
+            raise RequestError(
+                f"{self.name}: {value} is not a finite number", advice="give a number; nothing was sent"
+            )
+        if not self.unit and value != int(value):
+            raise RequestError(
+                f"{self.name}: {value} is not a whole number",
+                expected=f"{self.low} to {self.high}",
+                advice="this register has no unit; give its raw value",
+            )
+        return round(value / self.scale) if self.unit else int(value)
+
+    def _shown(self, raw: int) -> str:
+        return f"{self.to_value(raw):.6g} {self.unit} (raw {raw})" if self.unit else str(raw)
+
+
+class Table(Mapping[str, Entry]):
+    """All rows of one register map, by name and by address. Never changed after it is made."""
+
+    def __init__(self, name: str, entries: Iterable[Entry], *, title: str = "") -> None:
+        self.name = name
+        self.title = title or name
+        self._by_name = {entry.name: entry for entry in entries}
+        self._by_address = {(e.address, e.subindex): e for e in self._by_name.values()}
+        if len(self._by_address) != len(self._by_name):
+            raise ValueError(f"table {name}: two rows share an address")
+
+    def __getitem__(self, name: str) -> Entry:
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise self._unknown(name) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._by_name
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self._by_name)
+
+    def _unknown(self, name: str) -> RequestError:
+        near = get_close_matches(name, self._by_name, n=3)
+        return RequestError(
+            f"table {self.name} has no register {name!r}",
+            expected=f"perhaps {', '.join(near)}" if near else "",
+            advice="`motorbus info BUS#ID --registers` lists them; nothing was sent",
+        )
+
+    def at(self, address: int, subindex: int | None = None) -> Entry | None:
+        """The row that starts at this address, or None."""
+        return self._by_address.get((address, subindex))
+
+    def derive(self, name: str, *changed: Entry, without: Iterable[str] = (), title: str = "") -> Table:
+        """A later model: these rows, some replaced or added by name, some left out."""
+        rows = {key: row for key, row in self._by_name.items() if key not in set(without)}
+        rows.update({row.name: row for row in changed})
+        return Table(name, sorted(rows.values(), key=lambda row: (row.address, row.subindex or 0)), title=title)
+
+
+def changed(entry: Entry, **differences: object) -> Entry:
+    """The same row with some fields different."""
+    return replace(entry, **differences)  # type: ignore[arg-type]

@@ -1,0 +1,232 @@
+"""The contract between a family of devices and everything that is family-blind.
+
+A family is a folder with four rooms (`wire`, `table`, `driver`, `simulator`) whose `__init__` says
+`FAMILY = …`, an object that fulfils `Family`. Nothing above knows more of a family than this file says, and
+`tests/conformance` is its executable definition of done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, NamedTuple, Protocol
+
+from motorbus.core.entry import Table, Value
+from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Runnable
+
+
+class Option(NamedTuple):
+    """One option that a bus string or a flag may carry for this family: `name=value`."""
+
+    name: str
+    kind: type
+    default: object
+    help: str
+
+
+class LinkNeeds(NamedTuple):
+    """What a family asks of its link: `bytes` or `frames`, the usual rate (bit/s), rates worth scanning, options."""
+
+    kind: str
+    rate: int
+    rates: tuple[int, ...] = ()
+    options: tuple[Option, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a device says it is. `table` is "" when its firmware is unknown: readable then, never written."""
+
+    node: int
+    model: str
+    firmware: str
+    table: str
+    details: Mapping[str, object] = field(default_factory=dict)
+
+
+class Found(NamedTuple):
+    """An event for `Report`, and what a scan returns: a node that answered, at which rate, and what it is."""
+
+    node: int
+    rate: int
+    identity: Identity | None
+
+
+class Quality(Enum):
+    """How far a sample can be trusted."""
+
+    FRESH = "fresh"
+    REPEATED = "repeated"
+    CONFIRMED = "confirmed"
+    SUSPECT = "suspect"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None where it does not tell.
+
+    `at` is the arrival time on the link's clock in seconds, `alarm` the names of the alarm bits that are set.
+    """
+
+    at: float
+    position: float | None = None
+    velocity: float | None = None
+    load: float | None = None
+    current: float | None = None
+    voltage: float | None = None
+    temperature: float | None = None
+    moving: bool | None = None
+    alarm: tuple[str, ...] = ()
+    quality: Quality = Quality.FRESH
+
+
+class Stop(NamedTuple):
+    """Frames that stop the nodes, in order, and what an acknowledgement of them promises."""
+
+    exchanges: tuple[Exchange[Answer], ...]
+    promise: str
+
+
+class Part(NamedTuple):
+    """One field of a frame: where it starts, its bytes, what it is called and what it says."""
+
+    start: int
+    data: bytes
+    name: str
+    meaning: str
+
+
+class Explanation(NamedTuple):
+    """One frame, or a run of bytes that is none: `fault` is "" for a good frame, else why it is bad."""
+
+    data: bytes
+    title: str
+    parts: tuple[Part, ...]
+    fault: str = ""
+
+
+class Receiver(Protocol):
+    """Turns what a link delivers into events. Never raises on any input, never holds more than 4 KiB."""
+
+    def feed(self, data: Data, /) -> list[Event]:
+        """Take bytes (cut anywhere) or one CAN frame; give what is complete."""
+
+    def flush(self) -> list[Event]:
+        """Nothing more is coming: give what can be made of the rest, and the remainder as noise."""
+
+
+class SimulatedNode(Protocol):
+    """One simulated device, as a test or a control socket pokes it."""
+
+    def unplug(self) -> None: ...
+    def plug(self) -> None: ...
+    def power_cycle(self) -> None: ...
+    def status(self) -> dict[str, object]: ...
+
+
+class Simulator(Protocol):
+    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own."""
+
+    @property
+    def nodes(self) -> Mapping[int, SimulatedNode]: ...
+
+    def receive(self, data: Data, at: float) -> None:
+        """The host's bytes, or one frame, have arrived completely at this moment."""
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        """Everything the devices begin to send up to this moment, each with its own moment, in order."""
+
+    def due(self) -> float | None:
+        """The next moment something happens by itself, or None."""
+
+    def tune(self, rate: int) -> None:
+        """The host's rate; devices set to another one neither hear nor are heard."""
+
+
+class Device(Protocol):
+    """The verbs that faces may expect of a blocking device; a verb a device lacks is absent, never raises."""
+
+    @property
+    def node(self) -> int: ...
+    @property
+    def alarm(self) -> tuple[str, ...]: ...
+    @property
+    def ping(self) -> Callable[[], bool]: ...
+    @property
+    def identify(self) -> Callable[[], Identity]: ...
+    @property
+    def read(self) -> Callable[..., dict[str, Value]]: ...
+    @property
+    def write(self) -> Callable[..., None]: ...
+
+
+class Devices(NamedTuple):
+    """The verb classes of a family: each is called with a bus and a node id."""
+
+    blocking: Callable[[Any, int], Any]
+    awaiting: Callable[[Any, int], Any]
+
+
+class Family(Protocol):
+    """What motorbus knows of a family: eighteen members, no state."""
+
+    @property
+    def name(self) -> str:
+        """The word before the colon in a bus address."""
+
+    @property
+    def link(self) -> LinkNeeds: ...
+
+    @property
+    def tables(self) -> Mapping[str, Table]:
+        """Every register map by its name."""
+
+    @property
+    def window(self) -> int:
+        """How many lanes may be in flight at once."""
+
+    @property
+    def devices(self) -> Devices: ...
+
+    def lane(self, node: int) -> int:
+        """The lane of this node; a family on a half-duplex line has one."""
+
+    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+        """Seconds on the wire for the request and every reply due, gaps of the protocol included."""
+
+    def turnaround(self, exchange: Exchange[Any]) -> float:
+        """The longest time the devices may think before and between their replies, by `exchange.timeout`."""
+
+    def quiet_time(self, rate: int) -> float:
+        """Seconds a node must have been left alone before it is probed again after a doubtful exchange."""
+
+    def echo_test(self) -> Exchange[Any] | None:
+        """An exchange whose echo cannot be taken for its answer, sent when a bus is opened; None: cannot echo."""
+
+    def explain(self, data: bytes) -> list[Explanation]:
+        """Every frame in these bytes, field by field, and why a bad one is bad."""
+
+    def receiver(self) -> Receiver: ...
+
+    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+        """A harmless exchange with a known answer; its value says whether the answer was right.
+
+        Attempts with different numbers differ in the key or in the length of their reply, and none of them
+        can be confused with its own echo.
+        """
+
+    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+        """Stop these nodes; each comes with its last answer that told a position, if there was one."""
+
+    def identify(self, node: int) -> Runnable[Identity]: ...
+
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+        """Look for devices by unicast; () means every id, or the present rate. Reports `Found` and `Progress`."""
+
+    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
+        """SI operations by capability name for this model; empty when it has none."""
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        """A simulated bus with these nodes; "" is the family's usual model."""
+

@@ -1,0 +1,295 @@
+"""How work is said, so that it can be said once and run blocking or async.
+
+A driver function is a generator (an `Operation`) that yields *steps* and returns its answer. There are seven
+steps and no others. A step is a plain value: whoever runs the operation (`bus/pump.py`, `bus/aio.py`) decides
+when and how. A function that needs one exchange returns the `Exchange` itself, which may be kept and run again.
+
+Each step is iterable so that `value = yield from step` has a type; the bare `yield` occurs in this file only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Hashable, Sequence
+from enum import Enum, IntEnum
+from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
+
+from motorbus.errors import MotorbusError
+
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+
+
+class CanFrame(NamedTuple):
+    """One classic CAN data frame: identifier, 0 to 8 data bytes, 29-bit identifier or not."""
+
+    id: int
+    data: bytes
+    extended: bool = False
+
+
+Data: TypeAlias = bytes | CanFrame
+Key: TypeAlias = Hashable
+
+
+class Rank(IntEnum):
+    """Who goes first when several exchanges wait: the lower the earlier."""
+
+    STOP = 0
+    CONTROL = 1
+    POLL = 2
+    CONFIGURATION = 3
+
+
+class Effect(IntEnum):
+    """What carrying out a write does to the world; the greatest of several counts."""
+
+    NONE = 0
+    PERSISTENT = 1
+    IDENTITY = 2
+    TORQUE = 3
+    MOTION = 4
+
+
+class Timeout(Enum):
+    """How long the device itself may take before it answers; the family gives the seconds."""
+
+    REPLY = "reply"
+    SCAN = "scan"
+    STORE = "store"
+
+
+class Due(NamedTuple):
+    """One reply that an exchange calls for: from which node, recognised by which key, how many bytes exactly."""
+
+    node: int
+    key: Key
+    length: int
+
+
+class Any_(Enum):
+    """The type of `ANY`: every reply that comes until the deadline is part of the answer."""
+
+    ANY = "any"
+
+
+ANY: Final = Any_.ANY
+
+
+class Goal(NamedTuple):
+    """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
+
+    `quantity` is position (rad), velocity (rad/s), load (fraction) or relative (rad). A limit that is not known
+    is None, and the gate refuses what it cannot judge.
+    """
+
+    node: int
+    quantity: str
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+class Reply(NamedTuple):
+    """A frame that answers some request. `key` tells which, `data` is the whole frame or the CAN data field."""
+
+    lane: int
+    key: Key
+    data: bytes
+
+
+class Notice(NamedTuple):
+    """A frame the device sent on its own account: a report, an alarm, the end of a program."""
+
+    node: int
+    kind: str
+    data: bytes
+
+
+class Noise(NamedTuple):
+    """Bytes that belong to nobody, and why; `fault` is framing, checksum or foreign."""
+
+    data: bytes
+    fault: str
+
+
+Event: TypeAlias = Reply | Notice | Noise
+
+
+class Answer(NamedTuple):
+    """What came back: the replies in the order they were due, the nodes that did not answer, and when (s)."""
+
+    replies: tuple[Reply, ...]
+    missing: tuple[int, ...]
+    at: float
+
+
+class Exchange(Generic[T_co]):
+    """One request and the replies, or the silence, it calls for. A value: never changed after it is made.
+
+    `request`     the bytes or the CAN frame to send
+    `replies`     one `Due` for each reply; empty when none is due; `ANY` for all that come until the deadline
+    `read`        answer -> value; None gives the `Answer` itself. Matching never looks at it, so an exchange
+                  without it is plain data
+    `lane`        two exchanges on one lane never overlap
+    `rank`        who goes first
+    `effect`      the greatest effect of the rows it writes
+    `goals`       what it orders, per node, for the gate
+    `timeout`     how long the device may think
+    `repeatable`  sending it twice does no more than sending it once
+    `tells_position`  the replies begin with the present position, so stop can hold it
+    """
+
+    __slots__ = (
+        "effect",
+        "goals",
+        "lane",
+        "rank",
+        "read",
+        "repeatable",
+        "replies",
+        "request",
+        "tells_position",
+        "timeout",
+    )
+
+    def __init__(
+        self,
+        request: Data,
+        replies: tuple[Due, ...] | Any_ = (),
+        read: Callable[[Answer], T_co] | None = None,
+        *,
+        lane: int = 0,
+        rank: Rank = Rank.POLL,
+        effect: Effect = Effect.NONE,
+        goals: tuple[Goal, ...] = (),
+        timeout: Timeout = Timeout.REPLY,
+        repeatable: bool = False,
+        tells_position: bool = False,
+    ) -> None:
+        self.request: Final = request
+        self.replies: Final = replies
+        self.read: Final = read
+        self.lane: Final = lane
+        self.rank: Final = rank
+        self.effect: Final = effect
+        self.goals: Final = goals
+        self.timeout: Final = timeout
+        self.repeatable: Final = repeatable
+        self.tells_position: Final = tells_position
+
+    def __iter__(self) -> Generator[Step, Any, T_co]:
+        value: T_co = yield self
+        return value
+
+    def __repr__(self) -> str:
+        shown = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
+        return f"<Exchange {shown}>"
+
+
+class Together(Generic[T_co]):
+    """Operations that may overlap where the bus allows it; results in order.
+
+    One failure does not stop the others; when all have ended the first error is raised, with a note for each
+    of the rest. Wrap each in `outcome()` to have the errors as values.
+    """
+
+    __slots__ = ("operations",)
+
+    def __init__(self, operations: Sequence[Runnable[T_co]]) -> None:
+        self.operations: Final = operations
+
+    def __iter__(self) -> Generator[Step, Any, list[T_co]]:
+        values: list[T_co] = yield self
+        return values
+
+
+class Alone(Generic[T_co]):
+    """An operation during which nothing else but a stop goes onto the bus."""
+
+    __slots__ = ("operation",)
+
+    def __init__(self, operation: Runnable[T_co]) -> None:
+        self.operation: Final = operation
+
+    def __iter__(self) -> Generator[Step, Any, T_co]:
+        value: T_co = yield self
+        return value
+
+
+class Pause:
+    """Let at least `seconds` pass on the link's clock."""
+
+    __slots__ = ("seconds",)
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds: Final = seconds
+
+    def __iter__(self) -> Generator[Step, Any, None]:
+        yield self
+
+
+class Listen:
+    """Wait for a notice that `match` accepts, at most `until` seconds from this step on; None when none came."""
+
+    __slots__ = ("match", "until")
+
+    def __init__(self, match: Callable[[Notice], bool], until: float) -> None:
+        self.match: Final = match
+        self.until: Final = until
+
+    def __iter__(self) -> Generator[Step, Any, Notice | None]:
+        notice: Notice | None = yield self
+        return notice
+
+
+class Tune:
+    """Set the rate of the link, in bit/s, once nothing is in flight."""
+
+    __slots__ = ("rate",)
+
+    def __init__(self, rate: int) -> None:
+        self.rate: Final = rate
+
+    def __iter__(self) -> Generator[Step, Any, None]:
+        yield self
+
+
+class Progress(NamedTuple):
+    """An event for `Report`: `done` of `total` units of work, and what is being done."""
+
+    done: int
+    total: int
+    what: str = ""
+
+
+class Journal(NamedTuple):
+    """An event for `Report` that must be on disk before the next step: intent or outcome of a guarded change."""
+
+    change: str
+    state: str
+    facts: dict[str, object]
+
+
+class Report:
+    """Hand an event (progress, an early result, a journal record) to whoever listens, before the next step."""
+
+    __slots__ = ("event",)
+
+    def __init__(self, event: object) -> None:
+        self.event: Final = event
+
+    def __iter__(self) -> Generator[Step, Any, None]:
+        yield self
+
+
+Step: TypeAlias = "Exchange[Any] | Together[Any] | Alone[Any] | Pause | Listen | Tune | Report"
+Operation: TypeAlias = Generator[Step, Any, T]
+Runnable: TypeAlias = "Generator[Step, Any, T] | Exchange[T]"
+
+
+def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
+    """Carry out `runnable`; an error of ours becomes the value, so that a loop can visit everyone."""
+    try:
+        return (yield from runnable)
+    except MotorbusError as error:
+        return error

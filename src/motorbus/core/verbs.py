@@ -1,0 +1,66 @@
+"""One list of verbs gives a blocking and an awaitable face, both typed, with no mirror.
+
+A device class lists driver functions: `position = verb(driver.position)`. `Servo` and `AsyncServo` are two-line
+classes over one list. What is a method here is always I/O; nothing that costs a frame is an attribute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
+
+from motorbus.core.operation import Runnable
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class BlockingRunner(Protocol):
+    """What a blocking device needs of its bus."""
+
+    def run(self, operation: Runnable[T], /) -> T: ...
+
+
+class AsyncRunner(Protocol):
+    """What an async device needs of its bus."""
+
+    async def run(self, operation: Runnable[T], /) -> T: ...
+
+
+class Blocking:
+    """Carries out verbs by a blocking bus."""
+
+    def __init__(self, bus: BlockingRunner) -> None:
+        self.bus = bus
+
+
+class Awaiting:
+    """Carries out verbs by an async bus."""
+
+    def __init__(self, bus: AsyncRunner) -> None:
+        self.bus = bus
+
+
+class verb(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+    """Makes a method of a driver function: blocking on a `Blocking` device, awaitable on an `Awaiting` one."""
+
+    def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, device: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, device: Blocking, owner: type) -> Callable[P, T]: ...
+    @overload
+    def __get__(self, device: Awaiting, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    def __get__(self, device: Any, owner: type) -> Any:
+        if device is None:
+            return self
+        function = self.function
+
+        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
+            return device.bus.run(function(device, *args, **kwargs))
+
+        call.__doc__ = self.__doc__
+        return call

@@ -1,0 +1,146 @@
+"""What can go wrong, told so that the reader knows whose fault it is and what to do next.
+
+    MotorbusError
+    ├── LinkError            the port: cannot open, busy, lost                    (also OSError)
+    │   ├── PortNotFound     there is no such port
+    │   ├── PortBusy         another program holds it; `owner` names it
+    │   └── LinkLost         it was open and went away
+    ├── WireError            bytes came that are not an answer; they are attached
+    │   ├── FramingError     no frame could be made of them
+    │   ├── ChecksumError    a frame, but its checksum is wrong
+    │   └── UnexpectedReply  a good frame that nobody asked for (echo, foreign, wrong content)
+    ├── NoReply              nothing valid came in time                           (also TimeoutError)
+    ├── DeviceError          it answered and said no: `node`, `code`, `register`
+    ├── RequestError         the caller asked for something impossible            (also ValueError)
+    ├── MotionError          motion refused or ended early
+    │   ├── LimitExceeded    the goal lies outside the limits, or the limits are unknown
+    │   ├── NotHomed         the reference is not known
+    │   ├── Stalled          it stopped moving before it was there
+    │   └── Interrupted      a stop or a cancellation came in between
+    ├── VerificationFailed   written, read back, and different
+    └── OutcomeUnknown       sent, and whether it took effect cannot be known
+
+Every message has up to five parts: what happened, what was sent, what came back, what was expected, the
+likely cause and what to do. The parts are attributes too, so a program need not read prose.
+"""
+
+from __future__ import annotations
+
+
+class MotorbusError(Exception):
+    """Base of every error of this package. `summary` is one line; the other parts may be empty."""
+
+    def __init__(
+        self,
+        summary: str,
+        *,
+        sent: object = b"",
+        received: object = b"",
+        expected: str = "",
+        cause: str = "",
+        advice: str = "",
+        node: int | None = None,
+    ) -> None:
+        super().__init__(summary)
+        self.summary = summary
+        self.sent = sent
+        self.received = received
+        self.expected = expected
+        self.cause = cause
+        self.advice = advice
+        self.node = node
+
+    def __str__(self) -> str:
+        parts = (
+            ("sent", _shown(self.sent)),
+            ("received", _shown(self.received)),
+            ("expected", self.expected),
+            ("likely cause", self.cause),
+            ("what to do", self.advice),
+        )
+        return "\n".join([self.summary, *(f"  {name}: {text}" for name, text in parts if text)])
+
+
+def _shown(data: object) -> str:
+    if isinstance(data, bytes | bytearray):
+        return data.hex(" ").upper()
+    return str(data) if data else ""
+
+
+class LinkError(MotorbusError, OSError):
+    """The port cannot be opened, is held by another program, or went away."""
+
+
+class PortNotFound(LinkError):
+    """There is no such port."""
+
+
+class PortBusy(LinkError):
+    """Another program holds the port; `owner` is its process id where it is known."""
+
+    owner: int | None = None
+
+
+class LinkLost(LinkError):
+    """The port was open and is gone (unplugged, connection closed)."""
+
+
+class WireError(MotorbusError):
+    """Bytes came in time but are not the answer; `received` holds them."""
+
+
+class FramingError(WireError):
+    """No frame could be made of the bytes."""
+
+
+class ChecksumError(WireError):
+    """A whole frame came and its checksum is wrong."""
+
+
+class UnexpectedReply(WireError):
+    """A good frame that is not the answer: an echo, another node's, or wrong content."""
+
+
+class NoReply(MotorbusError, TimeoutError):
+    """Nothing valid came before the deadline."""
+
+
+class DeviceError(MotorbusError):
+    """The device answered and refused. `code` is its own number, `register` what was asked for."""
+
+    def __init__(self, summary: str, *, code: int = 0, register: str = "", **parts: object) -> None:
+        super().__init__(summary, **parts)  # type: ignore[arg-type]
+        self.code = code
+        self.register = register
+
+
+class RequestError(MotorbusError, ValueError):
+    """The request itself is impossible: unknown or read-only register, value out of range. Nothing was sent."""
+
+
+class MotionError(MotorbusError):
+    """Motion was refused or ended early."""
+
+
+class LimitExceeded(MotionError):
+    """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent."""
+
+
+class NotHomed(MotionError):
+    """The reference position is not known."""
+
+
+class Stalled(MotionError):
+    """It stopped moving before it was in position."""
+
+
+class Interrupted(MotionError):
+    """A stop or a cancellation came in between."""
+
+
+class VerificationFailed(MotorbusError):
+    """What was read back differs from what was written."""
+
+
+class OutcomeUnknown(MotorbusError):
+    """The request was sent and no evidence says whether it took effect."""

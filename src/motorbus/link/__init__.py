@@ -1,0 +1,1 @@
+"""Links move bytes or CAN frames and understand nothing. Every link owns its clock."""
