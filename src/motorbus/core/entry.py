@@ -173,7 +173,9 @@ class Table(Mapping[str, Entry]):
         """A later model: these rows, some replaced or added by name, some left out."""
         rows = {key: row for key, row in self._by_name.items() if key not in set(without)}
         rows.update({row.name: row for row in changed})
-        return Table(name, sorted(rows.values(), key=lambda row: (row.address, row.subindex or 0)), title=title)
+        return Table(
+            name, sorted(rows.values(), key=lambda row: (row.address, row.subindex or 0)), title=title
+        )
 
 
 def changed(entry: Entry, **differences: object) -> Entry:

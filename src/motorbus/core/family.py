@@ -229,4 +229,3 @@ class Family(Protocol):
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         """A simulated bus with these nodes; "" is the family's usual model."""
-

@@ -1,0 +1,81 @@
+# Every verb does all of its own set-up: Python >= 3.11 and make are enough.
+#   make demo PYTHON=python3.12     builds the environment with another interpreter
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+PEERS := .peers/.ready
+SOURCES := src tests bench examples
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check soak bench docs lint types contracts interpreters lock clean
+
+help:
+	@echo "make demo    six simulated servos are found, moved together and read back; picture in build/demo.png"
+	@echo "make test    every test but the long ones"
+	@echo "make check   lint, types, import contracts, strict docs, a few tests on every other Python found"
+	@echo "make soak    the long runs, with their figures"
+	@echo "make bench   side by side with other libraries"
+	@echo "make docs    the documentation, into build/site"
+	@echo "make lock    resolve the dependencies anew (needs the network)"
+	@echo "make clean   remove all that these verbs have made"
+
+demo: $(READY)
+	@mkdir -p build
+	$(BIN)/motorbus demo --output build/demo.png
+
+test: $(READY) $(PEERS)
+	$(BIN)/python -m pytest -n auto --dist loadgroup $(ARGS)
+
+soak: $(READY) $(PEERS)
+	$(BIN)/python -m pytest --soak -s --durations=0 $(ARGS)
+
+bench: $(READY) $(PEERS)
+	$(BIN)/python -m bench $(ARGS)
+
+docs: $(READY)
+	$(BIN)/zensical build --strict --clean
+
+check: lint types contracts docs interpreters
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(READY)
+	$(BIN)/mypy $(wildcard $(SOURCES))
+
+contracts: $(READY)
+	$(BIN)/lint-imports
+
+interpreters: $(READY)
+	$(BIN)/python scripts/interpreters.py
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "motorbus needs Python 3.11 or later, \
+	$(PYTHON) is %d.%d; say make PYTHON=..." % sys.version_info[:2])'
+	@$(PYTHON) -m venv .venv || { echo "$(PYTHON) cannot make a virtual environment; on Debian and Ubuntu \
+	the package python3-venv is missing"; exit 1; }
+	@echo "installing the locked dependencies into .venv (once)"
+	@$(BIN)/python -m pip install -qq --require-hashes --requirement requirements.lock
+	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# Other libraries, for tests and measurements against them. Two of them install a module of the same name, so each
+# gets a folder of its own and only ever runs in a process of its own.
+$(PEERS): peers.txt scripts/peers.py | $(READY)
+	@$(BIN)/python scripts/peers.py
+	@touch $@
+
+lock:
+	@$(PYTHON) -m venv --clear build/lock
+	@build/lock/bin/python -m pip install -qq uv
+	build/lock/bin/uv pip compile pyproject.toml --all-extras --group dev --universal --generate-hashes --upgrade \
+		--no-header --no-annotate --quiet --output-file requirements.lock
+	build/lock/bin/uv pip compile peers.in --no-deps --universal --python-version 3.11 --generate-hashes --upgrade \
+		--no-header --no-annotate --quiet --output-file peers.txt
+	@rm -rf build/lock
+
+clean:
+	rm -rf .venv .venvs .peers build .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,175 @@
+/* The other end of the wire for the measurements: thirty servos that answer at once.
+
+   A library can only be timed against something that is never slower than itself, and that notices when a library
+   cheats. So this answers FEETECH PING, READ, WRITE, SYNC READ and SYNC WRITE from plain memory, a whole sync-read
+   train in one write(), and keeps books: the present position of a servo counts how often it was read, so a stale,
+   skipped or doubled reading shows in the values, and every goal that arrives is added up.
+
+   Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
+#define _GNU_SOURCE
+#include <fcntl.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+
+enum { SERVOS = 30, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
+enum { PING = 1, READ = 2, WRITE = 3, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
+
+typedef unsigned char byte;
+
+struct servo {
+    byte memory[256];
+    unsigned long reads, writes, goals;
+};
+
+static struct servo servos[SERVOS + 1];
+static unsigned long frames, strays;
+static byte answer[ROOM];
+static size_t filled;
+
+/* Position of servo n before its first reading; the contenders know the same rule. */
+static unsigned position_of(int id) { return (100u * (unsigned)id + servos[id].reads) % COUNTS; }
+
+static struct servo *servo_of(int id) { return id >= 1 && id <= SERVOS ? &servos[id] : NULL; }
+
+static byte checksum(const byte *from, size_t count) {
+    unsigned sum = 0;
+    while (count--) sum += *from++;
+    return (byte)~sum;
+}
+
+static void reply(int id, const byte *data, size_t count) {
+    byte *frame = answer + filled;
+    if (filled + count + 6 > ROOM) return;
+    frame[0] = frame[1] = 0xFF;
+    frame[2] = (byte)id;
+    frame[3] = (byte)(count + 2);
+    frame[4] = 0;
+    memcpy(frame + 5, data, count);
+    frame[5 + count] = checksum(frame + 2, count + 3);
+    filled += count + 6;
+}
+
+static void read_memory(int id, unsigned address, unsigned count) {
+    struct servo *servo = servo_of(id);
+    if (!servo || address + count > sizeof servo->memory) return;
+    if (address <= POSITION && address + count >= POSITION + 2) {
+        unsigned position = position_of(id);
+        servo->memory[POSITION] = (byte)position;
+        servo->memory[POSITION + 1] = (byte)(position >> 8);
+        servo->reads++;
+    }
+    reply(id, servo->memory + address, count);
+}
+
+static int write_memory(int id, unsigned address, const byte *data, unsigned count) {
+    struct servo *servo = servo_of(id);
+    if (!servo || address + count > sizeof servo->memory) return 0;
+    memcpy(servo->memory + address, data, count);
+    if (address <= GOAL && address + count >= GOAL + 2) {
+        servo->writes++;
+        servo->goals += servo->memory[GOAL] | servo->memory[GOAL + 1] << 8;
+    }
+    return 1;
+}
+
+static void carry_out(int id, int instruction, const byte *parameters, unsigned count) {
+    if (instruction == PING && servo_of(id)) {
+        reply(id, parameters, 0);
+    } else if (instruction == READ && count == 2) {
+        read_memory(id, parameters[0], parameters[1]);
+    } else if (instruction == WRITE && count > 1) {
+        if (write_memory(id, parameters[0], parameters + 1, count - 1)) reply(id, parameters, 0);
+    } else if (instruction == SYNC_READ && count > 2) {
+        for (unsigned i = 2; i < count; i++) read_memory(parameters[i], parameters[0], parameters[1]);
+    } else if (instruction == SYNC_WRITE && count > 2) {
+        unsigned each = parameters[1];
+        for (unsigned i = 2; i + 1 + each <= count; i += 1 + each)
+            write_memory(parameters[i], parameters[0], parameters + i + 1, each);
+    } else {
+        strays++;
+    }
+}
+
+/* Carries out every whole packet in the buffer; returns how many bytes are done with. */
+static size_t take(const byte *from, size_t have) {
+    size_t at = 0;
+    while (have - at >= 6) {
+        const byte *frame = from + at;
+        size_t length = frame[3];
+        if (frame[0] != 0xFF || frame[1] != 0xFF || frame[2] > BROADCAST || length < 2) {
+            strays++, at++;
+            continue;
+        }
+        if (have - at < length + 4) break;
+        if (checksum(frame + 2, length + 1) != frame[length + 3]) {
+            strays++, at++;
+            continue;
+        }
+        frames++;
+        carry_out(frame[2], frame[4], frame + 5, (unsigned)length - 2);
+        at += length + 4;
+    }
+    return at;
+}
+
+static int open_terminal(void) {
+    struct termios raw;
+    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    if (master < 0 || grantpt(master) || unlockpt(master)) exit(1);
+    /* One open slave of our own: the line stays raw, and the master does not hang up when a contender leaves. */
+    int slave = open(ptsname(master), O_RDWR | O_NOCTTY);
+    if (slave < 0 || tcgetattr(slave, &raw)) exit(1);
+    cfmakeraw(&raw);
+    cfsetspeed(&raw, B1000000);
+    if (tcsetattr(slave, TCSANOW, &raw)) exit(1);
+    return master;
+}
+
+static void send_answer(int master) {
+    for (size_t sent = 0; sent < filled;) {
+        ssize_t count = write(master, answer + sent, filled - sent);
+        if (count <= 0) exit(1);
+        sent += (size_t)count;
+    }
+    filled = 0;
+}
+
+static void print_books(void) {
+    printf("{\"frames\": %lu, \"strays\": %lu, \"servos\": {", frames, strays);
+    for (int id = 1; id <= SERVOS; id++)
+        printf("%s\"%d\": [%lu, %lu, %lu]", id > 1 ? ", " : "", id, servos[id].reads, servos[id].writes,
+               servos[id].goals);
+    puts("}}");
+}
+
+int main(void) {
+    static byte buffer[ROOM];
+    size_t have = 0;
+    int master = open_terminal();
+    struct pollfd watched[] = {{.fd = master, .events = POLLIN}, {.fd = STDIN_FILENO, .events = POLLIN}};
+    for (int id = 1; id <= SERVOS; id++) {
+        static const byte identity[] = {3, 10, 0, 9, 3}; /* firmware 3.10, low byte first, STS3215 */
+        memcpy(servos[id].memory, identity, sizeof identity);
+        servos[id].memory[5] = (byte)id;
+    }
+    puts(ptsname(master));
+    fflush(stdout);
+    while (poll(watched, 2, -1) > 0) {
+        if (watched[0].revents & POLLIN) {
+            ssize_t count = read(master, buffer + have, sizeof buffer - have);
+            if (count <= 0) return 1;
+            have += (size_t)count;
+            size_t done = take(buffer, have);
+            memmove(buffer, buffer + done, have -= done);
+            if (filled) send_answer(master);
+        } else if (watched[1].revents) {
+            break;
+        }
+    }
+    print_books();
+    return 0;
+}

@@ -1,0 +1,280 @@
+"""What is in the air: exchanges under way, what comes in for them, and when each is settled.
+
+Every deadline is fixed when the request leaves and no arriving byte extends it. A reply counts only if its key and
+its exact length are due, nothing trails behind it, and its node may be believed. Turns (the queue) builds on this.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from motorbus.bus import verdict
+from motorbus.bus.echo import Echo
+from motorbus.bus.statistics import Statistics
+from motorbus.bus.ticket import Flight
+from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.bus.trust import Trust
+from motorbus.core.family import Family
+from motorbus.core.operation import ANY, Answer, Data, Exchange, Noise, Notice, Rank, Reply, Timeout
+
+MARGIN = {  # s; a busy host may run this late without a reply counting as missing
+    Timeout.SCAN: 0.002,  # silence is the usual answer here, and a second pass follows
+    Timeout.REPLY: 0.02,
+    Timeout.STORE: 0.02,
+}
+EARLY = 0.9  # of the air time: a reply sooner than this on a paced link answers an older request
+
+
+class Air:
+    """The exchanges in flight on one bus, one per lane. `rate` in bit/s, `latency` in seconds, of the link."""
+
+    def __init__(self, family: Family, *, rate: int, latency: float, paced: bool) -> None:
+        self.family = family
+        self.rate = rate
+        self.latency = latency
+        self.paced = paced
+        self.trace: Feed[TraceRecord] = Feed()
+        self.notices: Feed[Notice] = Feed()
+        self.statistics = Statistics()
+        self.trust = Trust(family)
+        self.echo = Echo()
+        self.receiver = family.receiver()
+        self.known: dict[int, Answer | None] = {}
+        self.stop = family.stop(self.known)
+        self._flying: dict[int, Flight] = {}
+        self._free_at = 0.0
+        self._echo_exchange: Exchange[Any] | None = None
+
+    def _failed(self, flight: Flight, kind: str, now: float) -> None:
+        """This try has failed; the queue decides whether there is another."""
+        raise AssertionError("turns decides")
+
+    def _heard(self, notice: Notice) -> None:
+        """Tell whoever listens."""
+        raise AssertionError("turns knows the listeners")
+
+    def _landed(self) -> None:
+        """A lane has become free."""
+        raise AssertionError("turns hands it on")
+
+    # -- what leaves ----------------------------------------------------------------------------------------
+
+    def _launch(self, flight: Flight, now: float) -> Data:
+        exchange = flight.exchange
+        echo_checked = flight.spoiled == "echo" or flight.echo_checked
+        flight.reset()
+        flight.echo_checked = echo_checked
+        self.trust.ask(exchange, now)
+        start = max(now, self._free_at)
+        air = self.family.air_time(exchange, self.rate)
+        flight.sent_at = now
+        flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
+        flight.deadline += MARGIN[exchange.timeout]
+        if exchange.replies == ():
+            self._free_at = start + air
+        else:
+            self._flying[exchange.lane] = flight
+        if isinstance(exchange.request, bytes):
+            self.echo.sent(exchange.request, flight.parent is not None or exchange is self._echo_exchange)
+        self._count_sent(exchange)
+        if self.trace.subscriptions:
+            self.trace.put(TraceRecord(now, "tx", exchange.request))
+        if exchange.replies == ():
+            flight.finish(flight.answer(now))
+        return exchange.request
+
+    def expect_echo(self, exchange: Exchange[Any]) -> None:
+        """This exchange, sent when the bus is opened, shows whether the adapter echoes."""
+        self._echo_exchange = exchange
+
+    def _count_sent(self, exchange: Exchange[Any]) -> None:
+        if exchange.replies is ANY or not exchange.replies:
+            self.statistics.other["sent"] += 1
+            return
+        for due in exchange.replies:
+            self.statistics.of(due.node).sent += 1
+
+    # -- what comes in --------------------------------------------------------------------------------------
+
+    def feed(self, arrived: list[Data], now: float) -> None:
+        """Take what the link delivered, settle what it answers, then what is overdue."""
+        for data in arrived:
+            if self.trace.subscriptions:
+                self.trace.put(TraceRecord(now, "rx", data))
+            if isinstance(data, bytes):
+                data = self.echo.strip(data)
+                if self.echo.broken:
+                    self._echo_broke(now)
+            if data:
+                for event in self.receiver.feed(data):
+                    self._take(event, now)
+        self._land(now)
+        self.expire(now)
+
+    def _take(self, event: Reply | Notice | Noise, now: float) -> None:
+        if isinstance(event, Reply):
+            self._take_reply(event, now)
+        elif isinstance(event, Notice):
+            self.statistics.other["notices"] += 1
+            self.notices.put(event)
+            self._heard(event)
+        else:
+            self._take_noise(event, now)
+
+    def _take_reply(self, reply: Reply, now: float) -> None:
+        flight = self._flying.get(reply.lane)
+        if flight is None:
+            self._nobodys(reply, now)
+        elif reply.data == flight.exchange.request and not flight.echo_checked:
+            self.echo.doubted()
+            flight.spoiled = "echo"
+            self.statistics.other["echo"] += 1
+        elif flight.complete:
+            flight.surplus = True
+        elif not self._is_stale(flight, reply) and not flight.take(reply):
+            self._mismatch(flight, reply, now)
+
+    def _is_stale(self, flight: Flight, reply: Reply) -> bool:
+        """Only flights that go to doubtful nodes without a probe can meet an older reply of their own kind."""
+        return flight.rank is Rank.STOP and self._late(reply)
+
+    def _late(self, reply: Reply) -> bool:
+        if self.trust.late(reply.lane, reply.key, len(reply.data)):
+            self.statistics.other["late"] += 1
+            return True
+        return False
+
+    def _mismatch(self, flight: Flight, reply: Reply, now: float) -> None:
+        dues = flight.exchange.replies
+        mine = dues is not ANY and any(due.key == reply.key for due in dues)
+        if self._late(reply):
+            return
+        if mine and not flight.parent:
+            flight.disbelieve(reply)
+            self.statistics.other["unexpected"] += 1
+        else:
+            self._nobodys(reply, now)
+
+    def _nobodys(self, reply: Reply, now: float) -> None:
+        if self._late(reply):
+            return
+        self.statistics.other["foreign"] += 1
+        self.trust.doubt(now, self._quiet)
+
+    def _take_noise(self, noise: Noise, now: float) -> None:
+        self.statistics.other[noise.fault] += 1
+        if noise.fault == "foreign":
+            return
+        for flight in self._flying.values():
+            if flight.complete:
+                flight.surplus = True
+            flight.noise.append((noise.fault, noise.data[:64]))
+            del flight.noise[:-16]
+        self.trust.doubt(now, self._quiet)
+
+    def _echo_broke(self, now: float) -> None:
+        self.echo.broken = False
+        self.statistics.other["echo"] += 1
+        for flight in self._flying.values():
+            flight.spoiled = "echo"
+        self.trust.doubt(now, self._quiet)
+
+    @property
+    def _quiet(self) -> float:
+        return self.family.quiet_time(self.rate)
+
+    # -- what is settled ------------------------------------------------------------------------------------
+
+    def _land(self, now: float) -> None:
+        for lane, flight in list(self._flying.items()):
+            if not flight.complete or flight.exchange.replies is ANY:
+                continue
+            for event in self.receiver.flush():  # all replies are in, so what is held is surplus
+                self._take(event, now)
+            if self.paced and now < flight.sent_at + EARLY * self.family.air_time(flight.exchange, self.rate):
+                flight.spoiled = "early"
+            if flight.spoiled or flight.surplus:
+                self._lost_try(lane, flight, now)
+            else:
+                self._accepted(lane, flight, now)
+
+    def expire(self, now: float) -> None:
+        """Settle everything whose moment has passed."""
+        for lane, flight in list(self._flying.items()):
+            if now >= flight.deadline:
+                self._overdue(lane, flight, now)
+
+    def _overdue(self, lane: int, flight: Flight, now: float) -> None:
+        held = self.echo.give_up()
+        for event in (self.receiver.feed(held) if held else []) + self.receiver.flush():
+            self._take(event, now)
+        if self._flying.get(lane) is not flight or flight.done:
+            self._flying.pop(lane, None)
+        elif flight.exchange.replies is ANY:
+            self._accepted(lane, flight, now)
+        elif flight.complete:
+            self._land(now)
+        elif len(flight.exchange.replies) > 1 and not flight.spoiled:
+            self._accepted(lane, flight, now)
+        else:
+            self._lost_try(lane, flight, now)
+
+    def _accepted(self, lane: int, flight: Flight, now: float) -> None:
+        answer = flight.answer(now)
+        exchange = flight.exchange
+        if flight.parent is not None and not (exchange.read is not None and exchange.read(answer)):
+            flight.spoiled = "unexpected"
+            self._lost_try(lane, flight, now)
+            return
+        if flight.parent is None and not flight.abandoned:
+            flight.finish(answer)
+        self._believe(flight, answer, now)
+        self._echo_settled(flight)
+        if self._flying.get(lane) is flight:
+            del self._flying[lane]
+        self._landed()
+
+    def _echo_settled(self, flight: Flight) -> None:
+        """A test of the echo has ended, and none came before its answer or its silence."""
+        if self.echo.present is None and (
+            flight.parent is not None or flight.exchange is self._echo_exchange
+        ):
+            self.echo.excluded()
+
+    def _believe(self, flight: Flight, answer: Answer, now: float) -> None:
+        dues = flight.exchange.replies
+        if dues is ANY:
+            return
+        for index, due in enumerate(dues):
+            if index in flight.got and due.node not in flight.unbelieved:
+                self.trust.believe(due, barrier=flight.parent is not None)
+                self.statistics.of(due.node).answered(now - flight.sent_at)
+                self._know(due.node, answer if flight.exchange.tells_position else None)
+            else:
+                if index not in flight.got:
+                    self.trust.missed(flight.exchange.lane, due, now, self._quiet)
+                self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
+
+    def _know(self, node: int, position: Answer | None) -> None:
+        if node not in self.known:
+            self.known[node] = position
+            self.stop = self.family.stop(self.known)
+        elif position is not None:
+            self.known[node] = position
+
+    def _lost_try(self, lane: int, flight: Flight, now: float) -> None:
+        kind = verdict.fault(flight)
+        dues = flight.exchange.replies
+        assert dues is not ANY
+        for index, due in enumerate(dues):
+            if index not in flight.got:
+                self.trust.missed(lane, due, now, self._quiet)
+            else:
+                self.trust.of(due.node).quiet_until = now + self._quiet
+            self.statistics.of(due.node).errors[kind] += 1
+        if kind == "silence":
+            self._echo_settled(flight)
+        self._failed(flight, kind, now)
+        if self._flying.get(lane) is flight:
+            del self._flying[lane]
+        self._landed()

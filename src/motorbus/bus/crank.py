@@ -1,0 +1,70 @@
+"""One turn of the crank: what every pump does between two looks at its operation.
+
+Send what may be sent, wait for what comes (or for the next moment that matters), hand it to turns. Shared by the
+blocking pump, the async pump and the stop thread, so that none of them has policy of its own.
+"""
+
+from __future__ import annotations
+
+from motorbus.bus.ticket import Flight
+from motorbus.bus.turns import Turns
+from motorbus.core.operation import Tune
+from motorbus.errors import LinkError, MotorbusError
+from motorbus.link.base import Link
+
+IDLE = 0.25  # s; the longest wait when nothing is awaited from the wire
+
+
+def crank(link: Link, turns: Turns, until: float) -> None:
+    """Send, wait at most `until`, take in. A lost link fails everything awaited and does not raise."""
+    try:
+        with turns.lock:
+            now = flush(link, turns)
+            due = turns.due()
+        arrived = link.read(min(until, due, now + IDLE))
+        with turns.lock:
+            turns.feed(arrived, link.now())
+    except LinkError as error:
+        with turns.lock:
+            turns.lost(error)
+
+
+def flush(link: Link, turns: Turns) -> float:
+    """Put onto the wire whatever may go now; the caller holds the lock. Returns the time."""
+    now = link.now()
+    turns.expire(now)
+    if turns.waiting:
+        drain(link, turns, now)
+    while (out := turns.send(now)) is not None:
+        if isinstance(out, Tune):
+            link.tune(out.rate)
+        else:
+            link.write(out)
+    return now
+
+
+def drain(link: Link, turns: Turns, now: float) -> None:
+    """What has already arrived cannot answer a request that has not left: take it in first."""
+    stale = link.read(now)
+    if stale:
+        turns.feed(stale, now)
+
+
+def launch(link: Link, turns: Turns, flight: Flight, *, idle: bool) -> None:
+    """The short path where it may be taken, the queue otherwise."""
+    try:
+        with turns.lock:
+            now = link.now()
+            if idle and turns.idle:
+                drain(link, turns, now)
+                request = turns.short(flight, now)
+                if request is not None:
+                    link.write(request)
+                    return
+            turns.submit(flight, now)
+    except LinkError as error:
+        with turns.lock:
+            turns.lost(error)
+            flight.finish(error=error)
+    except MotorbusError as refusal:
+        flight.finish(error=refusal)

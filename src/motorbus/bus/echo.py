@@ -1,0 +1,59 @@
+"""Some adapters hand back every byte that is sent. An echo can be a perfect forgery of an answer.
+
+The echo of a FEETECH READ is a valid status frame, the echo of a PING is a PING reply with an alarm. So echo is
+found out by an exchange whose answer differs in length (at open, and again by every probe after a doubt), and from
+then on exactly the bytes sent are taken off what comes in.
+"""
+
+from __future__ import annotations
+
+
+class Echo:
+    """`present` is None while unknown. `strip` takes off what is expected back."""
+
+    def __init__(self) -> None:
+        self.present: bool | None = None
+        self.broken = False
+        self._expected = b""
+        self._matched = b""
+
+    def sent(self, data: bytes, testing: bool) -> None:
+        """These bytes leave; `testing` when their answer can tell whether they come back."""
+        if self.present or (self.present is None and testing):
+            self._expected += data
+
+    def strip(self, data: bytes) -> bytes:
+        """What remains of incoming bytes without the echo; sets `broken` when an echo was due and did not come."""
+        expected = self._expected
+        if not expected:
+            return data
+        count = min(len(expected), len(data))
+        if data[:count] != expected[:count]:
+            return self._differs(data)
+        self._expected = expected[count:]
+        self._matched += data[:count]
+        if not self._expected:
+            self.present = True
+            self._matched = b""
+        return data[count:]
+
+    def _differs(self, data: bytes) -> bytes:
+        data = self._matched + data
+        if self.present:
+            self.broken = True
+            self.present = None
+        self.give_up()
+        return data
+
+    def give_up(self) -> bytes:
+        """Nothing more is coming: the bytes held back as the beginning of an echo."""
+        held, self._matched, self._expected = self._matched, b"", b""
+        return held
+
+    def excluded(self) -> None:
+        """An answer came that no echo preceded."""
+        self.present = False
+
+    def doubted(self) -> None:
+        """The bytes sent came back where none were expected: find out again."""
+        self.present = None

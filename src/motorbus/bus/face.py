@@ -1,0 +1,92 @@
+"""What a blocking and an async bus have in common: their parts, their watchers, their emergency stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from threading import Condition
+from typing import Any
+
+from motorbus.bus.statistics import Statistics
+from motorbus.bus.stop import StopOutcome, Stopper
+from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.bus.turns import GATED, Admit, Turns
+from motorbus.core.family import Family
+from motorbus.core.operation import Exchange, Notice
+from motorbus.link.base import Link
+
+
+class BusFace:
+    """An open bus: one link, one family, one set of turns.
+
+    `admit` is asked before anything that moves a motor or switches torque is sent; without it such exchanges are
+    refused. `report` gets the events of operations (progress, early results, journal records). `stop_socket` is
+    where another process can ask for an emergency stop.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        family: Family,
+        *,
+        admit: Admit | None = None,
+        report: Callable[[object], None] | None = None,
+        stop_socket: Path | None = None,
+    ) -> None:
+        self.link = link
+        self.family = family
+        self.report = report
+        self.turns = Turns(
+            family,
+            rate=link.rate,
+            latency=link.latency,
+            paced=link.paced,
+            admit=self._armed(admit) if admit is not None else None,
+        )
+        self.changed = Condition(self.turns.lock)
+        self.stopper = Stopper(link, self.turns, stop_socket)
+
+    def _armed(self, admit: Admit) -> Admit:
+        def admitted(exchange: Exchange[Any]) -> None:
+            admit(exchange)
+            if exchange.effect in GATED:
+                self.stopper.start()
+
+        return admitted
+
+    @property
+    def statistics(self) -> Statistics:
+        """Counts and latencies per node."""
+        return self.turns.statistics
+
+    @property
+    def trace(self) -> Feed[TraceRecord]:
+        """Subscribe to every request and delivery."""
+        return self.turns.trace
+
+    @property
+    def notices(self) -> Feed[Notice]:
+        """Subscribe to what devices say on their own account."""
+        return self.turns.notices
+
+    @property
+    def simulated(self) -> bool:
+        """There is no real device behind this bus."""
+        return self.link.simulated
+
+    @property
+    def rate(self) -> int:
+        """Bit/s at present."""
+        return self.turns.rate
+
+    def estop(self) -> StopOutcome:
+        """Emergency stop: drop the queue, send the stop frames until acknowledged or five times, and latch.
+
+        Afterwards motion and torque are refused with Interrupted until `reset()`. May be called from any thread.
+        """
+        return self.stopper.estop()
+
+    def reset(self) -> None:
+        """Take the latch of an emergency stop off. Nothing is sent and nothing moves."""
+        with self.turns.lock:
+            self.turns.reset()

@@ -1,0 +1,286 @@
+"""One operation under way: steps its generators, hands their wishes to turns, brings the results back.
+
+Both pumps drive a `Run` in the same way: `advance()` until it says it is finished, letting time pass in between.
+A started operation is never closed. When its caller is interrupted, the interruption is thrown in, the clean-up
+steps the operation then yields are carried out under a deadline of their own, and the interruption is raised again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any, Generic, TypeVar
+
+from motorbus.bus import verdict
+from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
+from motorbus.bus.turns import Turns
+from motorbus.core.operation import (
+    Alone,
+    Exchange,
+    Journal,
+    Listen,
+    Operation,
+    Pause,
+    Report,
+    Runnable,
+    Step,
+    Together,
+    Tune,
+)
+from motorbus.errors import RequestError
+
+T = TypeVar("T")
+
+CLEAN_UP = 2.0  # s for the clean-up steps of an interrupted operation
+HURRY = 0.25  # s when it is interrupted once more
+
+Notify = Callable[[object], None]
+
+
+class Branch:
+    """One generator and the one thing it waits for: a ticket, or its children."""
+
+    __slots__ = (
+        "alone",
+        "children",
+        "claimed",
+        "error",
+        "finished",
+        "generator",
+        "owner",
+        "started",
+        "ticket",
+        "value",
+    )
+
+    def __init__(self, operation: Runnable[Any], parent: Branch | None, alone: bool = False) -> None:
+        self.generator: Operation[Any] = iter(operation) if isinstance(operation, Exchange) else operation
+        self.alone = alone
+        self.claimed = False
+        self.owner: object = parent.owner if parent is not None and parent.owner is not None else None
+        if alone and self.owner is None:
+            self.owner = self  # the outermost one owns the bus; what is nested in it belongs to it
+        self.ticket: Ticket | None = None
+        self.children: list[Branch] = []
+        self.started = self.finished = False
+        self.value: Any = None
+        self.error: BaseException | None = None
+
+
+class Run(Generic[T]):
+    """Carries out one operation on one bus. Not for two threads at once."""
+
+    def __init__(
+        self,
+        turns: Turns,
+        operation: Runnable[T],
+        *,
+        now: Callable[[], float],
+        report: Notify | None = None,
+        wake: Callable[[], None] | None = None,
+    ) -> None:
+        self.turns = turns
+        self.now = now
+        self.report = report
+        self.wake = wake
+        self.interruption: BaseException | None = None
+        self.deadline = inf
+        self.root = Branch(operation, None)
+
+    # -- forward --------------------------------------------------------------------------------------------
+
+    def advance(self) -> bool:
+        """Step everything that can go on; True when the operation has ended."""
+        if self.now() >= self.deadline:
+            self._give_up()
+        while self._pass(self.root):
+            pass
+        return self.root.finished
+
+    def _pass(self, branch: Branch) -> bool:
+        """One look at this branch and below; True when something moved."""
+        if branch.finished:
+            return False
+        if not branch.started:
+            branch.started = True
+            self._step(branch)
+            return True
+        if branch.ticket is not None:
+            if not branch.ticket.done:
+                return False
+            self._step(branch, *self._settled(branch))
+            return True
+        moved = [self._pass(child) for child in branch.children]
+        if all(child.finished for child in branch.children):
+            self._join(branch)
+            return True
+        return any(moved)
+
+    def _settled(self, branch: Branch) -> tuple[Any, BaseException | None]:
+        ticket, branch.ticket = branch.ticket, None
+        assert ticket is not None
+        if ticket.error is not None:
+            return None, ticket.error
+        if isinstance(ticket, Claim):
+            branch.claimed = True
+            return None, None
+        if not isinstance(ticket, Flight) or ticket.exchange.read is None:
+            return ticket.value, None
+        try:
+            return ticket.exchange.read(ticket.value), None
+        except Exception as error:  # the driver's own verdict on the answer belongs to the driver's generator
+            return None, error
+
+    def _step(self, branch: Branch, value: Any = None, error: BaseException | None = None) -> None:
+        try:
+            if error is not None:
+                wish = branch.generator.throw(error)
+            else:
+                wish = branch.generator.send(value)
+        except StopIteration as end:
+            self._finish(branch, end.value, None)
+        except BaseException as failure:  # noqa: BLE001 - it travels to the caller, whatever it is
+            self._finish(branch, None, failure)
+        else:
+            self._grant(branch, wish)
+
+    def _grant(self, branch: Branch, wish: Step) -> None:
+        if isinstance(wish, Together):
+            branch.children = [Branch(operation, branch) for operation in wish.operations]
+        elif isinstance(wish, Alone):
+            branch.children = [Branch(_claimed(wish), branch, alone=True)]
+        elif isinstance(wish, Report):
+            self._notify(branch, wish.event)
+        else:
+            self._await(branch, self._ticket(branch.owner, wish))
+
+    def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune | _Claiming) -> Ticket:
+        if isinstance(wish, Exchange):
+            return Flight(wish, owner, self.wake)
+        if isinstance(wish, _Claiming):
+            return Claim(owner, self.wake)
+        if isinstance(wish, Tune):
+            return Retune(wish, owner, self.wake)
+        if isinstance(wish, Listen):
+            listener = Listener(wish, owner, self.wake)
+            listener.deadline = self.now() + wish.until
+            return listener
+        timer = Timer(owner, self.wake)
+        timer.deadline = self.now() + wish.seconds
+        return timer
+
+    def _await(self, branch: Branch, ticket: Ticket) -> None:
+        branch.ticket = ticket
+        if self.now() >= self.deadline:
+            ticket.finish(error=verdict.cancelled())
+            return
+        with self.turns.lock:
+            self.turns.submit(ticket, self.now())
+
+    def _notify(self, branch: Branch, event: object) -> None:
+        done = Ticket()
+        branch.ticket = done
+        if self.report is None and isinstance(event, Journal):
+            done.finish(error=_no_journal(event))
+            return
+        try:
+            if self.report is not None:
+                self.report(event)
+        except Exception as error:  # what the listener raises is the operation's to clean up after
+            done.finish(error=error)
+        done.finish()
+
+    def _finish(self, branch: Branch, value: Any, error: BaseException | None) -> None:
+        branch.value, branch.error = value, error
+        if branch.claimed:
+            with self.turns.lock:
+                branch.claimed = False
+                self.turns.release(branch.owner)
+        branch.finished = True
+
+    def _join(self, branch: Branch) -> None:
+        """All children have ended: their results, or the first error, go to the parent."""
+        children, branch.children = branch.children, []
+        errors = [child.error for child in children if child.error is not None]
+        if errors:
+            for other in errors[1:]:
+                errors[0].add_note(f"also: {other}")
+            self._step(branch, error=errors[0])
+        elif len(children) == 1 and children[0].alone:
+            self._step(branch, children[0].value)
+        else:
+            self._step(branch, [child.value for child in children])
+
+    # -- interrupted ----------------------------------------------------------------------------------------
+
+    def interrupt(self, interruption: BaseException) -> None:
+        """The caller must go: throw this into everything that waits, in order, and let it clean up."""
+        if self.interruption is None:
+            self.interruption = interruption
+            self.deadline = self.now() + CLEAN_UP
+        else:
+            self.deadline = min(self.deadline, self.now() + HURRY)
+            return
+        self._throw(self.root, interruption)
+
+    def _throw(self, branch: Branch, interruption: BaseException) -> None:
+        if branch.finished:
+            return
+        if not branch.started:
+            branch.started = True
+            self._finish(branch, None, interruption)
+            branch.generator.close()  # it has not begun, so it has nothing to clean up
+            return
+        for child in branch.children:
+            self._throw(child, interruption)
+        if not branch.children:
+            self._abandon(branch)
+            self._step(branch, error=interruption)
+
+    def _abandon(self, branch: Branch) -> None:
+        ticket, branch.ticket = branch.ticket, None
+        if ticket is not None:
+            with self.turns.lock:
+                granted = isinstance(ticket, Claim) and ticket.done
+                self.turns.abandon(ticket)
+                branch.claimed = branch.claimed or granted
+
+    def _give_up(self) -> None:
+        """The clean-up took too long: whatever it still waits for fails at once."""
+        for branch in _waiting(self.root):
+            if branch.ticket is not None:
+                with self.turns.lock:
+                    self.turns.abandon(branch.ticket)
+
+    def result(self) -> T:
+        """What the operation returned; raises what it raised, or the interruption it was cut by."""
+        if self.interruption is not None:
+            raise self.interruption
+        if self.root.error is not None:
+            raise self.root.error
+        value: T = self.root.value
+        return value
+
+
+class _Claiming:
+    """The wish to have the bus alone; only `_claimed` makes it."""
+
+
+def _claimed(alone: Alone[Any]) -> Operation[Any]:
+    inner = alone.operation
+    yield _Claiming()  # type: ignore[misc]  # an eighth step that no driver can say
+    return (yield from inner)
+
+
+def _waiting(branch: Branch) -> list[Branch]:
+    if branch.finished:
+        return []
+    return [branch, *(leaf for child in branch.children for leaf in _waiting(child))]
+
+
+def _no_journal(event: Journal) -> RequestError:
+    return RequestError(
+        f"this bus keeps no journal, so it refuses to {event.change}",
+        cause="a guarded change must be on disk before it begins, or a crash in the middle could not be mended",
+        advice="open the bus with motorbus.open(), or give it a `report`; nothing was sent",
+    )

@@ -1,0 +1,42 @@
+"""How well each node is doing: counted by turns, read by anyone, reset by nobody.
+
+`sent = ok + errors + what is in flight` balances per node; a retry counts as sent again.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+BUCKETS = 24
+
+
+@dataclass(slots=True)
+class NodeStatistics:
+    """One node's ledger. `latency[k]` counts replies that took at least 2**(k-1) and less than 2**k µs."""
+
+    sent: int = 0
+    ok: int = 0
+    retries: int = 0
+    errors: Counter[str] = field(default_factory=Counter)
+    latency: list[int] = field(default_factory=lambda: [0] * BUCKETS)
+
+    def answered(self, seconds: float) -> None:
+        """One good reply after this time."""
+        self.ok += 1
+        self.latency[min(int(seconds * 1e6).bit_length(), BUCKETS - 1)] += 1
+
+
+@dataclass(slots=True)
+class Statistics:
+    """The ledgers of all nodes, and what belongs to none: noise, foreign frames, notices, echoes."""
+
+    nodes: dict[int, NodeStatistics] = field(default_factory=dict)
+    other: Counter[str] = field(default_factory=Counter)
+
+    def of(self, node: int) -> NodeStatistics:
+        """This node's ledger, a new one at its first exchange."""
+        ledger = self.nodes.get(node)
+        if ledger is None:
+            ledger = self.nodes[node] = NodeStatistics()
+        return ledger

@@ -1,0 +1,207 @@
+"""The emergency stop, which goes through whatever happens.
+
+Every bus has one sleeping stop thread from its first motion or torque command on. `estop()` wakes it by one byte
+through a socket pair, so a signal handler may do the same; it latches the turns, writes the stop frames and repeats
+them until every node has acknowledged, or five times. It needs neither the event loop nor the thread that pumps; it
+does need this process and its interpreter lock. Another process asks for it over a local socket beside the lock
+file. Over a link with virtual time there is no thread: the caller turns the crank.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from selectors import EVENT_READ, DefaultSelector
+from threading import Event, Lock, Thread
+from typing import NamedTuple
+
+from motorbus.bus.crank import crank
+from motorbus.bus.ticket import Flight
+from motorbus.bus.turns import Turns
+from motorbus.core.operation import ANY, Answer, Exchange
+from motorbus.errors import LinkError, PortNotFound
+from motorbus.link.base import Link
+
+ROUNDS = 5
+ROUND_TIME = 0.25  # s for all frames of one round, whatever the line does
+PATIENCE = 5.0  # s that a caller waits for the stop thread
+
+
+class StopOutcome(NamedTuple):
+    """What an emergency stop achieved: who acknowledged, who did not, and what that promises."""
+
+    acknowledged: tuple[int, ...]
+    silent: tuple[int, ...]
+    rounds: int
+    promise: str
+
+
+class Stopper:
+    """The emergency stop of one bus."""
+
+    def __init__(self, link: Link, turns: Turns, socket_path: Path | None = None) -> None:
+        self.link = link
+        self.turns = turns
+        self.socket_path = socket_path
+        self.outcome: StopOutcome | None = None
+        self._wish, self._wake = socket.socketpair()
+        self._done = Event()
+        self._starting = Lock()
+        self._thread: Thread | None = None
+        self._closed = False
+
+    def start(self) -> None:
+        """Have the stop thread ready; does nothing when it is, or where time is virtual."""
+        with self._starting:
+            if self._thread is None and not self.link.virtual and not self._closed:
+                self._thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
+                self._thread.start()
+
+    def trigger(self) -> None:
+        """Ask for the stop and return at once; safe in a signal handler."""
+        with contextlib.suppress(OSError):
+            self._wake.send(b"!")
+
+    def estop(self) -> StopOutcome:
+        """Stop, and wait for the outcome."""
+        if self.link.virtual:
+            return self.stop()
+        self.start()
+        self._done.clear()
+        self.trigger()
+        self._done.wait(PATIENCE)
+        return self.outcome or StopOutcome(
+            (), tuple(self.turns.known), 0, "nothing: the stop thread gave no sign"
+        )
+
+    def stop(self) -> StopOutcome:
+        """Latch and send the stop frames; runs in the stop thread, or in the caller's where time is virtual."""
+        with self.turns.lock:
+            frames = self.turns.latch(self.link.now())
+        pending = list(frames.exchanges)
+        acknowledged: list[int] = []
+        rounds = 0
+        while pending and rounds < ROUNDS:
+            rounds += 1
+            pending = self._round(pending, acknowledged)
+        with self.turns.lock:
+            self.turns.stopped()
+        silent = tuple(node for node in self.turns.known if node not in acknowledged)
+        return StopOutcome(tuple(acknowledged), silent, rounds, frames.promise)
+
+    def _round(self, exchanges: list[Exchange[Answer]], acknowledged: list[int]) -> list[Exchange[Answer]]:
+        """Send each once; returns those whose acknowledgement is missing."""
+        flights = [Flight(exchange) for exchange in exchanges]
+        limit = self.link.now() + ROUND_TIME + sum(self._air(exchange) for exchange in exchanges)
+        with self.turns.lock:
+            for flight in flights:
+                self.turns.submit(flight, self.link.now())
+        while not all(flight.done for flight in flights) and self.link.now() < limit:
+            crank(self.link, self.turns, limit)
+        return [flight.exchange for flight in flights if not self._settled(flight, acknowledged)]
+
+    def _air(self, exchange: Exchange[Answer]) -> float:
+        turns = self.turns
+        return turns.family.air_time(exchange, turns.rate) + turns.family.turnaround(exchange) + turns.latency
+
+    def _settled(self, flight: Flight, acknowledged: list[int]) -> bool:
+        with self.turns.lock:
+            if not flight.done:
+                self.turns.abandon(flight)
+        if flight.error is not None:
+            return False
+        dues = flight.exchange.replies
+        if dues is not ANY:
+            acknowledged += [due.node for due in dues if due.node not in acknowledged]
+        return True
+
+    # -- the thread -----------------------------------------------------------------------------------------
+
+    def _serve(self) -> None:
+        with DefaultSelector() as ready, _listening(self.socket_path) as listener:
+            ready.register(self._wish, EVENT_READ)
+            if listener is not None:
+                ready.register(listener, EVENT_READ)
+            while not self._closed:
+                for key, _ in ready.select():
+                    if key.fileobj is self._wish:
+                        self._wished()
+                    else:
+                        self._asked(listener)
+
+    def _wished(self) -> None:
+        self._wish.recv(4096)
+        if not self._closed:
+            self._stop_and_tell()
+
+    def _stop_and_tell(self) -> StopOutcome:
+        self.outcome = self.stop()
+        self._done.set()
+        return self.outcome
+
+    def _asked(self, listener: socket.socket | None) -> None:
+        assert listener is not None
+        with contextlib.suppress(OSError):
+            client, _ = listener.accept()
+            with client:
+                client.settimeout(1.0)
+                if client.recv(64).strip() == b"estop":
+                    outcome = self._stop_and_tell()
+                    client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
+
+    def close(self) -> None:
+        """End the thread. Nothing is sent."""
+        self._closed = True
+        self.trigger()
+        if self._thread is not None:
+            self._thread.join(PATIENCE)
+        self._wish.close()
+        self._wake.close()
+
+
+@contextlib.contextmanager
+def _listening(path: Path | None) -> Iterator[socket.socket | None]:
+    """A local socket at this path, mode 0600, or None where there is none to serve."""
+    if path is None or not hasattr(socket, "AF_UNIX"):
+        yield None
+        return
+    with socket.socket(socket.AF_UNIX) as listener:
+        path.unlink(missing_ok=True)
+        mask = os.umask(0o177)
+        try:
+            listener.bind(str(path))
+        finally:
+            os.umask(mask)
+        listener.listen(4)
+        try:
+            yield listener
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
+    """Ask the process that serves this socket for an emergency stop, and wait for what came of it.
+
+    Raises PortNotFound when nobody serves it, LinkError when the process does not answer in time.
+    """
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(timeout)
+        try:
+            client.connect(str(path))
+            client.sendall(b"estop\n")
+            reply = client.makefile("rb").readline()
+        except (FileNotFoundError, ConnectionRefusedError):
+            raise PortNotFound(
+                "no motorbus process offers an emergency stop for this bus",
+                cause="none holds it, or the one that does has not yet commanded motion or torque",
+            ) from None
+        except OSError as error:
+            raise LinkError(f"the process that holds the bus did not answer: {error}") from error
+    outcome = json.loads(reply)
+    return StopOutcome(
+        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
+    )

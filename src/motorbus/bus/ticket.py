@@ -1,0 +1,164 @@
+"""What somebody waits for: an exchange, a moment, a notice, a change of rate, or the bus for itself.
+
+Turns finishes a ticket; its owner looks at `done`. The order of assignments in `finish` matters: an interrupt at
+any line leaves either an unfinished ticket or a complete one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+from motorbus.core.operation import ANY, Answer, Exchange, Listen, Rank, Reply, Tune
+
+
+class Ticket:
+    """Something awaited. `owner` is the run it belongs to, `deadline` when turns must look at it again."""
+
+    __slots__ = ("deadline", "done", "error", "owner", "value", "wake")
+
+    def __init__(self, owner: object = None, wake: Callable[[], None] | None = None) -> None:
+        self.owner = owner
+        self.wake = wake
+        self.deadline = inf
+        self.value: Any = None
+        self.error: BaseException | None = None
+        self.done = False
+
+    def finish(self, value: object = None, error: BaseException | None = None) -> None:
+        """Settle it, once; later calls change nothing."""
+        if not self.done:
+            self.value = value
+            self.error = error
+            self.done = True
+            if self.wake is not None:
+                self.wake()
+
+    def result(self) -> Any:
+        """The value; raises the error."""
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+
+class Timer(Ticket):
+    """Awaits a moment."""
+
+    __slots__ = ()
+
+
+class Listener(Ticket):
+    """Awaits a notice, or a moment."""
+
+    __slots__ = ("listen",)
+
+    def __init__(self, listen: Listen, owner: object, wake: Callable[[], None] | None) -> None:
+        super().__init__(owner, wake)
+        self.listen = listen
+
+
+class Retune(Ticket):
+    """Awaits a change of the link's rate."""
+
+    __slots__ = ("tune",)
+
+    def __init__(self, tune: Tune, owner: object, wake: Callable[[], None] | None) -> None:
+        super().__init__(owner, wake)
+        self.tune = tune
+
+
+class Claim(Ticket):
+    """Awaits the bus for its owner alone."""
+
+    __slots__ = ()
+
+
+class Flight(Ticket):
+    """Awaits the answer to one exchange, over all its tries."""
+
+    __slots__ = (
+        "abandoned",
+        "complete",
+        "echo_checked",
+        "exchange",
+        "got",
+        "noise",
+        "parent",
+        "sent_at",
+        "spoiled",
+        "surplus",
+        "tries",
+        "unbelieved",
+    )
+
+    def __init__(
+        self,
+        exchange: Exchange[Any],
+        owner: object = None,
+        wake: Callable[[], None] | None = None,
+        parent: Flight | None = None,
+    ) -> None:
+        super().__init__(owner, wake)
+        self.exchange = exchange
+        self.parent = parent
+        self.tries = 0
+        self.abandoned = False
+        self.echo_checked = False
+        self.unbelieved: tuple[int, ...] = ()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what the last try brought."""
+        self.sent_at = 0.0
+        self.got: dict[int, Reply] = {}
+        self.noise: list[tuple[str, bytes]] = []
+        self.spoiled = ""
+        self.surplus = False
+        self.complete = self.exchange.replies == ()
+
+    @property
+    def rank(self) -> Rank:
+        return self.exchange.rank
+
+    def take(self, reply: Reply) -> bool:
+        """Is this one of the replies due? Keeps it if so."""
+        dues = self.exchange.replies
+        if dues is ANY:
+            self.got[len(self.got)] = reply
+            return True
+        size = len(reply.data)
+        for index, (_, key, length) in enumerate(dues):
+            if key == reply.key and length == size and index not in self.got:
+                self.got[index] = reply
+                self.complete = len(self.got) == len(dues) or self._all_believed_here()
+                return True
+        return False
+
+    def _all_believed_here(self) -> bool:
+        """A group does not wait for a node that is known to be silent."""
+        dues = self.exchange.replies
+        return dues is not ANY and all(
+            index in self.got or due.node in self.unbelieved for index, due in enumerate(dues)
+        )
+
+    def disbelieve(self, reply: Reply) -> None:
+        """A node of this exchange sent something else: in a group it alone is lost, else the whole try."""
+        dues = self.exchange.replies
+        if dues is not ANY and len(dues) > 1:
+            self.unbelieved += tuple(due.node for due in dues if due.key == reply.key)
+            self.complete = self._all_believed_here()
+        else:
+            self.spoiled = self.spoiled or "unexpected"
+
+    def answer(self, at: float) -> Answer:
+        """What came, in the order due; a reply of a node that is not believed counts as missing."""
+        dues = self.exchange.replies
+        got = self.got
+        if dues is ANY:
+            return Answer(tuple(got.values()), (), at)
+        if len(got) == len(dues) and not self.unbelieved:
+            return Answer(tuple([got[i] for i in range(len(dues))]), (), at)
+        here = [i for i, due in enumerate(dues) if i in got and due.node not in self.unbelieved]
+        missing = tuple(due.node for i, due in enumerate(dues) if i not in here)
+        return Answer(tuple(got[i] for i in here), missing, at)

@@ -1,0 +1,119 @@
+"""Which nodes may be believed. Decision record 0006.
+
+A node is tainted before the first byte of a request to it leaves, and cleared only when its reply has been
+accepted; so every other way out, an interrupt at any line included, leaves it tainted by construction. A tainted
+node is left alone for a quiet time and then probed: an exchange with a known answer whose reply cannot be
+confused with any reply still outstanding. Device and adapter are first-in first-out, so once that answer is here
+nothing older can follow.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from motorbus.core.family import Family
+from motorbus.core.operation import ANY, Due, Exchange, Key
+
+FORGOTTEN_AFTER = 5.0  # s; no device of any family answers this late, so the memory of a request may end
+LONGEST_BACK_OFF = 1.0  # s between probes of a node that stays silent while a group is read
+ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding replies
+
+
+class NodeTrust:
+    """One node: may it be believed, what is still outstanding, when may it be probed."""
+
+    __slots__ = ("asked_at", "attempt", "outstanding", "probe_at", "quiet_until", "silent", "tainted")
+
+    def __init__(self) -> None:
+        self.tainted = False
+        self.asked_at = 0.0
+        self.quiet_until = 0.0
+        self.probe_at = 0.0
+        self.silent = 0
+        self.attempt = 0
+        self.outstanding: dict[tuple[int, Key, int], float] = {}
+
+
+class Trust:
+    """The nodes of one bus."""
+
+    def __init__(self, family: Family) -> None:
+        self.family = family
+        self.nodes: dict[int, NodeTrust] = {}
+
+    def of(self, node: int) -> NodeTrust:
+        """This node's state, a clean one when it was never asked."""
+        trust = self.nodes.get(node)
+        if trust is None:
+            trust = self.nodes[node] = NodeTrust()
+        return trust
+
+    def ask(self, exchange: Exchange[Any], now: float) -> None:
+        """A request is about to leave: taint every node that owes a reply."""
+        if exchange.replies is not ANY:
+            for due in exchange.replies:
+                trust = self.of(due.node)
+                trust.tainted = True
+                trust.asked_at = now
+
+    def missed(self, lane: int, due: Due, now: float, quiet: float) -> None:
+        """This reply did not come in time and may still come."""
+        trust = self.of(due.node)
+        trust.outstanding[lane, due.key, due.length] = now
+        trust.quiet_until = now + quiet
+
+    def believe(self, due: Due, barrier: bool) -> None:
+        """This reply is accepted. Only a probe (`barrier`) vouches for a node with replies outstanding."""
+        trust = self.nodes[due.node]
+        if barrier:
+            trust.outstanding.clear()
+        if not trust.outstanding:
+            trust.tainted = False
+            trust.silent = 0
+
+    def doubt(self, now: float, quiet: float) -> None:
+        """Bytes came that belong to nobody: whoever was asked lately may have sent them."""
+        for trust in self.nodes.values():
+            if now - trust.asked_at <= quiet and not trust.tainted:
+                trust.tainted = True
+                trust.quiet_until = now + quiet
+
+    def doubt_node(self, node: int, now: float, quiet: float) -> None:
+        """This node sent something that nobody asked for."""
+        trust = self.of(node)
+        if not trust.tainted:
+            trust.tainted = True
+            trust.quiet_until = now + quiet
+
+    def late(self, lane: int, key: Key, length: int) -> bool:
+        """Is a reply of this kind outstanding from anyone? It is then no longer."""
+        for trust in self.nodes.values():
+            if trust.outstanding.pop((lane, key, length), None) is not None:
+                return True
+        return False
+
+    def probe(self, node: int, now: float) -> Exchange[bool]:
+        """The next probe of this node whose reply differs from every reply outstanding."""
+        trust = self.of(node)
+        for kind, asked in list(trust.outstanding.items()):
+            if now - asked > FORGOTTEN_AFTER:
+                del trust.outstanding[kind]
+        oldest: tuple[float, Exchange[bool]] | None = None
+        for _ in range(ATTEMPTS):
+            exchange = self.family.probe(node, trust.attempt)
+            trust.attempt += 1
+            due = exchange.replies[0]  # type: ignore[index]  # a probe has exactly one reply
+            asked_at = trust.outstanding.get((exchange.lane, due.key, due.length))
+            if asked_at is None:
+                return exchange
+            if oldest is None or asked_at < oldest[0]:
+                oldest = asked_at, exchange
+        assert oldest is not None
+        return oldest[1]
+
+    def stayed_silent(self, node: int, now: float, quiet: float) -> None:
+        """A probe was not answered: leave the node alone, longer each time."""
+        trust = self.of(node)
+        trust.silent += 1
+        trust.quiet_until = now
+        trust.probe_at = now + min(quiet * 2.0**trust.silent, LONGEST_BACK_OFF)

@@ -1,0 +1,340 @@
+"""Who talks when, on one bus: all policy in one state machine that never waits and never reads a clock.
+
+Time and bytes come in, bytes and results go out. Tickets wait in four queues by rank; `send` picks the next that
+may go, `feed` takes what arrived, `due` says when to look again. One exchange flies per lane, as many lanes as the
+family's window allows. Every deadline is fixed when the request leaves and no arriving byte extends it.
+
+The pumps hold `lock` around every call. An interrupt at any line leaves the state usable: a node is tainted before
+anything else happens to it, a flight keeps its deadline, and what is half done is done again or times out.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from math import inf
+from threading import RLock
+from typing import Any
+
+from motorbus.bus import verdict
+from motorbus.bus.air import Air
+from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
+from motorbus.core.family import Family, Stop
+from motorbus.core.operation import (
+    ANY,
+    Data,
+    Effect,
+    Exchange,
+    Notice,
+    Rank,
+    Timeout,
+    Tune,
+)
+from motorbus.errors import LinkError, MotorbusError, RequestError
+
+RETRIES = 2  # of a repeatable exchange, after the first try
+GATED = (Effect.MOTION, Effect.TORQUE)
+KEPT = (
+    Effect.PERSISTENT,
+    Effect.IDENTITY,
+)  # an emergency stop lets these follow it, so that locks get closed
+
+Admit = Callable[[Exchange[Any]], None]
+
+
+class Turns(Air):
+    """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link."""
+
+    def __init__(
+        self,
+        family: Family,
+        *,
+        rate: int,
+        latency: float = 0.0,
+        paced: bool = False,
+        admit: Admit | None = None,
+    ) -> None:
+        super().__init__(family, rate=rate, latency=latency, paced=paced)
+        self.admit = admit
+        self.lock = RLock()
+        self.latched = False
+        self.stopping = False
+        self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
+        self._timers: list[Timer | Listener] = []
+        self._claims: deque[Claim] = deque()
+        self._holder: object = None
+        self._held = 0
+        self._look_at = inf
+
+    # -- what is wanted -------------------------------------------------------------------------------------
+
+    def submit(self, ticket: Ticket, now: float) -> None:
+        """Take a ticket into the queues. `ticket.deadline` of a timer or listener is set by its owner."""
+        if isinstance(ticket, Flight):
+            if ticket.done:
+                return
+            if self.latched and ticket.exchange.effect in GATED and ticket.rank is not Rank.STOP:
+                ticket.finish(error=verdict.latched())
+                return
+            self._queues[ticket.rank].append(ticket)
+        elif isinstance(ticket, Retune):
+            self._queues[Rank.CONFIGURATION].append(ticket)
+        elif isinstance(ticket, Timer | Listener):
+            self._timers.append(ticket)
+        elif isinstance(ticket, Claim):
+            self._claims.append(ticket)
+            self._grant_claim()
+
+    def abandon(self, ticket: Ticket) -> None:
+        """Its owner no longer waits. What is in the air stays there until it lands or its deadline passes."""
+        for queue in self._queues:
+            if ticket in queue:
+                queue.remove(ticket)  # type: ignore[arg-type]
+        if isinstance(ticket, Timer | Listener) and ticket in self._timers:
+            self._timers.remove(ticket)
+        if isinstance(ticket, Claim) and ticket in self._claims:
+            self._claims.remove(ticket)
+        if isinstance(ticket, Flight):
+            ticket.abandoned = True
+        ticket.finish(error=verdict.cancelled())
+
+    def release(self, owner: object) -> None:
+        """One `Alone` of this owner has ended."""
+        if self._holder is owner:
+            self._held -= 1
+            if self._held <= 0:
+                self._holder, self._held = None, 0
+        self._grant_claim()
+
+    def _grant_claim(self) -> None:
+        for claim in list(self._claims):
+            if self._holder is None and not self._flying:
+                self._holder = claim.owner
+            if self._holder is claim.owner:
+                self._held += 1
+                self._claims.remove(claim)
+                claim.finish()
+
+    @property
+    def waiting(self) -> bool:
+        """Something is queued."""
+        return any(self._queues)
+
+    @property
+    def idle(self) -> bool:
+        """Nothing waits, nothing flies, nobody holds the bus."""
+        return not (self._flying or self._claims or self._holder or self.latched or any(self._queues))
+
+    # -- what goes out --------------------------------------------------------------------------------------
+
+    def send(self, now: float) -> Data | Tune | None:
+        """What the pump must do next: write this data, change the rate, or (None) wait."""
+        self._look_at = inf
+        if len(self._flying) >= self.family.window:
+            return None
+        if self.paced and now < self._free_at:
+            self._look_at = self._free_at
+            return None
+        for queue in self._queues:
+            for ticket in list(queue):
+                out = self._try(ticket, queue, now)
+                if out is not None:
+                    return out
+                if len(self._flying) >= self.family.window:
+                    return None
+        return None
+
+    def short(self, flight: Flight, now: float) -> Data | None:
+        """The short path: launch at once when the bus is idle and the node is clean; None means queue it."""
+        exchange = flight.exchange
+        if not self.idle or (self.paced and now < self._free_at):
+            return None
+        if exchange.replies is not ANY:
+            nodes = self.trust.nodes
+            for due in exchange.replies:
+                trust = nodes.get(due.node)
+                if trust is not None and trust.tainted:
+                    return None
+        try:
+            self._admitted(exchange)
+        except MotorbusError as refusal:
+            flight.finish(error=refusal)
+            return None
+        return self._launch(flight, now)
+
+    def _try(self, ticket: Flight | Retune, queue: deque[Flight | Retune], now: float) -> Data | Tune | None:
+        if ticket.done:
+            queue.remove(ticket)
+            return None
+        if not self._may_go(ticket):
+            return None
+        if isinstance(ticket, Retune):
+            return self._retune(ticket, queue)
+        probe = self._probe(ticket, now)
+        if probe is not None:
+            return self._launch(probe, now)
+        if self._must_wait(ticket, now):
+            return None
+        try:
+            self._admitted(ticket.exchange)
+        except MotorbusError as refusal:
+            queue.remove(ticket)
+            ticket.finish(error=refusal)
+            return None
+        request = self._launch(ticket, now)
+        queue.remove(ticket)
+        return request
+
+    def _may_go(self, ticket: Flight | Retune) -> bool:
+        urgent = isinstance(ticket, Flight) and ticket.rank is Rank.STOP
+        if self.stopping and not urgent:
+            return False
+        if not urgent and (self._holder is not ticket.owner if self._holder else bool(self._claims)):
+            return False
+        if isinstance(ticket, Retune):
+            return not self._flying
+        return ticket.exchange.lane not in self._flying
+
+    def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Tune:
+        queue.remove(ticket)
+        self.rate = ticket.tune.rate
+        self.receiver = self.family.receiver()
+        ticket.finish()
+        return ticket.tune
+
+    def _admitted(self, exchange: Exchange[Any]) -> None:
+        if exchange.effect not in GATED:
+            return
+        if self.admit is None:
+            raise RequestError(
+                "this bus has no gate, so it refuses whatever moves a motor or switches its torque",
+                sent=exchange.request,
+                cause="the bus was built by hand, without the gate that open() puts in",
+                advice="use motorbus.open(), or give the bus an `admit`; nothing was sent",
+            )
+        self.admit(exchange)
+
+    def _doubtful(self, flight: Flight) -> list[int]:
+        exchange = flight.exchange
+        if exchange.replies is ANY or exchange.rank is Rank.STOP or flight.parent is not None:
+            return []
+        if exchange.timeout is Timeout.SCAN and flight.spoiled != "echo":
+            return []
+        nodes = self.trust.nodes
+        return [due.node for due in exchange.replies if due.node in nodes and nodes[due.node].tainted]
+
+    def _probe(self, flight: Flight, now: float) -> Flight | None:
+        """A probe that must be answered before this flight may leave, if one may be sent now."""
+        unbelieved: tuple[int, ...] = ()
+        group = flight.exchange.replies is not ANY and len(flight.exchange.replies) > 1
+        for node in self._doubtful(flight):
+            trust = self.trust.of(node)
+            if group and trust.silent and now < trust.probe_at:
+                unbelieved += (node,)
+            elif now >= trust.quiet_until:
+                probe = Flight(self.trust.probe(node, now), flight.owner, parent=flight)
+                if probe.exchange.lane not in self._flying:
+                    return probe
+        flight.unbelieved = unbelieved
+        return None
+
+    def _must_wait(self, flight: Flight, now: float) -> bool:
+        waiting = [node for node in self._doubtful(flight) if node not in flight.unbelieved]
+        for node in waiting:
+            self._look_at = min(self._look_at, self.trust.of(node).quiet_until)
+        return bool(waiting)
+
+    # -- what comes of it -----------------------------------------------------------------------------------
+
+    def expire(self, now: float) -> None:
+        """Settle everything whose moment has passed."""
+        super().expire(now)
+        for timer in list(self._timers):
+            if now >= timer.deadline:
+                self._timers.remove(timer)
+                timer.finish()
+
+    def _landed(self) -> None:
+        self._grant_claim()
+
+    def _heard(self, notice: Notice) -> None:
+        for ticket in list(self._timers):
+            if isinstance(ticket, Listener) and not ticket.done and ticket.listen.match(notice):
+                self._timers.remove(ticket)
+                ticket.finish(notice)
+
+    def _failed(self, flight: Flight, kind: str, now: float) -> None:
+        if flight.parent is not None:
+            self._probe_failed(flight, flight.parent, kind, now)
+        elif not flight.abandoned:
+            self._again_or_fail(flight, kind)
+
+    def _again_or_fail(self, flight: Flight, kind: str) -> None:
+        exchange = flight.exchange
+        flight.tries += 1
+        patient = exchange.rank is not Rank.STOP and (exchange.timeout is not Timeout.SCAN or kind == "echo")
+        if exchange.repeatable and patient and flight.tries <= RETRIES and not self.latched:
+            for due in exchange.replies:  # type: ignore[union-attr]  # never ANY here
+                self.statistics.of(due.node).retries += 1
+            self._queues[flight.rank].appendleft(flight)
+        else:
+            flight.finish(error=verdict.error(flight, kind, flight.tries))
+
+    def _probe_failed(self, probe: Flight, parent: Flight, kind: str, now: float) -> None:
+        parent.tries += 1
+        node = probe.exchange.replies[0].node  # type: ignore[index]  # a probe has exactly one reply
+        if kind != "silence" and parent.tries <= RETRIES:
+            return
+        self.trust.stayed_silent(node, now, self._quiet)
+        if len(parent.exchange.replies) == 1:  # type: ignore[arg-type]  # never ANY here
+            self._drop(parent)
+            parent.noise = probe.noise
+            parent.finish(error=verdict.error(parent, kind, parent.tries))
+
+    def _drop(self, flight: Flight) -> None:
+        if flight in self._queues[flight.rank]:
+            self._queues[flight.rank].remove(flight)
+
+    # -- when to look again, and stopping -------------------------------------------------------------------
+
+    def due(self) -> float:
+        """The next moment something must be settled or may be sent; inf when nothing is awaited."""
+        moments = [self._look_at]
+        moments += [flight.deadline for flight in self._flying.values()]
+        moments += [timer.deadline for timer in self._timers]
+        return min(moments)
+
+    def latch(self, now: float) -> Stop:
+        """Emergency stop: drop the queue, let the rest of a reply pass, refuse motion until `reset`."""
+        self.latched = self.stopping = True
+        for queue in self._queues:
+            for ticket in list(queue):
+                if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:
+                    queue.remove(ticket)
+                    ticket.finish(error=verdict.latched())
+        for flight in self._flying.values():
+            rest = self.family.air_time(flight.exchange, self.rate) + self.latency
+            flight.deadline = min(flight.deadline, now + rest)
+            flight.abandoned = True
+            flight.finish(error=verdict.latched())
+        return self.stop
+
+    def stopped(self) -> None:
+        """The stop frames are out: clean-ups and reading may go on, motion and torque stay refused."""
+        self.stopping = False
+
+    def reset(self) -> None:
+        """Take the latch off."""
+        self.latched = self.stopping = False
+
+    def lost(self, error: LinkError) -> None:
+        """The link is gone: everything awaited fails with this error."""
+        waiting: list[Ticket] = [*self._flying.values(), *self._timers, *self._claims]
+        for queue in self._queues:
+            waiting += queue
+            queue.clear()
+        self._flying.clear()
+        self._timers.clear()
+        self._claims.clear()
+        for ticket in waiting:
+            ticket.finish(error=error)

@@ -1,0 +1,109 @@
+"""Why an exchange failed, in words: what was sent, what came, what was expected, the likely cause, what to do."""
+
+from __future__ import annotations
+
+from motorbus.bus.ticket import Flight
+from motorbus.core.operation import ANY, Effect
+from motorbus.errors import (
+    ChecksumError,
+    FramingError,
+    Interrupted,
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    UnexpectedReply,
+)
+
+CAUSES = {
+    "silence": (
+        "no such id on this bus, another baud rate, no power, or a loose cable",
+        "`motorbus scan BUS` lists who answers; add `--baud all` to try every rate",
+    ),
+    "checksum": (
+        "bytes changed on the way: a long or loose cable, missing ground, or two nodes with one id",
+        "check the wiring; `motorbus scan BUS` shows whether two nodes share an id",
+    ),
+    "framing": (
+        "the line carries something else: another baud rate, another program, electrical noise",
+        "check the baud rate and that nothing else talks on this bus",
+    ),
+    "surplus": (
+        "more bytes came than were asked for: two nodes with one id, an echo, or another host on the bus",
+        "make sure that one program alone talks on this bus and that every id is there once",
+    ),
+    "echo": (
+        "the adapter began, or ceased, to hand back what is sent",
+        "check the adapter; open the bus again",
+    ),
+    "unexpected": (
+        "the node sent a reply that belongs to another request: an old one that came late, or another host's",
+        "make sure that one program alone talks on this bus",
+    ),
+    "early": (
+        "the reply came sooner than it can travel: it is the answer to an earlier request",
+        "nothing to do if it is rare; the value was not used",
+    ),
+}
+ERRORS: dict[str, type[MotorbusError]] = {
+    "silence": NoReply,
+    "checksum": ChecksumError,
+    "framing": FramingError,
+    "surplus": UnexpectedReply,
+    "echo": UnexpectedReply,
+    "unexpected": UnexpectedReply,
+    "early": UnexpectedReply,
+}
+
+
+def fault(flight: Flight) -> str:
+    """The kind of failure of this try, a key of `CAUSES`."""
+    if flight.spoiled:
+        return flight.spoiled
+    if flight.surplus:
+        return "surplus"
+    kinds = [kind for kind, _ in flight.noise]
+    return "checksum" if "checksum" in kinds else kinds[0] if kinds and kinds[0] in CAUSES else "silence"
+
+
+def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
+    """The exception for an exchange that failed for good."""
+    exchange = flight.exchange
+    dues = () if exchange.replies is ANY else exchange.replies
+    node = dues[0].node if dues else None
+    received = b"".join(bytes(data) for _, data in flight.noise) + b"".join(
+        r.data for r in flight.got.values()
+    )
+    changes = exchange.effect is not Effect.NONE or not exchange.repeatable
+    made = OutcomeUnknown if changes and dues else ERRORS[kind]
+    who = f"node {node}" if node is not None else "the bus"
+    again = f" ({tries} tries)" if tries > 1 else ""
+    what = {
+        "silence": f"{who} did not answer{again}",
+        "checksum": f"the answer of {who} was damaged{again}",
+    }.get(kind, f"no valid answer from {who}{again}")
+    if made is OutcomeUnknown:
+        what += "; whether the write took effect is not known"
+    cause, advice = CAUSES[kind]
+    return made(
+        what,
+        sent=exchange.request,
+        received=received,
+        expected=f"{dues[0].length} bytes from {who}" if dues else "",
+        cause=cause,
+        advice=advice,
+        node=node,
+    )
+
+
+def latched() -> Interrupted:
+    """The error for whatever an emergency stop drops or refuses."""
+    return Interrupted(
+        "the bus is stopped: an emergency stop is latched",
+        cause="estop() was called, here or by `motorbus estop` from another process",
+        advice="when it is safe, call reset() on the bus, in the process that owns it",
+    )
+
+
+def cancelled() -> Interrupted:
+    """The error for an exchange whose caller no longer waits."""
+    return Interrupted("the exchange was abandoned", cause="its caller was interrupted or the bus was closed")

@@ -1,0 +1,166 @@
+"""The shell's face: thin commands that parse, ask, call the floors below and print. No logic of their own.
+
+One file per command, file name = command name, each loaded when it is called, so that `--help`, `--version` and
+completion import no family, no serial port and no plotting. What only one family has lives in a module of that
+family's name.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import sys
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import App, CycloptsError, Group, Parameter
+
+from motorbus import __version__, families
+from motorbus.cli.exits import Exit, exit_code
+from motorbus.cli.output import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+_COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
+    "Find": {
+        "ports": "List the serial ports of this machine and what hangs on them.",
+        "scan": "Find the devices on a bus.",
+        "ping": "Ask devices whether they are there.",
+        "info": "Say what a device is: model, firmware, limits, registers.",
+    },
+    "Look": {
+        "read": "Read registers, or the telemetry, of a device.",
+        "monitor": "Watch devices: position, velocity, load, current, voltage, temperature, alarms.",
+        "decode": "Explain the bytes of frames, and why a bad one is bad.",
+    },
+    "Act": {
+        "write": "Write registers of a device.",
+        "move": "Move devices to positions, several of them together.",
+        "torque": "Switch the power stage on or off.",
+        "stop": "Decelerate and hold.",
+        "estop": "Emergency stop: cut the torque of a bus at once, from any shell.",
+    },
+    "Without hardware": {
+        "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
+        "demo": "Find, identify and move six simulated devices, and draw what they did.",
+    },
+}
+
+
+def build() -> App:
+    """The parser with every command registered by name only; a command's file is imported when it is called."""
+    app = App(
+        name="motorbus",
+        help="Drive, simulate and diagnose motors on a bus.",
+        version=f"motorbus {__version__}",
+        help_format="plaintext",
+        help_epilogue=_EPILOGUE,
+        default_parameter=Parameter(show_default=_default_shown),
+        suppress_keyboard_interrupt=False,
+    )
+    for place, (title, commands) in enumerate(_COMMANDS.items()):
+        group = Group(title, sort_key=place)
+        for name, line in commands.items():
+            app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=group)
+    for name in _faces():
+        line = f"What only {name} devices can do."
+        app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=Group("One family", sort_key=10))
+    app["--help"].group = app["--version"].group = Group("Program", sort_key=11)
+    app.register_install_completion_command(help="Install completion for this shell.", group="Program")
+    return app
+
+
+def _default_shown(default: object) -> str | None:
+    return None if default in ("", False, 0) else str(default)
+
+
+_EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#ID:
+
+    feetech:/dev/ttyACM0               feetech:COM7,baud=500000
+    feetech:socket://10.0.0.7:4000     feetech:sim,ids=1-6
+
+`motorbus COMMAND --help` shows examples. Exit codes: 0 ok, 1 failure, 2 usage,
+3 port not found, 4 port busy, 5 no reply, 6 partial, 7 device refused,
+8 unsafe, 9 verification failed, 10 cancelled."""
+
+
+def _faces() -> list[str]:
+    return [name for name in families.names() if find_spec(f"{__name__}.{name}")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line (without the program's name) and return its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a console that lacks "²" must not end the program
+    output = Output(json="--json" in words)
+    try:
+        return _launch(build(), words, output)
+    except (Exception, KeyboardInterrupt) as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        return _report(error, code, output)
+
+
+def _report(error: BaseException, code: Exit, output: Output) -> Exit:
+    if isinstance(error, BrokenPipeError):
+        sys.stdout = io.StringIO()  # the reader has gone: nothing to say, and nobody to say it to
+        return code
+    output.error(error)
+    if isinstance(error, CycloptsError) and not output.json:
+        chain = " ".join(["motorbus", *(error.command_chain or ())])
+        output.note(f"  `{chain} --help` shows how to say it")
+    return code
+
+
+def _launch(app: App, words: Sequence[str], output: Output) -> int:
+    @app.meta.default
+    def launch(
+        *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+        as_json: Annotated[bool, Parameter(name="--json", negative="", group=_EVERYWHERE)] = False,
+        verbose: Annotated[int, Parameter(name=["--verbose", "-v"], count=True, group=_EVERYWHERE)] = 0,
+    ) -> int:
+        """Run one command.
+
+        Parameters
+        ----------
+        as_json
+            One JSON document on stdout instead of tables; JSON Lines for streams.
+        verbose
+            Say on stderr what happens; -vv says more.
+        """
+        output.json = as_json
+        command, bound, ignored = app.parse_args(words, exit_on_error=False, print_error=False)
+        bound.arguments.update(dict.fromkeys(ignored, output))
+        with _logging(verbose):
+            result = command(*bound.args, **bound.kwargs)
+        return result if isinstance(result, int) else Exit.OK
+
+    code = app.meta(words, exit_on_error=False, print_error=False, result_action="return_value")
+    return code if isinstance(code, int) else Exit.OK
+
+
+_EVERYWHERE = Group("Everywhere", sort_key=9)
+
+
+@contextmanager
+def _logging(verbose: int) -> Iterator[None]:
+    """-v shows what the logger "motorbus" says on stderr, -vv every detail of it; silent otherwise."""
+    logger = logging.getLogger("motorbus")
+    if not verbose:
+        yield
+        return
+    shown = logging.StreamHandler()
+    shown.setFormatter(logging.Formatter("%(relativeCreated)7.0f ms  %(name)s  %(message)s"))
+    before = logger.level
+    logger.addHandler(shown)
+    logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
+    try:
+        yield
+    finally:
+        logger.removeHandler(shown)
+        logger.setLevel(before)

@@ -1,0 +1,170 @@
+"""`motorbus monitor`: telemetry again and again, as a table that redraws itself or as JSON Lines."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from motorbus.cli import quantity
+from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.output import Output
+from motorbus.cli.read import UNITS, state_facts
+from motorbus.cli.target import able, everyone, face, gathered, opened
+from motorbus.core.operation import Pause
+from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from motorbus.bus.pump import Bus
+    from motorbus.core.family import State
+    from motorbus.core.operation import Operation
+
+app = App(
+    name="monitor",
+    usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
+    help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
+that does not answer keeps its row and is asked again.
+
+Examples:
+
+    motorbus monitor feetech:/dev/ttyACM0
+    motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
+    motorbus monitor feetech:sim,ids=1-2 --count 3 --json""",
+)
+
+Sample = dict[tuple[str, int], "State | MotorbusError"]
+
+
+@app.default
+def monitor(
+    *devices: Annotated[str, Parameter(name="BUS#ID")],
+    rate: float = 5.0,
+    count: int = 0,
+    duration: float = 0.0,
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Watch devices: position, velocity, load, current, voltage, temperature, alarms.
+
+    Parameters
+    ----------
+    devices
+        FAMILY:PORT, or FAMILY:PORT#ID for some of its devices.
+    rate
+        Samples of every device per second.
+    count
+        End after so many samples; 0 goes on.
+    duration
+        End after so many seconds; 0 goes on.
+    options
+        Any option of the bus string, as a flag.
+    """
+    if not devices:
+        raise RequestError("which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0")
+    if not rate > 0 or count < 0 or not duration >= 0:
+        raise RequestError("--rate must be above 0, --count and --duration not below 0")
+    with ExitStack() as stack, _shown(output) as show:
+        watched = _watched(gathered(devices), stack, options, output)
+        return _watch(watched, 1 / rate, count, duration, show)
+
+
+def _watched(
+    wanted: Mapping[str, tuple[int, ...]], stack: ExitStack, options: Mapping[str, str], output: Output
+) -> dict[tuple[str, int], Any]:
+    found = {}
+    for name, nodes in wanted.items():
+        bus = stack.enter_context(opened(name, options, output))
+        for node in everyone(bus, nodes):
+            one = face(bus, node)
+            able(one, "telemetry")
+            found[name, node] = one
+    return found
+
+
+def _watch(
+    watched: Mapping[tuple[str, int], Any],
+    period: float,
+    count: int,
+    duration: float,
+    show: Callable[[Sample], None],
+) -> Exit:
+    bus: Bus = next(iter(watched.values())).bus
+    began = bus.link.now()
+    heard: set[tuple[str, int]] = set()
+    done = 0
+    try:
+        while True:
+            sample = {key: _sample(one) for key, one in watched.items()}
+            heard |= {key for key, state in sample.items() if not isinstance(state, MotorbusError)}
+            show(sample)
+            done += 1
+            passed = bus.link.now() - began
+            if done == count or (duration and passed + period > duration):
+                break
+            bus.run(_pause(max(0.0, done * period - passed)))
+    except KeyboardInterrupt:
+        pass  # the usual way to end it
+    return _verdict(set(watched), heard)
+
+
+def _sample(one: Any) -> State | MotorbusError:
+    try:
+        state: State = one.telemetry()
+    except LinkError:
+        raise
+    except MotorbusError as error:
+        return error
+    return state
+
+
+def _pause(seconds: float) -> Operation[None]:
+    yield from Pause(seconds)
+
+
+def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit:
+    silent = ", ".join(f"{bus}#{node}" for bus, node in sorted(watched - heard))
+    if silent and not heard:
+        raise NoReply(f"no answer from {silent}")
+    if silent:
+        raise Partial(f"no answer from {silent}")
+    return Exit.OK
+
+
+@contextmanager
+def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
+    if not output.live:
+        yield lambda sample: _lines(sample, output)
+        return
+    from rich.live import Live
+
+    with Live(console=output.console(), auto_refresh=False) as screen:
+        yield lambda sample: screen.update(_grid(sample, output), refresh=True)
+
+
+def _lines(sample: Sample, output: Output) -> None:
+    for (bus, node), state in sample.items():
+        named: dict[str, object] = {"bus": bus, "id": node}
+        if isinstance(state, MotorbusError):
+            output.document("motorbus.monitor/1", {**named, "error": state.summary})
+        else:
+            output.document("motorbus.monitor/1", {**named, **state_facts(state)})
+    if not output.json:
+        output.console().print(_grid(sample, output))
+
+
+COLUMNS = (">id", *(f">{name}" for name in UNITS), "moving", "alarm")
+
+
+def _grid(sample: Sample, output: Output) -> Any:
+    buses = dict.fromkeys(bus for bus, _ in sample)
+    return output.grid(", ".join(buses), COLUMNS, [_row(node, state) for (_, node), state in sample.items()])
+
+
+def _row(node: int, state: State | MotorbusError) -> tuple[object, ...]:
+    if isinstance(state, MotorbusError):
+        return (node, *("" for _ in UNITS), "", state.summary)
+    values = (quantity.shown(getattr(state, name), unit) for name, unit in UNITS.items())
+    return (node, *values, "yes" if state.moving else "", ", ".join(state.alarm))

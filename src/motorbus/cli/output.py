@@ -1,0 +1,187 @@
+"""Where results go: a table for eyes, JSON for programs; results on stdout and everything else on stderr.
+
+A command says its result once, as plain facts, and once more as a table; which of the two is printed is decided
+here. rich is imported when the first table is drawn, so that JSON and help cost nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final, TextIO
+
+from motorbus.cli.exits import NeedsConsent, exit_code
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+    from rich.table import Table
+
+_NO_WRAP: Final = 10_000  # columns of a "terminal" that is a file or a pipe: never fold a row
+
+
+class Output:
+    """One run of one command. `simulated` is set as soon as it is known that no real device is behind the bus."""
+
+    def __init__(self, *, json: bool = False) -> None:
+        self.json = json
+        self.simulated = False
+
+    @property
+    def live(self) -> bool:
+        """A person is watching stdout, so a table may redraw itself."""
+        return not self.json and sys.stdout.isatty()
+
+    def document(self, schema: str, facts: Mapping[str, object]) -> None:
+        """The one JSON document of a command, or one line of a stream. Prints nothing without --json."""
+        if self.json:
+            marked = {"schema": schema, **({"simulated": True} if self.simulated else {}), **facts}
+            print(json.dumps(marked, allow_nan=False), flush=True)
+
+    def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """The same for eyes; a column whose name begins with `>` is set flush right."""
+        if not self.json:
+            self.console().print(self.grid(title, columns, rows))
+
+    def text(self, text: str) -> None:
+        """A result that is prose."""
+        if not self.json:
+            self.console().print(text, markup=False, soft_wrap=True)
+
+    def note(self, text: str) -> None:
+        """Something worth knowing that is not the result."""
+        print(text, file=sys.stderr, flush=True)
+
+    def console(self) -> Console:
+        return console(sys.stdout)
+
+    def grid(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
+        """A rich table: ruled on a terminal, bare columns in a file or a pipe."""
+        from rich import box
+        from rich.table import Table
+
+        terminal = sys.stdout.isatty()
+        grid = Table(
+            title=self.marked(title) if terminal else None,
+            title_justify="left",
+            title_style="bold",
+            box=box.SIMPLE_HEAD if terminal else None,
+            pad_edge=False,
+            header_style="bold" if terminal else "",
+        )
+        for name in columns:
+            grid.add_column(name.removeprefix(">"), justify="right" if name.startswith(">") else "left")
+        for row in rows:
+            grid.add_row(*(_cell(value) for value in row))
+        return grid
+
+    def marked(self, title: str) -> str:
+        return f"{title} (simulated)" if self.simulated else title
+
+    @contextmanager
+    def progress(self, what: str) -> Iterator[Bar]:
+        """A bar on stderr while a person watches it, and nothing at all otherwise."""
+        if not sys.stderr.isatty():
+            yield Bar()
+            return
+        from rich.progress import Progress
+
+        with Progress(console=console(sys.stderr), transient=True) as shown:
+            yield Bar(shown, shown.add_task(what, total=None))
+
+    def consent(self, question: str, *, yes: bool) -> None:
+        """Go on only if a person or `--yes` agrees. Raises NeedsConsent."""
+        if yes or (_can_ask() and _asked(question)):
+            return
+        raise NeedsConsent(
+            f"refused: {question}", advice="say --yes if that is what you want; nothing was sent"
+        )
+
+    def error(self, error: BaseException) -> None:
+        """One clear error on stderr: prose, or one JSON object with --json."""
+        if self.json:
+            print(json.dumps(_error_facts(error)), file=sys.stderr)
+        else:
+            console(sys.stderr).print(_error_text(error), soft_wrap=True)
+
+
+class Bar:
+    """A progress bar, or silence: long work calls it without asking which."""
+
+    def __init__(self, shown: Progress | None = None, task: TaskID | None = None) -> None:
+        self._shown = shown
+        self._task = task
+
+    def advance(self, done: float, total: float, what: str = "") -> None:
+        """`done` of `total` units of work."""
+        if self._shown is not None and self._task is not None:
+            named = {"description": what} if what else {}
+            self._shown.update(self._task, completed=done, total=total, **named)  # type: ignore[arg-type]
+
+    def say(self, text: str) -> None:
+        """An early result, above the bar."""
+        if self._shown is not None:
+            self._shown.console.print(text, markup=False)
+
+
+def console(file: TextIO) -> Console:
+    """A rich console on this stream; rich itself obeys NO_COLOR."""
+    from rich.console import Console
+
+    return Console(file=file, highlight=False, width=None if file.isatty() else _NO_WRAP)
+
+
+def _cell(value: object) -> Any:
+    from rich.text import Text
+
+    return value if hasattr(value, "__rich_console__") else Text("" if value is None else str(value))
+
+
+def _can_ask() -> bool:
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _asked(question: str) -> bool:
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in {"y", "yes"}
+
+
+def _error_text(error: BaseException) -> Any:
+    from rich.text import Text
+
+    return Text.assemble(("error: ", "bold red"), _message(error))
+
+
+def _message(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "cancelled"
+    return str(error) or type(error).__name__
+
+
+def _error_facts(error: BaseException) -> dict[str, object]:
+    facts = {"schema": "motorbus.error/1", "error": type(error).__name__, "exit": exit_code(error)}
+    if not hasattr(error, "summary"):
+        return {**facts, "summary": _message(error)}
+    parts = (
+        "summary",
+        "sent",
+        "received",
+        "expected",
+        "cause",
+        "advice",
+        "node",
+        "register",
+        "code",
+        "owner",
+    )
+    found = {part: getattr(error, part, None) for part in parts}
+    return facts | {part: _plain(value) for part, value in found.items() if value not in (None, "", b"")}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, bytes | bytearray):
+        return value.hex(" ").upper()
+    return value if isinstance(value, int | float | str) else str(value)

@@ -1,0 +1,83 @@
+"""`motorbus ping`: are they there, and how long do they take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.output import Output
+from motorbus.cli.target import face, gathered, opened
+from motorbus.errors import NoReply, RequestError
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+
+app = App(
+    name="ping",
+    usage="Usage: motorbus ping BUS#ID... [OPTIONS]",
+    help_epilogue="""Ends with exit code 0 when all answer, 6 when some do, 5 when none does.
+
+Examples:
+
+    motorbus ping feetech:/dev/ttyACM0#1
+    motorbus ping feetech:/dev/ttyACM0#1-6
+    motorbus ping feetech:sim,ids=1-6#1+3 --json""",
+)
+
+
+@app.default
+def ping(
+    *devices: Annotated[str, Parameter(name="BUS#ID")],
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Ask devices whether they are there.
+
+    Parameters
+    ----------
+    devices
+        FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3 or feetech:/dev/ttyACM0#1-6
+    options
+        Any option of the bus string, as a flag.
+    """
+    answers: list[dict[str, object]] = []
+    for bus, nodes in _wanted(devices).items():
+        with opened(bus, options, output) as opening:
+            answers += [_ask(opening, bus, node) for node in nodes]
+    output.document("motorbus.ping/1", {"devices": answers})
+    rows = [(a["id"], "yes" if a["answers"] else "NO", a["milliseconds"]) for a in answers]
+    output.table("Ping", [">id", "answers", ">ms"], rows)
+    return _verdict(answers)
+
+
+def _wanted(devices: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    found = gathered(devices)
+    if not found or not all(found.values()):
+        raise RequestError("which device?", expected="BUS#ID, as feetech:/dev/ttyACM0#3")
+    return found
+
+
+def _ask(opening: Bus, bus: str, node: int) -> dict[str, object]:
+    began = opening.link.now()
+    try:
+        answers = face(opening, node).ping()
+    except NoReply:
+        answers = False
+    took = round(1000 * (opening.link.now() - began), 3)
+    return {"bus": bus, "id": node, "answers": answers, "milliseconds": took if answers else None}
+
+
+def _verdict(answers: list[dict[str, object]]) -> Exit:
+    silent = [answer["id"] for answer in answers if not answer["answers"]]
+    if not silent:
+        return Exit.OK
+    names = ", ".join(f"#{node}" for node in silent)
+    if len(silent) == len(answers):
+        raise NoReply(
+            f"no answer from {names}",
+            cause="no power, a loose cable, another id or another rate",
+            advice="`motorbus scan BUS --baud all` looks for every id at every rate",
+        )
+    raise Partial(f"no answer from {names}")

@@ -1,0 +1,40 @@
+"""`motorbus ports`: which serial ports there are, and which of them look like an adapter for motors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.output import Output
+
+app = App(
+    name="ports",
+    help_epilogue="""The stable name stays the same when other adapters are plugged in; prefer it in
+scripts.
+
+Examples:
+
+    motorbus ports
+    motorbus ports --json""",
+)
+
+
+@app.default
+def ports(*, output: Annotated[Output, Parameter(parse=False)]) -> None:
+    """List the serial ports of this machine and what hangs on them."""
+    from motorbus.link import serial
+
+    found = serial.ports()
+    output.document("motorbus.ports/1", {"ports": [port._asdict() for port in found]})
+    if not found:
+        output.note("no serial port found; `motorbus demo` needs none")
+        return
+    rows = [
+        (port.device, _usb(port.vid, port.pid), port.description, port.guess, port.stable) for port in found
+    ]
+    output.table("Serial ports", ["device", "usb", "description", "looks like", "stable name"], rows)
+
+
+def _usb(vid: int | None, pid: int | None) -> str:
+    return "" if vid is None or pid is None else f"{vid:04x}:{pid:04x}"

@@ -1,0 +1,114 @@
+"""`motorbus scan`: who is on this bus, at which rate, and what each of them is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.exits import Exit
+from motorbus.cli.output import Output
+from motorbus.cli.target import nobody, opened, target
+from motorbus.core.family import Found
+from motorbus.core.operation import Progress
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from motorbus.cli.output import Bar
+    from motorbus.core.family import Family
+
+app = App(
+    name="scan",
+    help_epilogue="""Asks every id, one after the other, and writes nothing. Ends with exit code 5
+when nobody answers.
+
+Examples:
+
+    motorbus scan feetech:/dev/ttyACM0
+    motorbus scan feetech:/dev/ttyACM0 --ids 1-20 --baud 1000000,500000
+    motorbus scan feetech:/dev/ttyACM0 --baud all
+    motorbus scan feetech:sim,ids=1-6 --json""",
+)
+
+
+@app.default
+def scan(
+    bus: str,
+    /,
+    *,
+    ids: str = "",
+    baud: str = "",
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Find the devices on a bus.
+
+    Parameters
+    ----------
+    bus
+        FAMILY:PORT, as feetech:/dev/ttyACM0
+    ids
+        Which ids to ask, as 1-6 or 1,4,7; every id when left out.
+    baud
+        Which rates to try, as 1000000,500000, or `all`; the rate of the bus when left out.
+    options
+        Any option of the bus string, as a flag.
+    """
+    from motorbus import session
+
+    asked = session.parse_ids(ids) if ids else target(bus).nodes
+    with opened(target(bus).bus, options, output) as opening, output.progress("scanning") as bar:
+        found: list[Found] = []
+        try:
+            operation = opening.family.scan(asked, rates(baud, opening.family))
+            opening.run(operation, report=lambda event: _listen(event, found, bar))
+        finally:
+            _show(bus, found, output)
+        if not found:
+            raise nobody(opening)
+    return Exit.OK
+
+
+def rates(text: str, family: Family) -> tuple[int, ...]:
+    """The rates in a list, or all that the family knows. Raises RequestError when it is no list of numbers."""
+    if text == "all":
+        return family.link.rates
+    words = text.replace("+", ",").split(",") if text else []
+    if not all(word.strip().isdecimal() for word in words):
+        raise RequestError(f"--baud {text}: not a list of rates", expected="as 1000000,500000 or all")
+    return tuple(int(word) for word in words)
+
+
+def _listen(event: object, found: list[Found], bar: Bar) -> None:
+    if isinstance(event, Found):
+        found.append(event)
+        bar.say(f"  #{event.node}  {event.rate} bit/s  {_model(event)}")
+    elif isinstance(event, Progress):
+        bar.advance(event.done, event.total, event.what)
+
+
+def _model(one: Found) -> str:
+    return one.identity.model if one.identity else "does not say what it is"
+
+
+def _show(bus: str, found: list[Found], output: Output) -> None:
+    output.document("motorbus.scan/1", {"bus": bus, "devices": [facts(one) for one in found]})
+    if found:
+        output.table(f"Devices on {bus}", COLUMNS, [row(one) for one in found])
+
+
+COLUMNS = (">id", ">bit/s", "model", "firmware", "registers")
+
+
+def row(one: Found) -> tuple[object, ...]:
+    """One device as a row of `COLUMNS`."""
+    known = one.identity
+    map_ = (known.table or "unknown: read only") if known else ""
+    return (one.node, one.rate, _model(one), known.firmware if known else "", map_)
+
+
+def facts(one: Found) -> dict[str, object]:
+    """One device as plain data."""
+    known = one.identity
+    named = {"model": known.model, "firmware": known.firmware, "table": known.table} if known else {}
+    return {"id": one.node, "baud": one.rate, **named}

@@ -1,0 +1,41 @@
+"""`motorbus stop`: decelerate and hold. The arm stays up; `estop` is the other promise."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.each import each
+from motorbus.cli.exits import Exit
+from motorbus.cli.output import Output
+
+app = App(
+    name="stop",
+    usage="Usage: motorbus stop BUS[#ID]... [OPTIONS]",
+    help_epilogue="""The devices keep their torque and hold where they come to rest. When it must
+stop whatever happens, and may sag, say `motorbus estop`.
+
+Examples:
+
+    motorbus stop feetech:/dev/ttyACM0#3
+    motorbus stop feetech:/dev/ttyACM0""",
+)
+
+
+@app.default
+def stop(
+    *devices: Annotated[str, Parameter(name="BUS#ID")],
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Decelerate and hold.
+
+    Parameters
+    ----------
+    devices
+        FAMILY:PORT for every device that answers, or FAMILY:PORT#ID for some.
+    options
+        Any option of the bus string, as a flag.
+    """
+    return each("stop", "stop", devices, options, output)

@@ -1,0 +1,201 @@
+"""How a motor moves, as functions of time that are worked out when somebody asks and never ticked.
+
+A simulated bus may hold 253 servos and be read a thousand times a second or once an hour; with a tick it would
+cost the same in both cases and be wrong by the width of the tick in either. So a movement is a value: a few
+phases of constant acceleration, made once when a goal is given. Asking where the motor is costs a few
+multiplications, and the same question always has the same answer.
+
+Any unit of length does, as long as velocity and acceleration are in it too. Time is in seconds on whatever
+clock the caller uses; only differences count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, inf, isfinite, sqrt
+from typing import NamedTuple
+
+
+class Phase(NamedTuple):
+    """A stretch of constant acceleration: where and how fast it begins, how long it lasts (s)."""
+
+    duration: float
+    position: float
+    velocity: float
+    acceleration: float
+
+    def position_after(self, elapsed: float) -> float:
+        """Position `elapsed` seconds into this phase."""
+        return self.position + elapsed * (self.velocity + 0.5 * self.acceleration * elapsed)
+
+    def velocity_after(self, elapsed: float) -> float:
+        """Velocity `elapsed` seconds into this phase."""
+        return self.velocity + self.acceleration * elapsed
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A movement that began at `start` (s) and afterwards is at `goal`, or goes on at `cruise` for ever.
+
+    Before `start` it answers as at `start`, so a question that comes late on a reordered wire is harmless.
+    """
+
+    start: float
+    phases: tuple[Phase, ...]
+    goal: float
+    cruise: float = 0.0
+
+    def position(self, at: float) -> float:
+        """Where it is at this moment."""
+        phase, elapsed = self._phase(at)
+        if phase is not None:
+            return phase.position_after(elapsed)
+        return self.goal + self.cruise * elapsed if self.cruise else self.goal
+
+    def velocity(self, at: float) -> float:
+        """How fast it is at this moment, with its sign."""
+        phase, elapsed = self._phase(at)
+        return self.cruise if phase is None else phase.velocity_after(elapsed)
+
+    def acceleration(self, at: float) -> float:
+        """How much faster it gets at this moment, with its sign."""
+        phase, _ = self._phase(at)
+        return 0.0 if phase is None else phase.acceleration
+
+    def moving(self, at: float) -> bool:
+        """Whether it has not come to its end yet."""
+        return at < self.done_at
+
+    @property
+    def done_at(self) -> float:
+        """When it comes to rest at its goal; infinity when it never does."""
+        return inf if self.cruise else self.start + sum(phase.duration for phase in self.phases)
+
+    def _phase(self, at: float) -> tuple[Phase | None, float]:
+        elapsed = max(0.0, at - self.start)
+        for phase in self.phases:
+            if elapsed < phase.duration:
+                return phase, elapsed
+            elapsed -= phase.duration
+        return None, elapsed
+
+
+def rest(at: float, position: float) -> Motion:
+    """Stand still here: at rest, limp, or held."""
+    return Motion(at, (), position)
+
+
+def move(
+    at: float,
+    position: float,
+    goal: float,
+    *,
+    velocity: float = 0.0,
+    speed: float,
+    acceleration: float = inf,
+) -> Motion:
+    """Go to `goal` and stop there: a trapezoid, or a triangle where the way is short.
+
+    It may begin with a `velocity`. When that is too high to stop in time it overshoots and comes back; when it
+    points away from the goal it brakes first; when it exceeds `speed` it brakes down to it. `acceleration` may
+    be infinite: then velocity changes in no time. `speed` 0 brakes to a halt wherever that is. Raises
+    ValueError for a negative or missing figure, and for an infinite speed with an infinite acceleration.
+    """
+    _check(speed, acceleration, position, goal, velocity)
+    if not speed:
+        return run(at, position, 0.0, velocity=velocity, acceleration=acceleration)
+    if acceleration == inf:
+        return _dash(at, position, goal, speed)
+    halt = position + velocity * abs(velocity) / (2 * acceleration)
+    if goal == halt:
+        return _braked(at, position, velocity, goal, acceleration)
+    way = copysign(1.0, goal - halt)
+    peak = min(speed, sqrt(max(0.0, acceleration * way * (goal - position) + 0.5 * velocity**2)))
+    return _trapezoid(at, position, velocity, goal, way * peak, acceleration, cruises=peak == speed)
+
+
+def run(
+    at: float, position: float, velocity_goal: float, *, velocity: float = 0.0, acceleration: float = inf
+) -> Motion:
+    """Reach `velocity_goal` and keep it for ever, as a wheel does; 0 brakes to a halt."""
+    _check(abs(velocity_goal), acceleration, position, velocity_goal, velocity)
+    change = velocity_goal - velocity
+    if not change or acceleration == inf:
+        return Motion(at, (), position, velocity_goal)
+    ramp = Phase(abs(change) / acceleration, position, velocity, copysign(acceleration, change))
+    return Motion(at, (ramp,), ramp.position_after(ramp.duration), velocity_goal)
+
+
+def _check(speed: float, acceleration: float, *finite: float) -> None:
+    if not all(map(isfinite, finite)):
+        raise ValueError("position, goal and velocity must be finite")
+    if not speed >= 0 or not acceleration > 0:
+        raise ValueError("speed must be 0 or more, acceleration more than 0")
+    if speed == acceleration == inf:
+        raise ValueError("speed and acceleration cannot both be infinite")
+
+
+def _dash(at: float, position: float, goal: float, speed: float) -> Motion:
+    """Without inertia: full speed from the first moment to the last."""
+    way = goal - position
+    return Motion(at, (Phase(abs(way) / speed, position, copysign(speed, way), 0.0),) if way else (), goal)
+
+
+def _braked(at: float, position: float, velocity: float, goal: float, acceleration: float) -> Motion:
+    """Braking at once ends exactly at the goal."""
+    if not velocity:
+        return rest(at, goal)
+    return Motion(
+        at,
+        (Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity)),),
+        goal,
+    )
+
+
+def _trapezoid(
+    at: float,
+    position: float,
+    velocity: float,
+    goal: float,
+    peak: float,
+    acceleration: float,
+    *,
+    cruises: bool,
+) -> Motion:
+    """To the velocity `peak`, along at it if it is the highest allowed, and down to nothing at the goal."""
+    first = Phase(
+        abs(peak - velocity) / acceleration, position, velocity, copysign(acceleration, peak - velocity)
+    )
+    reached = first.position_after(first.duration)
+    braking = Phase(
+        abs(peak) / acceleration,
+        goal - peak * abs(peak) / (2 * acceleration),
+        peak,
+        -copysign(acceleration, peak),
+    )
+    # A triangle has no cruise: there the difference is rounding, and divided by a tiny peak it would be ages.
+    cruise = Phase(max(0.0, (braking.position - reached) / peak) if cruises else 0.0, reached, peak, 0.0)
+    return Motion(at, tuple(phase for phase in (first, cruise, braking) if phase.duration), goal)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """The electrical side of a motor, as far as a plausible reading needs it.
+
+    `top_speed` is what it reaches without load at full duty; `idle_current` (A) flows while it turns without
+    load and `stall_current` (A) at full torque. `torque` below is the share of the stall torque that the
+    outside takes, signed like velocity.
+    """
+
+    top_speed: float
+    idle_current: float
+    stall_current: float
+
+    def duty(self, velocity: float, torque: float = 0.0) -> float:
+        """Share of the supply the driver must switch through, -1 to 1: what FEETECH calls load."""
+        return max(-1.0, min(1.0, velocity / self.top_speed + torque))
+
+    def current(self, velocity: float, torque: float = 0.0) -> float:
+        """Supply current in A, signed like the effort."""
+        idle = copysign(self.idle_current, velocity) if velocity else 0.0
+        return idle + self.stall_current * torque

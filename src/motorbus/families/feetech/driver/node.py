@@ -1,0 +1,141 @@
+"""What the driver knows of one servo, and what its settings mean for the values that go to and fro.
+
+A node is memory only: no bus, no I/O. Driver functions fill it, every reply adds its alarm bits and its time to
+it, and whoever writes a setting makes it forget. Nothing here is ever guessed: unknown stays None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from math import inf
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Entry, Table, Value
+from motorbus.core.family import Identity
+from motorbus.errors import RequestError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.table import alarms, velocity_scale
+
+IMAGE: Final = 40
+"""Bytes of the EEPROM area, registers 0 to 39, which one READ brings."""
+MANY_TURNS: Final = 30719
+"""Counts to either side when both limits are 0 (7.5 turns). Source: STS3215 memory table V3.6."""
+POSITION, VELOCITY, PWM, STEP = range(4)
+"""Operating modes of STS servos (register 33)."""
+
+_POSITIONS: Final = ("present_position", "goal_position", "goal_position_echo")
+_VELOCITIES: Final = ("present_velocity", "goal_velocity")
+_NO_CURRENT: Final = 0b10_0000
+_ZERO_IS_MAXIMUM: Final = 0b1000
+
+alarm_names: Final = cache(alarms)
+
+
+class Settings(NamedTuple):
+    """What the EEPROM of a servo says about how to talk to it.
+
+    `limits` in rad; None when its map is not known. `mode` is the operating mode. `factors` multiply what a row
+    says of its unit, by row name. `answers_writes` is the status return level. `zero_is_maximum`: a goal velocity
+    of 0 means the maximum, otherwise it means standstill. `tells_current`: its bridge measures the current.
+    """
+
+    limits: tuple[float, float] | None = None
+    mode: int | None = None
+    factors: Mapping[str, float] = {}
+    answers_writes: bool = True
+    zero_is_maximum: bool = True
+    tells_current: bool = True
+
+
+class Node:
+    """One servo by its id, 0 to 253, and what is known of it.
+
+    `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s).
+    """
+
+    def __init__(self, node: int) -> None:
+        self.node: Final = checked_id(node)
+        self.identity: Identity | None = None
+        self.table: Table | None = None
+        self.settings: Settings | None = None
+        self.alarm: tuple[str, ...] = ()
+        self.at = -inf
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Lowest and highest position in rad, as last read from the servo; None when not read yet."""
+        return self.settings.limits if self.settings else None
+
+    @property
+    def mode(self) -> int | None:
+        """Operating mode as last read: 0 position, 1 velocity, 2 PWM, 3 step; None when not read yet."""
+        return self.settings.mode if self.settings else None
+
+    @property
+    def writable(self) -> bool:
+        """Its register map is known, so that a write does what its name says."""
+        return self.identity is not None and self.identity.table != ""
+
+    def heard(self, error: int, at: float) -> None:
+        """A reply came: keep its alarm bits and its time. An alarm never makes a good reply a failure."""
+        self.alarm = alarm_names(error) if error else ()
+        self.at = at
+
+    def forget_settings(self) -> None:
+        """They may have changed: read them again before they are used."""
+        self.settings = None
+
+    def value(self, row: Entry, raw: int) -> Value:
+        """Raw value of a register -> value in the row's unit, by the settings of this servo."""
+        value = row.to_value(raw)
+        if self.settings and row.name in self.settings.factors:
+            return value * self.settings.factors[row.name]
+        return value
+
+    def raw(self, row: Entry, value: Value) -> int:
+        """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise RequestError(
+                f"{row.name}: {value!r} is not a number", advice="give a number; nothing was sent", node=self.node
+            )
+        factor = self.settings.factors.get(row.name, 1) if self.settings else 1
+        return row.to_raw(value / factor if factor != 1 else value)
+
+
+def checked_id(node: int) -> int:
+    """An id that one servo can have. Raises RequestError for everything else, 254 (everyone) included."""
+    if isinstance(node, int) and not isinstance(node, bool) and 0 <= node <= wire.MAX_ID:
+        return node
+    everyone = node == wire.BROADCAST
+    raise RequestError(
+        f"{node!r} is not the id of a servo" + (": 254 addresses everyone at once" if everyone else ""),
+        expected=f"0 to {wire.MAX_ID}",
+        advice="name one servo; `motorbus scan BUS` lists them; nothing was sent",
+    )
+
+
+def settings_of(table: Table, image: bytes) -> Settings:
+    """What registers 0 to 39 say, read by a table that has all of its rows (a map that is known)."""
+
+    def raw(name: str) -> int:
+        row = table[name]
+        return row.decode(image[row.address : row.address + row.size])
+
+    phase = raw("phase")
+    turns = float(max(1, raw("angular_resolution")))
+    low, high = raw("min_position_limit"), raw("max_position_limit")
+    if low == high == 0:
+        low, high = -MANY_TURNS, MANY_TURNS
+    scale = table["goal_position"].scale
+    return Settings(
+        limits=(low * scale * turns, high * scale * turns),
+        mode=raw("operating_mode"),
+        factors={
+            **dict.fromkeys(_POSITIONS, turns),
+            **dict.fromkeys(_VELOCITIES, float(velocity_scale(phase))),
+        },
+        answers_writes=raw("status_return_level") != 0,
+        zero_is_maximum=bool(phase & _ZERO_IS_MAXIMUM),
+        tells_current=not phase & _NO_CURRENT,
+    )

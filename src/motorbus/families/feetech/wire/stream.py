@@ -1,0 +1,172 @@
+"""Packets out of a stream of bytes that may be cut anywhere, begin anywhere, and be wrong anywhere.
+
+There is no byte stuffing, so FF FF proves nothing: a packet is one only when id, length and checksum agree.
+Whatever fails is given up by ONE byte, never by the length it claimed, so that a good packet inside a bad one
+is not lost. What may still become a packet waits (at most 258 bytes); `flush` says that nothing more comes.
+
+Each byte ends in exactly one event. Noise is "checksum" for the bytes of a whole packet whose checksum is
+wrong, else "framing". How the stream was cut changes neither packets nor these words, only whether a run of
+noise comes in one piece.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, Literal, TypeAlias, TypeVar
+
+from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
+from motorbus.families.feetech.wire.packets import (
+    BROADCAST,
+    HEADER,
+    MAX_ID,
+    OVERHEAD,
+    InstructionPacket,
+    StatusPacket,
+    fault_of,
+    is_sound,
+)
+
+P = TypeVar("P")
+Direction: TypeAlias = Literal["status", "instruction"]
+Packet: TypeAlias = StatusPacket | InstructionPacket
+
+
+class Stream(Generic[P]):
+    """Finds packets with an id up to `top` and hands each whole one to `make`."""
+
+    __slots__ = ("_make", "_rest", "_suspect", "_top")
+
+    def __init__(self, top: int, make: Callable[[bytes], P]) -> None:
+        self._top = top
+        self._make = make
+        self._rest = b""
+        self._suspect = 0  # so many bytes of the rest belong to a packet whose checksum was wrong
+
+    @property
+    def held(self) -> int:
+        """How many bytes wait for more."""
+        return len(self._rest)
+
+    def feed(self, data: bytes) -> list[P | Noise]:
+        """Take bytes; give what is complete. Exactly one good packet, the usual case, is not searched for."""
+        if self._rest:
+            return self._split(self._rest + data, more=True)
+        if len(data) > 3 and len(data) == data[3] + 4 and fault_of(data, self._top) is None:
+            return [self._make(data)]
+        return self._split(data, more=True)
+
+    def flush(self) -> list[P | Noise]:
+        """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
+        events = self._split(self._rest, more=False)
+        self._suspect = 0
+        return events
+
+    def _split(self, data: bytes, more: bool) -> list[P | Noise]:
+        events: list[P | Noise] = []
+        noise = position = 0  # what lies between the two is noise, not yet told
+        end = len(data)
+        while (start := data.find(HEADER, position)) >= 0:
+            size = self._size(data, start)
+            if start + size > end and more:
+                position = start
+                break
+            position = start + 1
+            if not size or start + size > end:
+                continue
+            if is_sound(packet := data[start : start + size]):
+                self._tell(events, data[noise:start])
+                events.append(self._make(packet))
+                self._suspect = 0
+                noise = position = start + size
+            else:
+                noise = self._doubt(events, data, noise, start, size)
+        else:
+            position = end - 1 if more and position < end and data[-1] == 0xFF else end
+        self._tell(events, data[noise:position])
+        self._rest = data[position:]
+        return events
+
+    def _size(self, data: bytes, start: int) -> int:
+        """How many bytes the packet at this header has (at least, when unknown yet); 0: it is none."""
+        have = len(data) - start
+        if have > 2 and data[start + 2] > self._top:
+            return 0
+        if have > 3:
+            return data[start + 3] + 4 if data[start + 3] >= 2 else 0
+        return OVERHEAD
+
+    def _doubt(self, events: list[P | Noise], data: bytes, noise: int, start: int, size: int) -> int:
+        """A whole packet with a wrong checksum: from where on noise is not yet told."""
+        if start - noise >= self._suspect:
+            self._tell(events, data[noise:start])
+            noise = start
+        self._suspect = max(self._suspect, start + size - noise)
+        return noise
+
+    def _tell(self, events: list[P | Noise], noise: bytes) -> None:
+        bad, stray = noise[: self._suspect], noise[self._suspect :]
+        if bad:
+            events.append(Noise(bad, "checksum"))
+        if stray:
+            events.append(Noise(stray, "framing"))
+        self._suspect -= len(bad)
+
+
+class Splitter:
+    """Packets of one direction, "status" (from servos) or "instruction" (from a host), and the noise."""
+
+    __slots__ = ("_stream",)
+
+    def __init__(self, direction: Direction = "status") -> None:
+        self._stream: Stream[Packet] = (
+            Stream(MAX_ID, _status) if direction == "status" else Stream(BROADCAST, _instruction)
+        )
+
+    @property
+    def held(self) -> int:
+        """How many bytes wait for more."""
+        return self._stream.held
+
+    def feed(self, data: bytes) -> list[Packet | Noise]:
+        """Take bytes, cut anywhere; give what is complete. Never raises."""
+        return self._stream.feed(data)
+
+    def flush(self) -> list[Packet | Noise]:
+        """Nothing more comes: give what can be made of the rest."""
+        return self._stream.flush()
+
+
+class StatusReceiver:
+    """What a bus makes of the bytes of servos: each status packet a `Reply` on lane 0 with the id as key."""
+
+    __slots__ = ("_stream",)
+
+    def __init__(self) -> None:
+        self._stream: Stream[Event] = Stream(MAX_ID, _reply)
+
+    @property
+    def held(self) -> int:
+        """How many bytes wait for more."""
+        return self._stream.held
+
+    def feed(self, data: Data) -> list[Event]:
+        """Take bytes, cut anywhere; give what is complete. Never raises."""
+        if isinstance(data, CanFrame):
+            return [Noise(data.data, "foreign")]
+        return self._stream.feed(data)
+
+    def flush(self) -> list[Event]:
+        """Nothing more comes: give what can be made of the rest."""
+        return self._stream.flush()
+
+
+def _status(data: bytes) -> Packet:
+    return StatusPacket(data[2], data[4], data[5:-1], data)
+
+
+def _instruction(data: bytes) -> Packet:
+    return InstructionPacket(data[2], data[4], data[5:-1], data)
+
+
+def _reply(data: bytes) -> Event:
+    return Reply(0, data[2], data)

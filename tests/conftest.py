@@ -1,0 +1,69 @@
+"""How much of each test is run: all but the long ones, the long ones (`--soak`), or a quick few (`--quick`).
+
+A test that counts asks the fixture `rounds` how often; so the same test runs 10^4 times in `make test`, its full
+count in `make soak` and a hundred times on the other interpreters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+HERE = Path(__file__).parent
+USUAL_ROUNDS = 10_000
+QUICK_ROUNDS = 100
+# What decides whether another interpreter is supported: the floors that every byte passes through.
+QUICK_FOLDERS = ("core", "bus", "families", "conformance")
+
+settings.register_profile("test", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("quick", settings.get_profile("test"), max_examples=10)
+settings.register_profile("soak", deadline=None, max_examples=5_000, print_blob=True)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("motorbus")
+    group.addoption("--soak", action="store_true", help="only the long runs, with their full counts")
+    group.addoption("--quick", action="store_true", help="only a small subset, with small counts")
+
+
+def _profile(config: pytest.Config) -> str:
+    if config.getoption("--soak") or config.getoption("-m") == "soak":
+        return "soak"
+    return "quick" if config.getoption("--quick") else "test"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile(_profile(config))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    wanted = {"soak": _is_soak, "quick": _is_quick, "test": _is_usual}[_profile(config)]
+    for item in items:
+        if "rounds" in getattr(item, "fixturenames", ()) and _profile(config) == "soak":
+            item.add_marker("soak")
+    config.hook.pytest_deselected(items=[item for item in items if not wanted(item)])
+    items[:] = [item for item in items if wanted(item)]
+
+
+def _is_soak(item: pytest.Item) -> bool:
+    return item.get_closest_marker("soak") is not None
+
+
+def _is_usual(item: pytest.Item) -> bool:
+    return not _is_soak(item)
+
+
+def _is_quick(item: pytest.Item) -> bool:
+    inside = item.path.is_relative_to(HERE) and item.path.relative_to(HERE).parts[0] in QUICK_FOLDERS
+    return _is_usual(item) and (inside or item.get_closest_marker("quick") is not None)
+
+
+@pytest.fixture(scope="session")
+def rounds(pytestconfig: pytest.Config) -> Callable[[int], int]:
+    """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`."""
+    most = {"soak": None, "test": USUAL_ROUNDS, "quick": QUICK_ROUNDS}[_profile(pytestconfig)]
+    return lambda full: full if most is None else min(full, most)

@@ -1,0 +1,123 @@
+"""What people type becomes the API's unit exactly once, and what cannot be meant is refused in plain words."""
+
+from __future__ import annotations
+
+from math import pi
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motorbus.core.units import QUANTITIES, SCALES, parse, raw, show
+from motorbus.errors import RequestError
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "value"),
+    [
+        ("90deg", "position", pi / 2),
+        ("-45°", "position", -pi / 4),
+        ("1.2", "position", 1.2),
+        ("1.2rad", "position", 1.2),
+        ("0.25turn", "position", pi / 2),
+        ("2 turn", "position", 4 * pi),
+        (" +.5 rad ", "position", 0.5),
+        ("1.", "position", 1.0),
+        ("1e-3", "position", 0.001),
+        ("90DEG", "position", pi / 2),
+        ("30rpm", "velocity", pi),
+        ("180 deg/s", "velocity", pi),
+        ("-2", "velocity", -2.0),
+        ("1turn/s", "velocity", 2 * pi),
+        ("10rad/s²", "acceleration", 10.0),
+        ("10rad/s^2", "acceleration", 10.0),
+        ("180deg/s2", "acceleration", pi),
+        ("150mA", "current", 0.15),
+        ("7.4V", "voltage", 7.4),
+        ("70°C", "temperature", 70.0),
+        ("50ms", "time", 0.05),
+        ("20us", "time", 2e-5),
+        ("1min", "time", 60.0),
+        ("80%", "load", 0.8),
+        ("0.8", "load", 0.8),
+    ],
+)
+def test_a_number_with_or_without_a_unit(text: str, quantity: str, value: float) -> None:
+    assert parse(text, quantity) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "says"),
+    [
+        ("", "position", "is empty"),
+        ("   ", "position", "is empty"),
+        ("nan", "position", "is not a number"),
+        ("inf", "position", "is not a number"),
+        ("-inf", "velocity", "is not a number"),
+        ("1e999", "position", "too large"),
+        ("1e308turn", "position", "too large"),
+        ("deg", "position", "is not a number"),
+        ("--5", "position", "is not a number"),
+        ("90grad", "position", "'grad', which is not known"),
+        ("30rpm", "position", "measures velocity and not position"),
+        ("90deg", "velocity", "measures position and not velocity"),
+        ("1,5", "position", "decimal comma"),
+        ("100raw", "position", "raw value"),
+        ("1 2", "position", "'2', which is not known"),
+        ("٣", "position", "is not a number"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(text: str, quantity: str, says: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        parse(text, quantity)
+    assert says in caught.value.summary
+    assert repr(text) in caught.value.summary
+    assert "nothing was sent" in caught.value.advice
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("100raw", 100), ("-5 raw", -5), ("0x64 raw", 100), ("100", None), ("90deg", None), ("", None)],
+)
+def test_raw_only_when_the_text_says_so(text: str, value: int | None) -> None:
+    assert raw(text) == value
+
+
+@pytest.mark.parametrize("text", ["raw", "1.5raw", "xraw", "0xraw"])
+def test_raw_that_is_no_whole_number_is_refused(text: str) -> None:
+    with pytest.raises(RequestError, match="not a raw value"):
+        raw(text)
+
+
+@pytest.mark.parametrize(
+    ("value", "quantity", "text"),
+    [
+        (pi / 2, "position", "1.5708 rad (90.0°)"),
+        (pi, "velocity", "3.142 rad/s (30.0 rpm)"),
+        (8.789, "acceleration", "8.79 rad/s²"),
+        (0.15, "current", "0.150 A"),
+        (7.4, "voltage", "7.4 V"),
+        (31.0, "temperature", "31 °C"),
+        (0.294, "load", "29.4 %"),
+        (0.0, "time", "0 s"),
+        (1.5, "time", "1.5 s"),
+        (-0.02, "time", "-20 ms"),
+        (0.00016, "time", "160 µs"),
+    ],
+)
+def test_values_for_people(value: float, quantity: str, text: str) -> None:
+    assert show(value, quantity) == text
+
+
+def test_every_unit_of_the_api_has_a_quantity_whose_unit_it_is() -> None:
+    for unit, quantity in QUANTITIES.items():
+        assert SCALES[quantity][unit] == 1.0
+
+
+@given(st.text(max_size=12), st.sampled_from(sorted(SCALES)))
+def test_no_text_gives_anything_but_a_number_or_our_error(text: str, quantity: str) -> None:
+    try:
+        value = parse(text, quantity)
+    except RequestError:
+        return
+    assert abs(value) < float("inf")
