@@ -152,9 +152,9 @@ int main(void) {
     int master = open_terminal();
     struct pollfd watched[] = {{.fd = master, .events = POLLIN}, {.fd = STDIN_FILENO, .events = POLLIN}};
     for (int id = 1; id <= SERVOS; id++) {
-        static const byte identity[] = {3, 10, 0, 9, 3}; /* firmware 3.10, low byte first, STS3215 */
-        memcpy(servos[id].memory, identity, sizeof identity);
-        servos[id].memory[5] = (byte)id;
+        /* Firmware 3.10, low byte first, STS3215; id, rate, delay, answers everything, limits 0 to 4095. */
+        byte start[] = {3, 10, 0, 9, 3, (byte)id, 0, 0, 1, 0, 0, 0xFF, 0x0F};
+        memcpy(servos[id].memory, start, sizeof start);
     }
     puts(ptsname(master));
     fflush(stdout);

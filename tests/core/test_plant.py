@@ -206,7 +206,9 @@ def test_position_is_the_sum_of_velocity(
     steps = 2000
     width = span / steps
     summed = sum(motion.velocity(moment + (index + 0.5) * width) for index in range(steps)) * width
-    assert motion.position(moment + span) - motion.position(moment) == pytest.approx(summed, abs=0.5, rel=1e-3)
+    assert motion.position(moment + span) - motion.position(moment) == pytest.approx(
+        summed, abs=0.5, rel=1e-3
+    )
 
 
 def test_duty_and_current_follow_velocity_and_torque() -> None:

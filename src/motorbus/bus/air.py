@@ -208,8 +208,10 @@ class Air:
         held = self.echo.give_up()
         for event in (self.receiver.feed(held) if held else []) + self.receiver.flush():
             self._take(event, now)
-        if self._flying.get(lane) is not flight or flight.done:
-            self._flying.pop(lane, None)
+        if self._flying.get(lane) is not flight:
+            return
+        if flight.done and not flight.abandoned:  # an interrupt fell between settling it and forgetting it
+            del self._flying[lane]
         elif flight.exchange.replies is ANY:
             self._accepted(lane, flight, now)
         elif flight.complete:

@@ -6,7 +6,7 @@ it, and whoever writes a setting makes it forget. Nothing here is ever guessed: 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from math import inf
 from typing import Final, NamedTuple
@@ -26,6 +26,8 @@ POSITION, VELOCITY, PWM, STEP = range(4)
 
 _POSITIONS: Final = ("present_position", "goal_position", "goal_position_echo")
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
+SCALED: Final = frozenset((*_POSITIONS, *_VELOCITIES))
+"""Rows whose unit depends on settings of the servo (angular resolution, phase)."""
 _NO_CURRENT: Final = 0b10_0000
 _ZERO_IS_MAXIMUM: Final = 0b1000
 
@@ -113,6 +115,15 @@ def checked_id(node: int) -> int:
         expected=f"0 to {wire.MAX_ID}",
         advice="name one servo; `motorbus scan BUS` lists them; nothing was sent",
     )
+
+
+def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
+    """Each as a node, once, in this order; an id alone becomes a node of which nothing is known yet."""
+    nodes: dict[int, Node] = {}
+    for one in ids:
+        node = one if isinstance(one, Node) else Node(one)
+        nodes.setdefault(node.node, node)
+    return list(nodes.values())
 
 
 def settings_of(table: Table, image: bytes) -> Settings:

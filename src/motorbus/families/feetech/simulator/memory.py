@@ -116,7 +116,9 @@ class Memory:
     def _fits(self, entry: Entry, address: int, data: bytes) -> bool:
         after = bytearray(self.live)
         after[address : address + len(data)] = data
-        return entry.low <= entry.decode(bytes(after[entry.address : entry.address + entry.size])) <= entry.high
+        return (
+            entry.low <= entry.decode(bytes(after[entry.address : entry.address + entry.size])) <= entry.high
+        )
 
 
 def code(entry: Entry, raw: int) -> bytes:

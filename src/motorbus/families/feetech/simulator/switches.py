@@ -17,6 +17,10 @@ from motorbus.core.family import Option
 from motorbus.errors import RequestError
 
 
+_YES = frozenset({"yes", "true", "on", "1"})
+_NO = frozenset({"no", "false", "off", "0"})
+
+
 def _switch(default: object, help: str, *choices: str, source: str) -> Any:
     return field(default=default, metadata={"help": help, "choices": choices, "source": source})
 
@@ -95,7 +99,9 @@ class Switches:
         source="servolab, firmware 3.10: kept; feetech-cli documents id 1 at 1 Mbaud",
     )
     restore_time: float = _switch(
-        1.0, "how long it is deaf after a factory restore", source="servolab: about 1 s until it answers again"
+        1.0,
+        "how long it is deaf after a factory restore",
+        source="servolab: about 1 s until it answers again",
     )
     calibrate: str = _switch(
         "accept",
@@ -178,7 +184,8 @@ class Switches:
     def from_options(options: Mapping[str, object]) -> Switches:
         """Switches by name, values also as text. Raises RequestError for an unknown name or an impossible value."""
         known = {one.name: one for one in fields(Switches)}
-        return Switches(**{name: _value(name, known, value) for name, value in options.items()})
+        values: dict[str, Any] = {name: _value(name, known, value) for name, value in options.items()}
+        return Switches(**values)
 
 
 def options() -> tuple[Option, ...]:
@@ -205,16 +212,17 @@ def _value(name: str, known: Mapping[str, Field[Any]], value: object) -> object:
     if isinstance(default, float):
         return _number(name, value)
     if value not in choices:
-        raise RequestError(f"option {name}: {value!r} is not possible", expected=f"one of {', '.join(choices)}")
+        raise RequestError(
+            f"option {name}: {value!r} is not possible", expected=f"one of {', '.join(choices)}"
+        )
     return value
 
 
 def _truth(name: str, value: object) -> bool:
-    words = {"1": True, "yes": True, "true": True, "on": True, "0": False, "no": False, "false": False, "off": False}
-    truth = words.get(str(value).lower())
-    if truth is None:
+    word = str(value).lower()
+    if word not in _YES | _NO:
         raise RequestError(f"option {name}: {value!r} is neither yes nor no", expected="yes or no")
-    return truth
+    return word in _YES
 
 
 def _number(name: str, value: object) -> float:

@@ -27,6 +27,7 @@ _SHAPES: Final[dict[int, str]] = {
     Instruction.READ: "give the first register and how many bytes",
     Instruction.WRITE: "give the first register and at least one datum",
     Instruction.REG_WRITE: "give the first register and at least one datum",
+    Instruction.CALIBRATE: "give a position of two bytes, or none",
     Instruction.SYNC_READ: "give the first register, how many bytes, and the ids",
     Instruction.SYNC_WRITE: "give the first register, how many bytes, and an id and its bytes for each servo",
 }
@@ -104,12 +105,6 @@ def clear_turns(id: int) -> bytes:
 
 def calibrate(id: int, position: bytes = b"") -> bytes:
     """0x0B: call the present pose `position`: two bytes in the servo's byte order, or none for its middle."""
-    if len(position) == 1:
-        raise RequestError(
-            "CALIBRATE: a position has two bytes",
-            expected="no byte or two",
-            advice="give the position in the servo's byte order; nothing was sent",
-        )
     return encode_instruction(id, Instruction.CALIBRATE, position)
 
 
@@ -167,7 +162,7 @@ def _bad_id(id: int) -> RequestError:
 
 def _never_sent(instruction: int) -> RequestError:
     return RequestError(
-        f"instruction 0x{instruction:02X} ({instruction_name(instruction)}) is never sent",
+        f"{instruction_name(instruction)} is never sent",
         expected="one of " + ", ".join(instruction_name(code) for code, rule in RULES.items() if rule.sent),
         advice="it can leave a servo without its program, or does what nobody knows; nothing was sent",
     )

@@ -118,10 +118,10 @@ RULES: Final[Mapping[int, Rule]] = MappingProxyType(
 _NAMES: Final = {
     Instruction.REG_WRITE: "REG WRITE",
     Instruction.RESET: "RESET (factory restore)",
-    Instruction.BOOTLOADER: "enter bootloader",
+    Instruction.BOOTLOADER: "enter bootloader (0x08)",
     Instruction.UNKNOWN_09: "unknown (0x09)",
     Instruction.CLEAR_TURNS: "CLEAR TURNS",
-    Instruction.UPGRADE: "enter upgrade",
+    Instruction.UPGRADE: "enter upgrade (0x0D)",
     Instruction.SYNC_READ: "SYNC READ",
     Instruction.SYNC_WRITE: "SYNC WRITE",
 }

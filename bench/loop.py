@@ -1,0 +1,133 @@
+"""The measured loop: it runs inside the process of one contender and prints one line of JSON.
+
+Readings are kept while the clock runs and judged afterwards, so that checking costs nobody anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from resource import RUSAGE_SELF, getrusage
+from time import perf_counter
+from typing import Any, Protocol
+
+from bench.workloads import WARM_UP, WORKLOADS, Workload, goals, position
+
+
+class Contender(Protocol):
+    """One library, used as its own documentation shows. Its values stay in its own unit.
+
+    `read`, `sync_read` and `cycle` return what they read; `sync_write` and `cycle` take prepared goals.
+    """
+
+    def read(self, prepared: Any) -> Any: ...
+    def sync_read(self, prepared: Any) -> Any: ...
+    def sync_write(self, prepared: Any) -> Any: ...
+    def cycle(self, prepared: Any) -> Any: ...
+
+    def prepare(self, counts: list[int]) -> Any:
+        """Goals of the six servos in the unit that this library takes."""
+
+    def counts(self, values: Any) -> Sequence[int]:
+        """What `read` or `sync_read` returned, in counts."""
+
+    def close(self) -> None: ...
+
+
+class WrongValue(Exception):
+    """A contender returned something else than what the responder sent."""
+
+
+def check(readings: Sequence[Sequence[int]], nodes: tuple[int, ...]) -> None:
+    """Every reading against the rule. Raises WrongValue for the first that differs."""
+    for index, values in enumerate(readings):
+        expected = [position(node, index) for node in nodes]
+        if list(values) != expected:
+            raise WrongValue(f"reading {index}: {list(values)}, expected {expected}")
+
+
+class Course:
+    """One contender doing one workload: readings and goals so far, and the time the measured part took."""
+
+    def __init__(self, contender: Contender, workload: Workload) -> None:
+        self.contender = contender
+        self.workload = workload
+        self.exchange: Callable[[Any], Any] = getattr(contender, workload.method)
+        self.readings: list[Any] = []
+        self.barriers: list[Any] = []
+        self.written: list[list[int]] = []
+        self.processor = 0.0
+        self.wall = 0.0
+
+    def run(self, count: int) -> None:
+        """This many exchanges, cut where a barrier is due."""
+        stride = self.workload.stride or count
+        for start in range(0, count, stride):
+            self._stretch(min(stride, count - start))
+            if self.workload.stride:
+                self.barriers.append(self.contender.read(None))
+
+    def _stretch(self, count: int) -> None:
+        inputs: list[Any] = [None] * count
+        if self.workload.writes:
+            chosen = [goals(len(self.written) + index) for index in range(count)]
+            self.written += chosen
+            inputs = [self.contender.prepare(counts) for counts in chosen]
+        exchange, keep = self.exchange, self.readings.append
+        before, began = getrusage(RUSAGE_SELF), perf_counter()
+        for prepared in inputs:
+            keep(exchange(prepared))
+        ended, after = perf_counter(), getrusage(RUSAGE_SELF)
+        self.wall += ended - began
+        self.processor += after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+    def judge(self) -> None:
+        """Raises WrongValue unless every reading is what the responder must have sent."""
+        counts = self.contender.counts
+        if self.workload.reads:
+            check([counts(values) for values in self.readings], self.workload.reads)
+        check([counts(value) for value in self.barriers], (1,))
+
+    def books(self) -> dict[str, list[int]]:
+        """Readings, writings and the sum of the goals by node, as the responder must have them too."""
+        nodes = sorted({1, *self.workload.reads, *self.workload.writes})
+        return {
+            str(node): [
+                len(self.readings) * (node in self.workload.reads) + len(self.barriers) * (node == 1),
+                len(self.written) * (node in self.workload.writes),
+                sum(goals[node - 1] for goals in self.written) if node in self.workload.writes else 0,
+            ]
+            for node in nodes
+        }
+
+
+def measure(contender: Contender, workload: Workload, count: int) -> dict[str, Any]:
+    """Warm up, measure `count` exchanges, judge; seconds per exchange and the books."""
+    course = Course(contender, workload)
+    course.run(WARM_UP)
+    course.processor = course.wall = 0.0
+    course.run(count)
+    course.judge()
+    return {
+        "processor": course.processor / count,
+        "wall": course.wall / count,
+        "books": course.books(),
+    }
+
+
+def main(contender: Callable[[str], Contender]) -> None:
+    """The whole program of a contender's process: `PORT WORKLOAD COUNT`."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("port")
+    parser.add_argument("workload", choices=sorted(WORKLOADS))
+    parser.add_argument("count", type=int)
+    given = parser.parse_args()
+    opened = contender(given.port)
+    try:
+        print(json.dumps(measure(opened, WORKLOADS[given.workload], given.count)))
+    except WrongValue as error:
+        sys.exit(f"wrong value: {error}")
+    finally:
+        opened.close()

@@ -1,0 +1,157 @@
+"""The exchanges everything else is made of: read a block, write a block, and be sure of a write.
+
+A servo acknowledges the receipt of a write, or is set to acknowledge nothing at all (status return level 0), or
+its acknowledgement is lost. `confirmed` tells these apart by reading back. Source of the semantics: FEETECH
+serial bus servo protocol manual V1.01; STS3215 memory table V3.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple, TypeVar
+
+from motorbus.core.operation import Answer, Due, Effect, Exchange, Goal, Operation, Rank, Timeout
+from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, VerificationFailed, WireError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.node import Node
+
+T = TypeVar("T")
+
+PRESENT: Final = 56
+"""Where feedback begins in every map: the present position."""
+ACKNOWLEDGED: Final = wire.OVERHEAD
+"""Bytes of a status packet without parameters, which answers PING and every write."""
+DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
+"""Ways in which a write can fail that leave open whether it was heard."""
+
+
+class Block(NamedTuple):
+    """Adjoining registers to be written at once, and what that does.
+
+    `repeatable`: writing it twice does no more than writing it once.
+    """
+
+    address: int
+    data: bytes
+    effect: Effect = Effect.NONE
+    goals: tuple[Goal, ...] = ()
+    repeatable: bool = True
+
+
+def read_block(
+    node: Node,
+    address: int,
+    count: int,
+    take: Callable[[bytes], T],
+    *,
+    rank: Rank = Rank.POLL,
+    timeout: Timeout = Timeout.REPLY,
+) -> Exchange[T]:
+    """READ `count` bytes from `address` on; the value is what `take` makes of them."""
+
+    def read(answer: Answer) -> T:
+        frame = answer.replies[0].data
+        node.heard(frame[4], answer.at)
+        return take(frame[5:-1])
+
+    return Exchange(
+        wire.read(node.node, address, count),
+        (Due(node.node, node.node, wire.OVERHEAD + count),),
+        read,
+        rank=rank,
+        timeout=timeout,
+        repeatable=True,
+        tells_position=address == PRESENT and count > 1,
+    )
+
+
+def acknowledged(
+    node: Node,
+    request: bytes,
+    block: Block | None = None,
+    *,
+    rank: Rank = Rank.CONTROL,
+    timeout: Timeout = Timeout.REPLY,
+) -> Exchange[None]:
+    """A request that is answered by nothing but an acknowledgement; by silence at status return level 0."""
+
+    def read(answer: Answer) -> None:
+        for reply in answer.replies:
+            node.heard(reply.data[4], answer.at)
+
+    answers = node.settings is None or node.settings.answers_writes
+    return Exchange(
+        request,
+        (Due(node.node, node.node, ACKNOWLEDGED),) if answers else (),
+        read,
+        rank=rank,
+        effect=block.effect if block else Effect.NONE,
+        goals=block.goals if block else (),
+        timeout=timeout,
+        repeatable=block is not None and block.repeatable,
+    )
+
+
+def unanswered(
+    request: bytes, effect: Effect, goals: tuple[Goal, ...] = (), *, rank: Rank = Rank.CONTROL
+) -> Exchange[None]:
+    """A request to several servos, which none of them answers."""
+    return Exchange(request, (), _nothing, rank=rank, effect=effect, goals=goals)
+
+
+def _nothing(_: Answer) -> None:
+    return None
+
+
+def write_block(
+    node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
+) -> Exchange[None]:
+    """WRITE adjoining registers. The acknowledgement proves receipt, not more."""
+    return acknowledged(node, wire.write(node.node, block.address, block.data), block, rank=rank, timeout=timeout)
+
+
+def confirmed(
+    node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
+) -> Operation[None]:
+    """WRITE; when no acknowledgement is due, or none came, find out by reading back.
+
+    Raises OutcomeUnknown when that cannot be found out, VerificationFailed when the write did not take effect.
+    """
+    doubt: MotorbusError | None = None
+    exchange = write_block(node, block, rank=rank, timeout=timeout)
+    try:
+        yield from exchange
+    except DOUBTS as error:
+        doubt = error
+    if doubt is None and exchange.replies:
+        return
+    if doubt is not None and not block.repeatable:
+        raise doubt
+    yield from verified(node, block, doubt, timeout=timeout)
+
+
+def verified(
+    node: Node, block: Block, doubt: MotorbusError | None = None, *, timeout: Timeout = Timeout.REPLY
+) -> Operation[None]:
+    """Read back what was written. Raises VerificationFailed when it differs, `doubt` when nobody answers."""
+    try:
+        found = yield from read_block(node, block.address, len(block.data), bytes, timeout=timeout)
+    except DOUBTS as error:
+        if doubt is None:
+            raise
+        raise doubt from error
+    if found != block.data:
+        raise _differs(node, block, found) from doubt
+
+
+def _differs(node: Node, block: Block, found: bytes) -> VerificationFailed:
+    last = block.address + len(block.data) - 1
+    where = f"register {block.address}" + (f" to {last}" if last > block.address else "")
+    return VerificationFailed(
+        f"node {node.node}: {where} reads back different from what was written",
+        sent=block.data,
+        received=found,
+        cause="the write was lost, the servo does not take this value, or another program writes it too",
+        advice="read it again; see that no other program uses this bus, then write it again",
+        node=node.node,
+    )

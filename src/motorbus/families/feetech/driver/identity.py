@@ -1,0 +1,160 @@
+"""Who is there: is it alive, what is it, which register map has it, and how is it set.
+
+The map follows from firmware and byte order, the model gives the name and the byte order (the algorithm of the
+vendor's FD 1.9.8.5). A servo whose map is unknown, or not described here, is read by the few rows that all maps
+share and is never written: the same address is the lock in one map and the torque limit in another.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Final
+
+from motorbus.core.entry import Access, Entry, Table, changed
+from motorbus.core.family import Identity
+from motorbus.core.operation import Due, Exchange, Operation, Rank, Timeout
+from motorbus.errors import DeviceError, NoReply
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
+from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
+from motorbus.families.feetech.table import MODELS, STS, TABLES, map_for, model_number
+
+_HEAD: Final = 5
+_COMMON: Final = (
+    "firmware_major firmware_minor byte_order model_major model_minor id baud_rate status_return_level "
+    "min_position_limit max_position_limit max_temperature max_voltage min_voltage max_torque phase unload_mask "
+    "led_mask position_p position_d dead_band_cw dead_band_ccw torque_enable goal_position goal_velocity "
+    "present_position present_velocity present_load present_voltage present_temperature reg_write_pending "
+    "hardware_error moving"
+).split()
+_ONE_UNIT_IN_ALL_MAPS: Final = ("V", "°C", "fraction")
+
+
+def ping(node: Node) -> Operation[bool]:
+    """Is it there? Silence is the answer False; bytes that are no answer raise WireError."""
+    try:
+        yield from ping_exchange(node)
+    except NoReply:
+        return False
+    return True
+
+
+def ping_exchange(node: Node, *, scanning: bool = False) -> Exchange[None]:
+    """PING; silence raises NoReply. `scanning` waits shortly and asks once, for silence is usual then."""
+    exchange = acknowledged(node, wire.ping(node.node))
+    return Exchange(
+        exchange.request,
+        (Due(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
+        exchange.read,
+        rank=Rank.CONFIGURATION if scanning else Rank.POLL,
+        timeout=Timeout.SCAN if scanning else Timeout.REPLY,
+        repeatable=True,
+    )
+
+
+def identify(node: Node) -> Exchange[Identity]:
+    """Firmware, byte order, model and register map, in one READ of registers 0 to 4."""
+
+    def take(head: bytes) -> Identity:
+        return meet(node, head)
+
+    return read_block(node, 0, _HEAD, take)
+
+
+def prepare(node: Node) -> Exchange[Identity]:
+    """Read whatever motion and prepared group operations need: identity, limits, mode and units, in one READ."""
+
+    def take(image: bytes) -> Identity:
+        return learn(node, image)
+
+    return read_block(node, 0, IMAGE, take)
+
+
+def known(node: Node) -> Operation[Table]:
+    """The register map of this servo; asks it when its settings are not known yet."""
+    if node.table is None or node.settings is None:
+        yield from prepare(node)
+    assert node.table is not None
+    return node.table
+
+
+def writable(node: Node) -> Operation[Table]:
+    """As `known`, for those who will write. Raises DeviceError when the map is not known."""
+    table = yield from known(node)
+    if not node.writable:
+        raise unknown_map(node, "refuses to write to it")
+    return table
+
+
+def meet(node: Node, head: bytes) -> Identity:
+    """Registers 0 to 4 of this servo have been read."""
+    node.identity = identity_of(node.node, head)
+    node.table = TABLES[node.identity.table] if node.identity.table else common_table(_order(head))
+    return node.identity
+
+
+def learn(node: Node, image: bytes) -> Identity:
+    """Registers 0 to 39 of this servo have been read."""
+    identity = meet(node, image[:_HEAD])
+    if identity.table:
+        node.settings = settings_of(TABLES[identity.table], image)
+    else:
+        node.settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
+    return identity
+
+
+def identity_of(node: int, head: bytes) -> Identity:
+    """What registers 0 to 4 say."""
+    firmware, model = (head[0], head[1]), (head[3], head[4])
+    order = _order(head)
+    register_map = map_for(*firmware, order)
+    name = MODELS[model].name if model in MODELS else f"unknown model {model[0]}.{model[1]}"
+    return Identity(
+        node,
+        name,
+        f"{firmware[0]}.{firmware[1]}",
+        register_map if register_map in TABLES else "",
+        {
+            "model_number": model_number(*model, order),
+            "byte_order": order,
+            "register_map": register_map or "unknown",
+        },
+    )
+
+
+def _order(head: bytes) -> str:
+    """The model decides the byte order; a model nobody knows tells it by register 2."""
+    model = MODELS.get((head[3], head[4]))
+    if model is not None:
+        return model.order
+    return "little" if head[2] == 0 else "big"
+
+
+@cache
+def common_table(order: str) -> Table:
+    """The rows that all register maps share, read-only; what differs between maps in unit is a plain number."""
+    return Table(
+        "common",
+        [_commoner(STS[name], order) for name in _COMMON],
+        title="what all FEETECH register maps share; nothing may be written",
+    )
+
+
+def _commoner(row: Entry, order: str) -> Entry:
+    if row.unit in _ONE_UNIT_IN_ALL_MAPS:
+        return changed(row, access=Access.READ, order=order)
+    return changed(row, access=Access.READ, order=order, unit="", scale=1.0)
+
+
+def unknown_map(node: Node, refusal: str) -> DeviceError:
+    """The error for what needs a register map that this servo's firmware does not tell."""
+    identity = node.identity
+    assert identity is not None
+    return DeviceError(
+        f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map "
+        f"({identity.details['register_map']}) is not described: motorbus {refusal}",
+        expected=f"a servo with one of the maps {', '.join(TABLES)}",
+        cause="the same address means different things in different maps, so a guess could damage the servo",
+        advice="read() with the registers all maps share still works; nothing was written",
+        node=node.node,
+    )

@@ -1,0 +1,144 @@
+"""Registers by name: read and write them in API units.
+
+What adjoins is read and written together. A write goes the way its row asks for: RAM at once, EEPROM through the
+guarded sequence of `eeprom.py`, and what `orders.py` refuses not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Entry, Storage, Table, Value
+from motorbus.core.operation import Effect, Exchange, Operation
+from motorbus.errors import OutcomeUnknown
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver import eeprom
+from motorbus.families.feetech.driver.exchanges import Block, acknowledged, confirmed, read_block, unanswered
+from motorbus.families.feetech.driver.identity import known, writable
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import blocks, check_names, check_values, only_block, orders_of
+
+_GAP: Final = 8
+"""Bytes between two rows that are cheaper to read than to leave out: a request has 8, a reply 6, and a pause."""
+
+
+class Span(NamedTuple):
+    """Rows that one READ brings."""
+
+    address: int
+    count: int
+    rows: tuple[Entry, ...]
+
+
+def read(node: Node, *names: str) -> Operation[dict[str, Value]]:
+    """Registers in API units by name, all that can be read when none is named.
+
+    Raises RequestError for an unknown name (nothing is sent then), NoReply when the servo is silent.
+    """
+    raws = yield from read_raw(node, *names)
+    assert node.table is not None
+    table = node.table
+    return {name: node.value(table[name], raw) for name, raw in raws.items()}
+
+
+def read_raw(node: Node, *names: str) -> Operation[dict[str, int]]:
+    """Registers as raw values by name, all that can be read when none is named."""
+    check_names(names)
+    table = yield from known(node)
+    rows = rows_of(table, names)
+    found: dict[str, int] = {}
+    for span in spans(rows):
+        data = yield from read_block(node, span.address, span.count, bytes)
+        found.update(decode(span, data))
+    return {row.name: found[row.name] for row in rows}
+
+
+def rows_of(table: Table, names: Sequence[str]) -> list[Entry]:
+    """The rows of these names in this order; every readable one when none is named."""
+    rows = [table[name] for name in names] if names else list(table.values())
+    return [row for row in rows if row.readable]
+
+
+def spans(rows: Iterable[Entry]) -> Iterator[Span]:
+    """Group rows so that few READs bring them all; never across the border of two kinds of memory."""
+    group: list[Entry] = []
+    for row in sorted(rows, key=lambda row: row.address):
+        if group and (row.storage is not group[-1].storage or row.address - _end(group[-1]) > _GAP):
+            yield _span(group)
+            group = []
+        group.append(row)
+    if group:
+        yield _span(group)
+
+
+def decode(span: Span, data: bytes) -> dict[str, int]:
+    """The raw values in the bytes of a span."""
+    return {
+        row.name: row.decode(data[row.address - span.address : _end(row) - span.address]) for row in span.rows
+    }
+
+
+def _span(group: list[Entry]) -> Span:
+    return Span(group[0].address, _end(group[-1]) - group[0].address, tuple(group))
+
+
+def _end(row: Entry) -> int:
+    return row.address + row.size
+
+
+def write(node: Node, **values: Value) -> Operation[None]:
+    """Write registers by name, in API units; all are checked before the first is sent.
+
+    Registers in EEPROM go through the guarded sequence: torque off (the servo goes limp and stays so), unlock,
+    write, read back, lock. Raises RequestError for what cannot or must not be written so, DeviceError when the
+    register map is not known, VerificationFailed when EEPROM reads back different.
+    """
+    check_values(values)
+    table = yield from writable(node)
+    orders = orders_of(node, table, values)
+    kept = list(blocks(node, [order for order in orders if order.row.storage is Storage.EEPROM]))
+    if kept:
+        yield from eeprom.store(node, table, kept)
+    for block in blocks(node, [order for order in orders if order.row.storage is not Storage.EEPROM]):
+        yield from confirmed(node, block)
+
+
+def reg_write(node: Node, **values: Value) -> Operation[None]:
+    """REG WRITE: hand over a write of adjoining RAM registers that is carried out at the next ACTION.
+
+    A second one replaces the first; a power cycle loses it. Never sent twice: raises OutcomeUnknown when it was
+    not acknowledged.
+    """
+    check_values(values)
+    table = yield from writable(node)
+    block = only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
+    exchange = acknowledged(node, wire.reg_write(node.node, block.address, block.data), block)
+    yield from exchange
+    if not exchange.replies:
+        yield from _pending(node, table, exchange)
+
+
+def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
+    """A servo that acknowledges nothing still says whether a REG WRITE waits."""
+    waiting = yield from read_block(node, table["reg_write_pending"].address, 1, bytes)
+    if waiting == b"\0":
+        raise OutcomeUnknown(
+            f"node {node.node} holds no REG WRITE after one was sent",
+            sent=exchange.request,
+            cause="it was lost on the way, or an ACTION came in between",
+            advice="read the goal registers before sending it again",
+            node=node.node,
+        )
+
+
+def action(node: Node) -> Exchange[None]:
+    """ACTION for this servo: carry out what REG WRITE left. Never sent twice; nothing pending does nothing."""
+    return acknowledged(
+        node, wire.action(node.node), Block(0, b"", Effect.MOTION, repeatable=False)
+    )
+
+
+def action_all() -> Exchange[None]:
+    """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers."""
+    return unanswered(wire.action(), Effect.MOTION)

@@ -1,0 +1,84 @@
+"""Letting go, whatever happens: torque off ignores alarms, needs to know nothing of the servo, and visits everyone.
+
+Register 40 is the torque switch in every map, so this works on servos that nobody has identified. It has the rank
+of a stop: it passes whoever holds the bus, and an emergency stop that is latched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final
+
+from motorbus.core.operation import Effect, Exchange, Operation, Rank, Runnable
+from motorbus.errors import MotorbusError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
+from motorbus.families.feetech.driver.node import Node, as_nodes
+
+TORQUE_ENABLE: Final = 40
+LIMP: Final = Block(TORQUE_ENABLE, b"\0", Effect.TORQUE)
+_TRIES: Final = 3
+
+
+def disable_torque(node: Node) -> Operation[None]:
+    """Torque off: the servo goes limp. Alarms do not matter; said up to three times until it is acknowledged.
+
+    Without an acknowledgement the switch is read back. Raises OutcomeUnknown when nobody answers at all,
+    VerificationFailed when the torque is still on.
+    """
+    doubt: MotorbusError | None = None
+    for _ in range(_TRIES):
+        exchange = write_block(node, LIMP, rank=Rank.STOP)
+        try:
+            yield from exchange
+        except DOUBTS as error:
+            doubt = error
+            continue
+        if exchange.replies:
+            return
+        break
+    yield from verified(node, LIMP, doubt)
+
+
+def disable_torque_all(ids: Iterable[int | Node]) -> Operation[dict[int, MotorbusError]]:
+    """Torque off for all of these: at once by SYNC WRITE, then one after the other until acknowledged.
+
+    Visits everyone whatever happens. The value holds, by id, the error of each that did not acknowledge. An
+    interruption is raised after everyone has been visited.
+    """
+    nodes = as_nodes(ids)
+    errors: dict[int, MotorbusError] = {}
+    interruption: BaseException | None = None
+    for exchange in all_limp(nodes):
+        failure = yield from _attempt(exchange)
+        if not isinstance(failure, MotorbusError):  # whoever did not hear is visited below
+            interruption = interruption or failure
+    for node in nodes:
+        failure = yield from _attempt(disable_torque(node))
+        if failure is not None and not isinstance(failure, MotorbusError):
+            interruption = interruption or failure
+            failure = yield from _attempt(disable_torque(node))
+        if isinstance(failure, MotorbusError):
+            errors[node.node] = failure
+    if interruption is not None:
+        raise interruption
+    return errors
+
+
+def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
+    """SYNC WRITE torque off to these, as many frames as it takes; nobody answers."""
+    capacity = wire.sync_write_capacity(len(LIMP.data))
+    for start in range(0, len(nodes), capacity):
+        items = [(node.node, LIMP.data) for node in nodes[start : start + capacity]]
+        yield unanswered(wire.sync_write(LIMP.address, items), LIMP.effect, rank=Rank.STOP)
+
+
+def _attempt(runnable: Runnable[Any]) -> Operation[BaseException | None]:
+    """Carry it out; whatever it raises, an interruption included, becomes the value."""
+    try:
+        yield from runnable
+    except GeneratorExit:
+        raise
+    except BaseException as error:
+        return error
+    return None

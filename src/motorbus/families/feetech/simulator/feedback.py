@@ -1,0 +1,76 @@
+"""What the feedback registers say, worked out for the moment at which somebody reads them.
+
+Load is the duty of the power stage and not the torque, current is that of the supply: both follow from how fast
+the shaft turns and from what the outside takes (`Servo.torque`), so they are plausible and no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from motorbus.families.feetech.simulator import motor
+from motorbus.families.feetech.table import AMPERE, velocity_scale
+
+if TYPE_CHECKING:
+    from motorbus.families.feetech.simulator.servo import Servo
+
+
+def _position(servo: Servo, at: float) -> int:
+    return motor.reading(servo.motion.position(at), servo.zero, servo.memory["phase"], servo.model.turn)
+
+
+def _velocity(servo: Servo, at: float) -> int:
+    return round(servo.motion.velocity(at) / velocity_scale(servo.memory["phase"]))
+
+
+def _load(servo: Servo, at: float) -> int:
+    return round(1000 * servo.model.drive.duty(servo.motion.velocity(at), servo.burden))
+
+
+def _voltage(servo: Servo, at: float) -> int:
+    return round(servo.voltage * 10)
+
+
+def _temperature(servo: Servo, at: float) -> int:
+    return round(servo.temperature)
+
+
+def _pending(servo: Servo, at: float) -> int:
+    return int(servo.pending is not None)
+
+
+def _error(servo: Servo, at: float) -> int:
+    return servo.error
+
+
+def _moving(servo: Servo, at: float) -> int:
+    return int(servo.motion.moving(at))
+
+
+def _goal(servo: Servo, at: float) -> int:
+    return servo.memory["goal_position"]
+
+
+def _current(servo: Servo, at: float) -> int:
+    if not motor.feels_current(servo.memory["phase"]):
+        return 0
+    return round(servo.model.drive.current(servo.motion.velocity(at), servo.burden) / AMPERE)
+
+
+FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(
+    {
+        "present_position": _position,
+        "present_velocity": _velocity,
+        "present_load": _load,
+        "present_voltage": _voltage,
+        "present_temperature": _temperature,
+        "reg_write_pending": _pending,
+        "hardware_error": _error,
+        "moving": _moving,
+        "goal_position_echo": _goal,
+        "present_current": _current,
+    }
+)
+"""Row name -> raw value at a moment."""

@@ -1,0 +1,229 @@
+"""The one place where address, family and link meet.
+
+A bus is written FAMILY:PORT, options after commas, nodes after `#`:
+
+    feetech:/dev/ttyACM0,baud=500000       feetech:socket://10.0.0.7:4000      feetech:COM7
+    feetech:sim,ids=1-6,model=sts3215      feetech:sim:NAME                    feetech:/dev/ttyACM0#3
+
+Opening writes nothing to any device: one read is sent, to learn whether the adapter echoes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+from motorbus import families
+from motorbus.bus.aio import AsyncBus
+from motorbus.bus.face import BusFace
+from motorbus.bus.pump import Bus
+from motorbus.core.family import Family
+from motorbus.core.operation import Exchange
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.link.base import Link
+from motorbus.link.lock import socket_path
+from motorbus.link.url import open_link
+from motorbus.motion.safety import Gate
+from motorbus.simulation.named import Simulation, find
+
+LOG = logging.getLogger("motorbus.session")
+HIGHEST_NODE = 0x7FFFFFFF
+
+Notify = Callable[[object], None]
+
+
+class Address(NamedTuple):
+    """A parsed bus address: `nodes` is () for the whole bus."""
+
+    family: str
+    port: str
+    options: dict[str, str]
+    nodes: tuple[int, ...] = ()
+
+    @property
+    def bus(self) -> str:
+        """The address without its nodes."""
+        options = "".join(f",{name}={value}" for name, value in self.options.items())
+        return f"{self.family}:{self.port}{options}"
+
+
+def parse_address(text: str) -> Address:
+    """FAMILY:PORT[,option=value…][#ids] -> its parts. Raises RequestError with an example when it is none."""
+    body, hash_, ids = text.partition("#")
+    family, colon, rest = body.partition(":")
+    port, *options = rest.split(",")
+    if not (family and colon and port) or (hash_ and not ids):
+        raise RequestError(
+            f"{text!r} is not a bus address",
+            expected="FAMILY:PORT, options after commas, ids after #",
+            advice="for example feetech:/dev/ttyACM0,baud=1000000 or feetech:/dev/ttyACM0#3",
+        )
+    pairs = dict(_option(option, text) for option in options)
+    return Address(family, port, pairs, parse_ids(ids) if ids else ())
+
+
+def _option(text: str, address: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise RequestError(
+            f"{address!r}: the option {text!r} has no value",
+            expected="name=value after each comma",
+            advice="for example feetech:sim,ids=1-6,model=sts3215",
+        )
+    return name, value
+
+
+def parse_ids(text: str) -> tuple[int, ...]:
+    """A list of ids, joined by `+` or `,`, ranges by `-`, decimal or 0x: `1-3+7`. Raises RequestError."""
+    found: list[int] = []
+    for part in text.replace("+", ",").split(","):
+        low, dash, high = part.partition("-")
+        try:
+            first = int(low, 0)
+            last = int(high, 0) if dash else first
+        except ValueError:
+            raise _bad_ids(text, f"{part!r} is not a number or a range") from None
+        if not 0 <= first <= last or last - first > 0xFFFF or last > HIGHEST_NODE:
+            raise _bad_ids(text, f"{part!r} is not an ascending range of ids")
+        found += [node for node in range(first, last + 1) if node not in found]
+    return tuple(found)
+
+
+def _bad_ids(text: str, why: str) -> RequestError:
+    return RequestError(f"ids {text!r}: {why}", expected="for example 3, 1-6 or 1-3+7")
+
+
+class Opening(NamedTuple):
+    """Everything needed to open a bus, found out and checked beforehand."""
+
+    family: Family
+    port: str
+    rate: int
+    options: dict[str, object]
+
+
+def prepare(address: str, options: dict[str, object]) -> Opening:
+    """Check an address and its options without touching the port. Raises RequestError."""
+    spot = parse_address(address)
+    family = families.load(spot.family)
+    merged: dict[str, object] = {**spot.options, **options}
+    word = "baud" if family.link.kind == "bytes" else "bitrate"
+    rate = _number(word, merged.pop(word, family.link.rate))
+    simulated = spot.port == "sim"
+    known = {option.name for option in family.link.options} if simulated else set()
+    unknown = sorted(set(merged) - known - ({"ids", "model"} if simulated else set()))
+    if unknown:
+        raise RequestError(
+            f"{address!r}: unknown option {unknown[0]!r}",
+            expected=f"one of {', '.join(sorted({word} | known))}",
+        )
+    return Opening(family, spot.port, rate, merged)
+
+
+def _number(name: str, value: object) -> int:
+    try:
+        rate = int(str(value), 0)
+    except ValueError:
+        rate = 0
+    if rate <= 0:
+        raise RequestError(f"{name}={value}: not a rate in bit/s", expected="a positive whole number")
+    return rate
+
+
+def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
+    """Open a bus, blocking; use it in a `with`.
+
+    `report` gets progress, early results and journal records. Options may also stand in the address. Raises
+    RequestError for a bad address, PortNotFound, PortBusy (naming the owner) or LinkError for the port.
+    """
+    opening = prepare(address, options)
+    link = _link(opening)
+    try:
+        bus = Bus(link, opening.family, admit=Gate(), report=report, stop_socket=_stop_socket(opening, link))
+        test = _echo_test(bus)
+        if test is not None:
+            _settled(bus, lambda: bus.run(test))
+    except BaseException:
+        link.close()
+        raise
+    return bus
+
+
+class OpenAsyncBus(AsyncBus):
+    """An async bus that opens its port when its `async with` is entered."""
+
+    async def __aenter__(self) -> Self:
+        test = _echo_test(self)
+        if test is not None:
+            try:
+                await self.run(test)
+            except MotorbusError as silence:
+                LOG.debug("echo test: %s", silence.summary)
+            _tell_echo(self)
+        return self
+
+
+def open_async(address: str, *, report: Notify | None = None, **options: object) -> AsyncBus:
+    """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
+    opening = prepare(address, options)
+    link = _link(opening)
+    return OpenAsyncBus(
+        link, opening.family, admit=Gate(), report=report, stop_socket=_stop_socket(opening, link)
+    )
+
+
+def simulate(
+    family: str,
+    *,
+    ids: str | tuple[int, ...] = "1",
+    model: str = "",
+    clock: str = "virtual",
+    name: str | None = None,
+    **options: object,
+) -> Simulation:
+    """A simulated bus in this process; use it in a `with`, open it by its `url`, poke its nodes by `sim[3]`.
+
+    `clock` is "virtual" (time passes only while somebody waits) or "real". Raises RequestError for an unknown
+    family, model or option.
+    """
+    found = families.load(family)
+    numbers = parse_ids(ids) if isinstance(ids, str) else ids
+    return Simulation(found, numbers, model=model, clock=clock, name=name, **options)
+
+
+def _link(opening: Opening) -> Link:
+    if opening.port == "sim":
+        ids = parse_ids(str(opening.options.pop("ids", "1")))
+        model = str(opening.options.pop("model", ""))
+        return Simulation(opening.family, ids, model=model, clock="real", **opening.options).link(opening.rate)
+    if opening.port.startswith("sim:"):
+        return find(opening.port.removeprefix("sim:"), opening.family.name).link(opening.rate)
+    return open_link(opening.port, rate=opening.rate, kind=opening.family.link.kind)
+
+
+def _stop_socket(opening: Opening, link: Link) -> Path | None:
+    return None if opening.port == "sim" or opening.port.startswith("sim:") else socket_path(opening.port)
+
+
+def _echo_test(bus: BusFace) -> Exchange[Any] | None:
+    for warning in bus.link.warnings:
+        LOG.warning("%s: %s", bus.link.name, warning)
+    test = bus.family.echo_test()
+    if test is not None:
+        bus.turns.expect_echo(test)
+    return test
+
+
+def _settled(bus: BusFace, run: Callable[[], object]) -> None:
+    try:
+        run()
+    except MotorbusError as silence:
+        LOG.debug("echo test: %s", silence.summary)
+    _tell_echo(bus)
+
+
+def _tell_echo(bus: BusFace) -> None:
+    if bus.turns.echo.present:
+        LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

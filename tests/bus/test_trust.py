@@ -1,0 +1,93 @@
+"""Taint belongs to a node, and only an accepted reply takes it off."""
+
+from __future__ import annotations
+
+from script import position
+
+from motorbus.bus.trust import FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
+from motorbus.core.operation import Due
+from motorbus.families.feetech import FAMILY
+
+DUE = Due(1, 1, 8)
+QUIET = 0.04
+
+
+def asked() -> Trust:
+    trust = Trust(FAMILY)
+    trust.ask(position(1), 10.0)
+    return trust
+
+
+def test_asking_taints_before_anything_else() -> None:
+    assert asked().of(1).tainted
+
+
+def test_an_accepted_reply_clears_and_a_missed_one_does_not() -> None:
+    trust = asked()
+    trust.believe(DUE, barrier=False)
+    assert not trust.of(1).tainted
+    trust.ask(position(1), 11.0)
+    trust.missed(0, DUE, 11.0, QUIET)
+    trust.ask(position(1), 11.1)
+    trust.believe(DUE, barrier=False)
+    assert trust.of(1).tainted, "one reply is still outstanding; only a probe vouches for the node"
+    trust.believe(DUE, barrier=True)
+    assert not trust.of(1).tainted
+
+
+def test_a_probe_never_has_the_shape_of_an_outstanding_reply() -> None:
+    trust = asked()
+    shapes = set()
+    for _ in range(12):
+        probe = trust.probe(1, 10.0)
+        assert isinstance(probe.replies, tuple)
+        due = probe.replies[0]
+        assert (due.key, due.length) not in shapes
+        assert due.length != len(probe.request), "its echo must differ from its answer"
+        shapes.add((due.key, due.length))
+        trust.missed(0, due, 10.0, QUIET)
+
+
+def test_an_old_request_is_forgotten() -> None:
+    trust = asked()
+    trust.missed(0, DUE, 10.0, QUIET)
+    trust.probe(1, 10.0 + FORGOTTEN_AFTER + 0.1)
+    assert not trust.of(1).outstanding
+
+
+def test_a_late_reply_is_known_once_and_by_its_lane() -> None:
+    trust = asked()
+    trust.missed(0, DUE, 10.0, QUIET)
+    assert not trust.late(1, 1, 8)
+    assert not trust.late(0, 1, 9)
+    assert trust.late(0, 1, 8)
+    assert not trust.late(0, 1, 8)
+
+
+def test_doubt_falls_on_those_asked_within_the_quiet_time() -> None:
+    trust = Trust(FAMILY)
+    for node, at in ((1, 10.0), (2, 10.5)):
+        trust.ask(position(node), at)
+        trust.believe(Due(node, node, 8), barrier=False)
+    trust.doubt(10.51, QUIET)
+    assert not trust.of(1).tainted
+    assert trust.of(2).tainted
+    assert trust.of(2).quiet_until == 10.51 + QUIET
+
+
+def test_more_doubt_does_not_put_the_probe_off() -> None:
+    trust = asked()
+    trust.missed(0, DUE, 10.0, QUIET)
+    trust.doubt(10.03, QUIET)
+    trust.doubt_node(1, 10.03, QUIET)
+    assert trust.of(1).quiet_until == 10.0 + QUIET
+
+
+def test_a_silent_node_is_probed_ever_less_often() -> None:
+    trust = asked()
+    waits = []
+    for _ in range(10):
+        trust.stayed_silent(1, 10.0, QUIET)
+        waits.append(trust.of(1).probe_at - 10.0)
+    assert waits == sorted(waits)
+    assert waits[-1] == LONGEST_BACK_OFF

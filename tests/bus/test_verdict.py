@@ -1,0 +1,55 @@
+"""Why an exchange failed, in the right class and in words."""
+
+from __future__ import annotations
+
+import pytest
+from script import position, reply
+
+from motorbus.bus import verdict
+from motorbus.bus.ticket import Flight
+from motorbus.core.operation import Due, Effect, Exchange, Reply
+from motorbus.errors import ChecksumError, FramingError, NoReply, OutcomeUnknown, UnexpectedReply
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"),
+    [
+        ("silence", NoReply),
+        ("checksum", ChecksumError),
+        ("framing", FramingError),
+        ("surplus", UnexpectedReply),
+        ("echo", UnexpectedReply),
+        ("unexpected", UnexpectedReply),
+        ("early", UnexpectedReply),
+    ],
+)
+def test_every_fault_has_its_class_cause_and_advice(kind: str, error: type[Exception]) -> None:
+    found = verdict.error(Flight(position(3)), kind, 1)
+    assert type(found) is error
+    assert found.node == 3
+    assert found.cause
+    assert found.advice
+    assert set(verdict.CAUSES) == set(verdict.ERRORS)
+
+
+def test_the_fault_of_a_try_is_the_worst_thing_seen() -> None:
+    flight = Flight(position(3))
+    assert verdict.fault(flight) == "silence"
+    flight.noise.append(("framing", b"\x01"))
+    assert verdict.fault(flight) == "framing"
+    flight.noise.append(("checksum", b"\x02"))
+    assert verdict.fault(flight) == "checksum"
+    flight.surplus = True
+    assert verdict.fault(flight) == "surplus"
+    flight.spoiled = "echo"
+    assert verdict.fault(flight) == "echo"
+
+
+def test_a_write_that_was_not_confirmed_is_unknown_and_shows_what_came() -> None:
+    write = Exchange(b"\x01\x02", (Due(3, 3, 6),), effect=Effect.PERSISTENT, repeatable=True)
+    flight = Flight(write)
+    flight.take(Reply(0, 3, reply(3)[:6]))
+    found = verdict.error(flight, "surplus", 2)
+    assert isinstance(found, OutcomeUnknown)
+    assert "(2 tries)" in str(found)
+    assert "received: FF FF 03" in str(found)
