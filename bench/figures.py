@@ -36,6 +36,4 @@ def ratio(
     for sample in samples:
         if sample.workload == workload:
             by_round.setdefault(sample.round, {})[sample.contender] = of(sample)
-    return spread(
-        pair[ours] / pair[theirs] for pair in by_round.values() if ours in pair and theirs in pair
-    )
+    return spread(pair[ours] / pair[theirs] for pair in by_round.values() if ours in pair and theirs in pair)

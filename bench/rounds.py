@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bench import memory
 from bench.places import PEERS, ROOT, surroundings
 from bench.responder import responder
 from bench.workloads import WORKLOADS
@@ -21,11 +22,15 @@ TIMEOUT = 120.0
 
 
 class Candidate(NamedTuple):
-    """Who is measured: its name, its file in `contenders`, and the folders of `.peers` it needs."""
+    """Who is measured: its name, its file in `contenders`, and the folders of `.peers` it needs.
+
+    `in_memory`: it can also be measured without a kernel.
+    """
 
     name: str
     module: str
     peers: tuple[str, ...] = ()
+    in_memory: bool = False
 
     def missing(self) -> list[str]:
         """Folders that are not there."""
@@ -35,9 +40,11 @@ class Candidate(NamedTuple):
 CANDIDATES = {
     candidate.name: candidate
     for candidate in (
-        Candidate("motorbus", "motorbus"),
+        Candidate("motorbus", "motorbus", in_memory=True),
         Candidate("rustypot", "rustypot", ("rustypot",)),
-        Candidate("feetech-servo-sdk", "feetech_servo_sdk", ("feetech-servo-sdk", "pyserial")),
+        Candidate(
+            "feetech-servo-sdk", "feetech_servo_sdk", ("feetech-servo-sdk", "pyserial"), in_memory=True
+        ),
         Candidate("bare loop", "bare"),
     )
 }
@@ -57,28 +64,42 @@ class Failed(Exception):
     """A contender did not finish, returned a wrong value, or its books differ from the responder's."""
 
 
-def command(candidate: Candidate, port: str, workload: str, count: int) -> list[str]:
-    """How the process of a contender is started."""
-    return [sys.executable, "-m", f"bench.contenders.{candidate.module}", port, workload, str(count)]
+Run = Callable[[Candidate, str, int], dict[str, Any]]
+"""Carries out one measurement: who, which workload, how many exchanges."""
 
 
-def run(
-    program: Path, candidate: Candidate, workload: str, count: int, prefix: Iterable[str] = ()
+def on_wire(program: Path, prefix: Iterable[str] = ()) -> Run:
+    """Against a fresh responder on a pseudo-terminal, the books compared. `prefix` is a program to run it under."""
+
+    def run(candidate: Candidate, workload: str, count: int) -> dict[str, Any]:
+        with responder(program) as wire:
+            said = _launch(candidate, wire.port, workload, count, prefix)
+        compare(candidate, said["books"], wire.books)
+        return said
+
+    return run
+
+
+def in_memory(candidate: Candidate, workload: str, count: int) -> dict[str, Any]:
+    """Against answers inside the process."""
+    return _launch(candidate, memory.PORT, workload, count)
+
+
+def _launch(
+    candidate: Candidate, port: str, workload: str, count: int, prefix: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """One measurement in a process of its own, its books compared with the responder's. Raises Failed."""
-    with responder(program) as wire:
-        done = subprocess.run(
-            [*prefix, *command(candidate, wire.port, workload, count)],
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
-            cwd=ROOT,
-            env=dict(surroundings(*candidate.peers)),
-        )
+    module = f"bench.contenders.{candidate.module}"
+    done = subprocess.run(
+        [*prefix, sys.executable, "-m", module, port, workload, str(count)],
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+        cwd=ROOT,
+        env=dict(surroundings(*candidate.peers)),
+    )
     if done.returncode:
         raise Failed(f"{candidate.name}, {workload}: {done.stderr.strip() or done.returncode}")
     said: dict[str, Any] = json.loads(done.stdout)
-    compare(candidate, said["books"], wire.books)
     return said
 
 
@@ -95,7 +116,7 @@ def compare(candidate: Candidate, said: dict[str, list[int]], books: dict[str, A
 
 
 def rounds(
-    program: Path,
+    run: Run,
     candidates: list[Candidate],
     count: int,
     times: int,
@@ -110,6 +131,6 @@ def rounds(
         shuffler.shuffle(pairs)
         for candidate, workload in pairs:
             progress(f"round {number + 1} of {times}: {candidate.name}, {workload}")
-            said = run(program, candidate, workload, count)
+            said = run(candidate, workload, count)
             samples.append(Sample(number, candidate.name, workload, said["processor"], said["wall"]))
     return samples

@@ -45,14 +45,14 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
         {"families/other/__init__.py": "", "families/feetech/offence.py": "import motorbus.families.other"},
     ],
     "driver-and-simulator": [
-        {"families/feetech/driver.py": "import motorbus.families.feetech.simulator"},
-        {"families/feetech/simulator.py": "import motorbus.families.feetech.driver"},
+        {"families/feetech/driver/offence.py": "import motorbus.families.feetech.simulator"},
+        {"families/feetech/simulator/offence.py": "import motorbus.families.feetech.driver"},
         {
-            "families/feetech/driver.py": "import motorbus.families.feetech.third",
+            "families/feetech/driver/offence.py": "import motorbus.families.feetech.third",
             "families/feetech/third.py": "import motorbus.families.feetech.simulator",
         },
         {
-            "families/feetech/simulator.py": "import motorbus.families.feetech.third",
+            "families/feetech/simulator/offence.py": "import motorbus.families.feetech.third",
             "families/feetech/third.py": "import motorbus.families.feetech.driver",
         },
     ],
@@ -103,7 +103,7 @@ def offend(folder: Path, offence: dict[str, str]) -> Path:
     shutil.copytree(SOURCES, sources / "motorbus", ignore=shutil.ignore_patterns("__pycache__"))
     for name, line in offence.items():
         file = sources / "motorbus" / name
-        file.parent.mkdir(exist_ok=True)
+        file.parent.mkdir(exist_ok=True, parents=True)
         before = file.read_text(encoding="utf-8") if file.exists() else ""
         file.write_text(f"{before}\n{line}\n", encoding="utf-8")
     return sources

@@ -56,7 +56,8 @@ def places_of_its_test(file: Path) -> list[Path]:
     """Where the test of a source file may be.
 
     a/b.py is tested by tests/a/test_b.py. A package is tested, as to its `__init__`, by the file named after it,
-    inside or beside its folder; a room of a family that has outgrown one file may be tested as one room.
+    inside or beside its folder; a room of a family that has outgrown one file may be tested as one room, or file by
+    file beside its folder (wire/stream.py by test_wire_stream.py).
     """
     path = file.relative_to(SOURCES)
     if path == Path("__init__.py"):
@@ -66,7 +67,8 @@ def places_of_its_test(file: Path) -> list[Path]:
     if path.name == "__init__.py":
         return [folder / f"test_{folder.name}.py", beside]
     own = folder / f"test_{path.stem}.py"
-    return [own, beside] if folder.name in ROOMS else [own]
+    split = folder.parent / f"test_{folder.name}_{path.stem}.py"
+    return [own, beside, split] if folder.name in ROOMS else [own]
 
 
 FILES = python_files(*FOLDERS)

@@ -6,6 +6,7 @@ from typing import Any
 
 import scservo_sdk as sdk  # type: ignore[import-not-found]
 
+from bench import memory
 from bench.loop import main
 from bench.workloads import IDS
 
@@ -13,14 +14,41 @@ GOAL, POSITION = 42, 56
 SPEED = 1000
 
 
+class MemoryPort:
+    """Those members of its PortHandler that its packet handler uses, over answers in memory."""
+
+    def __init__(self) -> None:
+        self.is_using = False
+        self.wire = memory.Wire()
+        self.arrived = b""
+
+    def clearPort(self) -> None:  # noqa: N802 - the SDK's name
+        """There is nothing to wait for."""
+
+    def writePort(self, packet: list[int]) -> int:  # noqa: N802
+        self.arrived += self.wire.answer(bytes(packet))
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802
+        taken, self.arrived = self.arrived[:length], self.arrived[length:]
+        return taken
+
+    def setPacketTimeout(self, length: int) -> None:  # noqa: N802
+        """Everything is here already."""
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802
+        return True
+
+    def closePort(self) -> None:  # noqa: N802
+        """Nothing was opened."""
+
+
 class FeetechServoSdk:
     """Raw counts in and out; a result code per call, which is looked at as the examples do."""
 
     def __init__(self, port: str) -> None:
-        self.port = sdk.PortHandler(port)
+        self.port = MemoryPort() if port == memory.PORT else _opened(port)
         self.packets = sdk.PacketHandler(0)
-        if not self.port.openPort() or not self.port.setBaudRate(1_000_000):
-            raise OSError(f"cannot open {port}")
         self.positions = sdk.GroupSyncRead(self.port, self.packets, POSITION, 2)
         for node in IDS:
             self.positions.addParam(node)
@@ -60,6 +88,13 @@ class FeetechServoSdk:
 
     def close(self) -> None:
         self.port.closePort()
+
+
+def _opened(name: str) -> Any:
+    port = sdk.PortHandler(name)
+    if not port.openPort() or not port.setBaudRate(1_000_000):
+        raise OSError(f"cannot open {name}")
+    return port
 
 
 def _demand(result: int) -> None:

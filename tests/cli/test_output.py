@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import sys
 
 import pytest
@@ -64,7 +65,8 @@ def test_a_number_that_is_none_is_no_json() -> None:
 
 def test_a_piped_table_is_one_line_per_row_without_colour(capsys: pytest.CaptureFixture[str]) -> None:
     Output().table("title", ["name", ">n"], [["x" * 300, 7], ["[red]y[/red]", None]])
-    head, long, markup = capsys.readouterr().out.splitlines()
+    title, head, long, markup = capsys.readouterr().out.splitlines()
+    assert title == "title"
     assert head.split() == ["name", "n"]
     assert long.split() == ["x" * 300, "7"]
     assert markup.split() == ["[red]y[/red]"]
@@ -83,8 +85,14 @@ def test_no_color_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = watched(monkeypatch)
     monkeypatch.setenv("NO_COLOR", "1")
     Output().error(errors.NoReply("nobody"))
-    assert terminal.getvalue().startswith("error: nobody")
-    assert "\x1b[3" not in terminal.getvalue()
+    assert "error: " in terminal.getvalue()
+    assert re.search("\x1b\\[[0-9;]*3[0-7]", terminal.getvalue()) is None, "a colour"
+
+
+def test_an_error_is_red_where_colour_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = watched(monkeypatch)
+    Output().error(errors.NoReply("nobody"))
+    assert terminal.getvalue().startswith("\x1b[1;31merror: ")
 
 
 def test_notes_and_errors_go_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:

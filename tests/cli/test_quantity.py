@@ -9,6 +9,8 @@ import pytest
 from motorbus.cli import quantity
 from motorbus.core.entry import Access, Entry, Storage
 from motorbus.errors import RequestError
+from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.table import STS
 
 ANGLE = Entry(
     name="angle",
@@ -44,36 +46,63 @@ FLAGS = Entry(
 
 
 @pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("1.5", 1.5),
-        ("90deg", math.pi / 2),
-        ("-45°", -math.pi / 4),
-        ("2048raw", math.pi),
-        ("0.25 turn", math.pi / 2),
-    ],
+    ("text", "number"),
+    [("1.5", 1.5), ("90deg", math.pi / 2), ("-45°", -math.pi / 4), ("0.25 turn", math.pi / 2)],
 )
-def test_an_angle_is_typed_with_or_without_unit(text: str, value: float) -> None:
-    assert quantity.value(ANGLE, text) == pytest.approx(value)
+def test_an_angle_is_typed_with_or_without_unit(text: str, number: float) -> None:
+    assert quantity.typed(ANGLE, text) == (pytest.approx(number), False)
 
 
-@pytest.mark.parametrize(("text", "value"), [("velocity", 1), ("Position", 0), ("3", 3), ("0x02", 2)])
-def test_a_plain_number_may_be_named(text: str, value: int) -> None:
-    assert quantity.value(MODE, text) == value
+@pytest.mark.parametrize(
+    ("text", "raw"), [("2048raw", False), ("2048", True), ("0x800", True), ("2048raw", True)]
+)
+def test_a_raw_value_is_said_to_be_one(text: str, raw: bool) -> None:
+    assert quantity.typed(ANGLE, text, raw=raw) == (2048, True)
+
+
+@pytest.mark.parametrize(("text", "number"), [("velocity", 1), ("Position", 0), ("3", 3), ("0x02", 2)])
+def test_a_plain_number_may_be_named(text: str, number: int) -> None:
+    assert quantity.typed(MODE, text) == (number, True)
 
 
 @pytest.mark.parametrize(
     ("entry", "text"),
-    [(ANGLE, "nan"), (ANGLE, "inf"), (ANGLE, "far"), (ANGLE, ""), (ANGLE, "1A"), (MODE, "sideways")],
+    [
+        (ANGLE, "nan"),
+        (ANGLE, "inf"),
+        (ANGLE, "far"),
+        (ANGLE, ""),
+        (ANGLE, "1A"),
+        (MODE, "sideways"),
+        (MODE, "1.5"),
+    ],
 )
 def test_what_is_no_value_is_refused(entry: Entry, text: str) -> None:
     with pytest.raises(RequestError):
-        quantity.value(entry, text)
+        quantity.typed(entry, text)
+
+
+def test_a_raw_value_has_no_unit() -> None:
+    with pytest.raises(RequestError):
+        quantity.typed(ANGLE, "90deg", raw=True)
+
+
+def test_a_row_converts_where_a_device_cannot() -> None:
+    assert quantity.to_value(object(), ANGLE, 2048) == pytest.approx(math.pi)
+    assert quantity.to_raw(object(), ANGLE, math.pi) == 2048
+
+
+def test_a_device_that_converts_by_its_settings_is_asked() -> None:
+    servo = Node(1)
+    servo.settings = Settings(factors={"present_velocity": 50.0})
+    row = STS["present_velocity"]
+    assert quantity.to_value(servo, row, 2) == pytest.approx(100 * row.scale)
+    assert quantity.to_raw(servo, row, 100 * row.scale) == 2
 
 
 def test_the_choices_are_offered_when_a_name_is_wrong() -> None:
     with pytest.raises(RequestError, match="position, velocity"):
-        quantity.value(MODE, "sideways")
+        quantity.typed(MODE, "sideways")
 
 
 @pytest.mark.parametrize(

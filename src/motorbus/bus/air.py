@@ -11,7 +11,7 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.statistics import Statistics
-from motorbus.bus.ticket import Flight
+from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.trust import Trust
 from motorbus.core.family import Family
@@ -41,6 +41,7 @@ class Air:
         self.receiver = family.receiver()
         self.known: dict[int, Answer | None] = {}
         self.stop = family.stop(self.known)
+        self.settled = 0
         self._flying: dict[int, Flight] = {}
         self._free_at = 0.0
         self._echo_exchange: Exchange[Any] | None = None
@@ -56,6 +57,11 @@ class Air:
     def _landed(self) -> None:
         """A lane has become free."""
         raise AssertionError("turns hands it on")
+
+    def _settle(self, ticket: Ticket, value: object = None, error: BaseException | None = None) -> None:
+        """Finish a ticket, and let the pump see that somebody can go on."""
+        self.settled += 1
+        ticket.finish(value, error)
 
     # -- what leaves ----------------------------------------------------------------------------------------
 
@@ -80,7 +86,7 @@ class Air:
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", exchange.request))
         if exchange.replies == ():
-            flight.finish(flight.answer(now))
+            self._settle(flight, flight.answer(now))
         return exchange.request
 
     def expect_echo(self, exchange: Exchange[Any]) -> None:
@@ -229,7 +235,7 @@ class Air:
             self._lost_try(lane, flight, now)
             return
         if flight.parent is None and not flight.abandoned:
-            flight.finish(answer)
+            self._settle(flight, answer)
         self._believe(flight, answer, now)
         self._echo_settled(flight)
         if self._flying.get(lane) is flight:

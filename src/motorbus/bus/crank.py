@@ -19,8 +19,9 @@ def crank(link: Link, turns: Turns, until: float) -> None:
     """Send, wait at most `until`, take in. A lost link fails everything awaited and does not raise."""
     try:
         with turns.lock:
+            settled = turns.settled
             now = flush(link, turns)
-            due = turns.due()
+            due = turns.due() if turns.settled == settled else now  # somebody may go on at once
         arrived = link.read(min(until, due, now + IDLE))
         with turns.lock:
             turns.feed(arrived, link.now())

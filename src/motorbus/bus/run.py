@@ -139,7 +139,9 @@ class Run(Generic[T]):
                 wish = branch.generator.send(value)
         except StopIteration as end:
             self._finish(branch, end.value, None)
-        except BaseException as failure:  # noqa: BLE001 - it travels to the caller, whatever it is
+        except BaseException as failure:
+            if _alive(branch.generator):  # an interrupt fell into the lines above, not into the operation
+                raise
             self._finish(branch, None, failure)
         else:
             self._grant(branch, wish)
@@ -270,6 +272,10 @@ def _claimed(alone: Alone[Any]) -> Operation[Any]:
     inner = alone.operation
     yield _Claiming()  # type: ignore[misc]  # an eighth step that no driver can say
     return (yield from inner)
+
+
+def _alive(generator: Operation[Any]) -> bool:
+    return getattr(generator, "gi_frame", None) is not None
 
 
 def _waiting(branch: Branch) -> list[Branch]:

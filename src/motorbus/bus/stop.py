@@ -48,7 +48,7 @@ class Stopper:
         self.turns = turns
         self.socket_path = socket_path
         self.outcome: StopOutcome | None = None
-        self._wish, self._wake = socket.socketpair()
+        self._pair: tuple[socket.socket, socket.socket] | None = None
         self._done = Event()
         self._starting = Lock()
         self._thread: Thread | None = None
@@ -58,13 +58,15 @@ class Stopper:
         """Have the stop thread ready; does nothing when it is, or where time is virtual."""
         with self._starting:
             if self._thread is None and not self.link.virtual and not self._closed:
+                self._pair = socket.socketpair()
                 self._thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
                 self._thread.start()
 
     def trigger(self) -> None:
-        """Ask for the stop and return at once; safe in a signal handler."""
-        with contextlib.suppress(OSError):
-            self._wake.send(b"!")
+        """Ask for the stop and return at once; safe in a signal handler. Does nothing before `start`."""
+        if self._pair is not None:
+            with contextlib.suppress(OSError):
+                self._pair[1].send(b"!")
 
     def estop(self) -> StopOutcome:
         """Stop, and wait for the outcome."""
@@ -122,19 +124,21 @@ class Stopper:
     # -- the thread -----------------------------------------------------------------------------------------
 
     def _serve(self) -> None:
+        assert self._pair is not None
+        wish = self._pair[0]
         with DefaultSelector() as ready, _listening(self.socket_path) as listener:
-            ready.register(self._wish, EVENT_READ)
+            ready.register(wish, EVENT_READ)
             if listener is not None:
                 ready.register(listener, EVENT_READ)
             while not self._closed:
                 for key, _ in ready.select():
-                    if key.fileobj is self._wish:
-                        self._wished()
+                    if key.fileobj is wish:
+                        self._wished(wish)
                     else:
                         self._asked(listener)
 
-    def _wished(self) -> None:
-        self._wish.recv(4096)
+    def _wished(self, wish: socket.socket) -> None:
+        wish.recv(4096)
         if not self._closed:
             self._stop_and_tell()
 
@@ -159,8 +163,8 @@ class Stopper:
         self.trigger()
         if self._thread is not None:
             self._thread.join(PATIENCE)
-        self._wish.close()
-        self._wake.close()
+        for end in self._pair or ():
+            end.close()
 
 
 @contextlib.contextmanager

@@ -74,7 +74,7 @@ class Turns(Air):
             if ticket.done:
                 return
             if self.latched and ticket.exchange.effect in GATED and ticket.rank is not Rank.STOP:
-                ticket.finish(error=verdict.latched())
+                self._settle(ticket, error=verdict.latched())
                 return
             self._queues[ticket.rank].append(ticket)
         elif isinstance(ticket, Retune):
@@ -96,7 +96,7 @@ class Turns(Air):
             self._claims.remove(ticket)
         if isinstance(ticket, Flight):
             ticket.abandoned = True
-        ticket.finish(error=verdict.cancelled())
+        self._settle(ticket, error=verdict.cancelled())
 
     def release(self, owner: object) -> None:
         """One `Alone` of this owner has ended."""
@@ -113,7 +113,7 @@ class Turns(Air):
             if self._holder is claim.owner:
                 self._held += 1
                 self._claims.remove(claim)
-                claim.finish()
+                self._settle(claim)
 
     @property
     def waiting(self) -> bool:
@@ -158,7 +158,7 @@ class Turns(Air):
         try:
             self._admitted(exchange)
         except MotorbusError as refusal:
-            flight.finish(error=refusal)
+            self._settle(flight, error=refusal)
             return None
         return self._launch(flight, now)
 
@@ -179,7 +179,7 @@ class Turns(Air):
             self._admitted(ticket.exchange)
         except MotorbusError as refusal:
             queue.remove(ticket)
-            ticket.finish(error=refusal)
+            self._settle(ticket, error=refusal)
             return None
         request = self._launch(ticket, now)
         queue.remove(ticket)
@@ -199,7 +199,7 @@ class Turns(Air):
         queue.remove(ticket)
         self.rate = ticket.tune.rate
         self.receiver = self.family.receiver()
-        ticket.finish()
+        self._settle(ticket)
         return ticket.tune
 
     def _admitted(self, exchange: Exchange[Any]) -> None:
@@ -252,7 +252,7 @@ class Turns(Air):
         for timer in list(self._timers):
             if now >= timer.deadline:
                 self._timers.remove(timer)
-                timer.finish()
+                self._settle(timer)
 
     def _landed(self) -> None:
         self._grant_claim()
@@ -261,7 +261,7 @@ class Turns(Air):
         for ticket in list(self._timers):
             if isinstance(ticket, Listener) and not ticket.done and ticket.listen.match(notice):
                 self._timers.remove(ticket)
-                ticket.finish(notice)
+                self._settle(ticket, notice)
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
         if flight.parent is not None:
@@ -278,7 +278,7 @@ class Turns(Air):
                 self.statistics.of(due.node).retries += 1
             self._queues[flight.rank].appendleft(flight)
         else:
-            flight.finish(error=verdict.error(flight, kind, flight.tries))
+            self._settle(flight, error=verdict.error(flight, kind, flight.tries))
 
     def _probe_failed(self, probe: Flight, parent: Flight, kind: str, now: float) -> None:
         parent.tries += 1
@@ -289,7 +289,7 @@ class Turns(Air):
         if len(parent.exchange.replies) == 1:  # type: ignore[arg-type]  # never ANY here
             self._drop(parent)
             parent.noise = probe.noise
-            parent.finish(error=verdict.error(parent, kind, parent.tries))
+            self._settle(parent, error=verdict.error(parent, kind, parent.tries))
 
     def _drop(self, flight: Flight) -> None:
         if flight in self._queues[flight.rank]:
@@ -311,12 +311,12 @@ class Turns(Air):
             for ticket in list(queue):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:
                     queue.remove(ticket)
-                    ticket.finish(error=verdict.latched())
+                    self._settle(ticket, error=verdict.latched())
         for flight in self._flying.values():
             rest = self.family.air_time(flight.exchange, self.rate) + self.latency
             flight.deadline = min(flight.deadline, now + rest)
             flight.abandoned = True
-            flight.finish(error=verdict.latched())
+            self._settle(flight, error=verdict.latched())
         return self.stop
 
     def stopped(self) -> None:
@@ -337,4 +337,4 @@ class Turns(Air):
         self._timers.clear()
         self._claims.clear()
         for ticket in waiting:
-            ticket.finish(error=error)
+            self._settle(ticket, error=error)

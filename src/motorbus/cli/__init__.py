@@ -11,12 +11,12 @@ import io
 import logging
 import sys
 from contextlib import contextmanager
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
-from motorbus import __version__, families
+from motorbus import __version__
+from motorbus.cli import faces
 from motorbus.cli.exits import Exit, exit_code
 from motorbus.cli.output import Output
 
@@ -64,7 +64,7 @@ def build() -> App:
         group = Group(title, sort_key=place)
         for name, line in commands.items():
             app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=group)
-    for name in _faces():
+    for name in faces.names():
         line = f"What only {name} devices can do."
         app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=Group("One family", sort_key=10))
     app["--help"].group = app["--version"].group = Group("Program", sort_key=11)
@@ -84,10 +84,6 @@ _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#I
 `motorbus COMMAND --help` shows examples. Exit codes: 0 ok, 1 failure, 2 usage,
 3 port not found, 4 port busy, 5 no reply, 6 partial, 7 device refused,
 8 unsafe, 9 verification failed, 10 cancelled."""
-
-
-def _faces() -> list[str]:
-    return [name for name in families.names() if find_spec(f"{__name__}.{name}")]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

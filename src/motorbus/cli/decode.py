@@ -35,7 +35,7 @@ Examples:
 
 @app.default
 def decode(
-    *data: Annotated[str, Parameter(name="HEX", allow_leading_hyphen=True)],
+    *data: Annotated[str, Parameter(name="HEX")],
     family: str,
     output: Annotated[Output, Parameter(parse=False)],
 ) -> Exit:

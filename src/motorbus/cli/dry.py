@@ -9,26 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from motorbus.core.operation import (
-    Alone,
-    Effect,
-    Exchange,
-    Goal,
-    Listen,
-    Pause,
-    Rank,
-    Report,
-    Runnable,
-    Together,
-    Tune,
-)
+from motorbus.core.operation import Alone, Effect, Exchange, Rank, Together
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from motorbus.bus.pump import Bus
+    from motorbus.cli.output import Output
+    from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
 
@@ -38,13 +26,10 @@ class Unforeseeable(MotorbusError):
 
 
 class _AsWritten:
-    """The answer to a read of what was withheld: equal to whatever it is compared with, and nothing else."""
+    """The answer to a read of what was withheld: equal to whatever it is compared with, and good for nothing else."""
 
     def __eq__(self, other: object) -> bool:
         return True
-
-    def __ne__(self, other: object) -> bool:
-        return False
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -53,22 +38,21 @@ class _AsWritten:
 
 
 class DryBus:
-    """Stands where a bus stands. `show` gets each request that was withheld, and the goals in it."""
+    """Stands where a bus stands: reads by it, and keeps what it withheld in `frames`, in order."""
 
-    def __init__(self, bus: Bus, show: Callable[[bytes, tuple[Goal, ...]], None]) -> None:
-        self.bus = bus
+    def __init__(self, bus: Bus) -> None:
         self.family = bus.family
         self.link = bus.link
-        self._show = show
+        self.frames: list[bytes] = []
+        self._bus = bus
         self._gate = Gate()
-        self._withheld = False
 
     def run(self, operation: Runnable[T], report: object = None) -> T:
-        """Carry out an operation, reading only."""
-        value: Any = self._exchange(operation) if isinstance(operation, Exchange) else self._drive(operation)
-        return value  # type: ignore[no-any-return]
+        """Carry out an operation, reading only. Raises as the operation does, LimitExceeded of the gate included."""
+        answer: Any = self._one(operation) if isinstance(operation, Exchange) else self._all(operation)
+        return answer  # type: ignore[no-any-return]
 
-    def _drive(self, operation: Any) -> object:
+    def _all(self, operation: Any) -> object:
         answer: object = None
         error: MotorbusError | None = None
         while True:
@@ -76,7 +60,7 @@ class DryBus:
                 step = operation.throw(error) if error else operation.send(answer)
             except StopIteration as end:
                 return end.value
-            answer, error = None, None
+            answer = error = None
             try:
                 answer = self._step(step)
             except MotorbusError as failure:
@@ -84,19 +68,28 @@ class DryBus:
 
     def _step(self, step: object) -> object:
         if isinstance(step, Exchange):
-            return self._exchange(step)
+            return self._one(step)
         if isinstance(step, Alone):
             return self.run(step.operation)
         if isinstance(step, Together):
             return [self.run(operation) for operation in step.operations]
-        assert isinstance(step, Pause | Listen | Tune | Report)
+        return None  # a pause, a report: nothing is sent
+
+    def _one(self, exchange: Exchange[Any]) -> object:
+        if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
+            return _AsWritten() if self.frames else self._bus.run(exchange)
+        self._gate(exchange)
+        assert isinstance(exchange.request, bytes)
+        self.frames.append(exchange.request)
         return None
 
-    def _exchange(self, exchange: Exchange[Any]) -> object:
-        if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
-            return _AsWritten() if self._withheld else self.bus.run(exchange)
-        self._gate(exchange)
-        self._withheld = True
-        assert isinstance(exchange.request, bytes)
-        self._show(exchange.request, exchange.goals)
-        return None
+
+def show(dry: DryBus, output: Output) -> None:
+    """Print what was withheld, each frame explained."""
+    explained = [one for frame in dry.frames for one in dry.family.explain(frame)]
+    facts = [{"data": one.data.hex(" ").upper(), "title": one.title} for one in explained]
+    output.document("motorbus.dry-run/1", {"withheld": facts})
+    for one in explained:
+        output.text(f"would send {one.data.hex(' ').upper()}")
+        meaning = "; ".join(f"{part.name} {part.meaning}" for part in one.parts[3:-1])
+        output.text(f"           {one.title}: {meaning}" if meaning else f"           {one.title}")

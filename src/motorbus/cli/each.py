@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.target import able, everyone, face, gathered, opened
-from motorbus.errors import LinkError, MotorbusError, RequestError
+from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 def each(what: str, verb: str, devices: tuple[str, ...], options: Mapping[str, str], output: Output) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked."""
-    if not devices:
-        raise RequestError("which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0")
     results: dict[tuple[str, int], MotorbusError | None] = {}
     for name, nodes in gathered(devices).items():
         with opened(name, options, output) as bus:

@@ -68,7 +68,7 @@ CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.NoReply: Exit.NO_REPLY,
     errors.DeviceError: Exit.DEVICE_REFUSED,
     errors.RequestError: Exit.USAGE,
-    errors.MotionError: Exit.UNSAFE,
+    errors.MotionError: Exit.FAILURE,
     errors.LimitExceeded: Exit.UNSAFE,
     errors.NotHomed: Exit.UNSAFE,
     errors.Stalled: Exit.FAILURE,

@@ -62,8 +62,6 @@ def monitor(
     options
         Any option of the bus string, as a flag.
     """
-    if not devices:
-        raise RequestError("which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0")
     if not rate > 0 or count < 0 or not duration >= 0:
         raise RequestError("--rate must be above 0, --count and --duration not below 0")
     with ExitStack() as stack, _shown(output) as show:
@@ -140,6 +138,8 @@ def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
         return
     from rich.live import Live
 
+    if output.simulated:
+        output.text("simulated")
     with Live(console=output.console(), auto_refresh=False) as screen:
         yield lambda sample: screen.update(_grid(sample, output), refresh=True)
 
@@ -152,15 +152,14 @@ def _lines(sample: Sample, output: Output) -> None:
         else:
             output.document("motorbus.monitor/1", {**named, **state_facts(state)})
     if not output.json:
-        output.console().print(_grid(sample, output))
+        output.draw(_grid(sample, output))
 
 
 COLUMNS = (">id", *(f">{name}" for name in UNITS), "moving", "alarm")
 
 
 def _grid(sample: Sample, output: Output) -> Any:
-    buses = dict.fromkeys(bus for bus, _ in sample)
-    return output.grid(", ".join(buses), COLUMNS, [_row(node, state) for (_, node), state in sample.items()])
+    return output.grid(COLUMNS, [_row(node, state) for (_, node), state in sample.items()])
 
 
 def _row(node: int, state: State | MotorbusError) -> tuple[object, ...]:

@@ -43,13 +43,24 @@ class Output:
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
         """The same for eyes; a column whose name begins with `>` is set flush right."""
-        if not self.json:
-            self.console().print(self.grid(title, columns, rows))
+        if self.json:
+            return
+        if title:
+            self.text(self.marked(title))
+        self.draw(self.grid(columns, rows))
 
     def text(self, text: str) -> None:
         """A result that is prose."""
         if not self.json:
             self.console().print(text, markup=False, soft_wrap=True)
+
+    def draw(self, table: Table) -> None:
+        """Print a table; in a file or a pipe without the blanks that pad it."""
+        shown = self.console()
+        with shown.capture() as drawn:
+            shown.print(table)
+        lines = drawn.get().splitlines()
+        print("\n".join(line if shown.is_terminal else line.rstrip() for line in lines), flush=True)
 
     def note(self, text: str) -> None:
         """Something worth knowing that is not the result."""
@@ -58,16 +69,13 @@ class Output:
     def console(self) -> Console:
         return console(sys.stdout)
 
-    def grid(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
+    def grid(self, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
         """A rich table: ruled on a terminal, bare columns in a file or a pipe."""
         from rich import box
         from rich.table import Table
 
         terminal = sys.stdout.isatty()
         grid = Table(
-            title=self.marked(title) if terminal else None,
-            title_justify="left",
-            title_style="bold",
             box=box.SIMPLE_HEAD if terminal else None,
             pad_edge=False,
             header_style="bold" if terminal else "",

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import face, gathered, opened
+from motorbus.cli.target import face, gathered, nobody, opened
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -18,11 +19,14 @@ app = App(
     name="ping",
     usage="Usage: motorbus ping BUS#ID... [OPTIONS]",
     help_epilogue="""Ends with exit code 0 when all answer, 6 when some do, 5 when none does.
+--broadcast asks everyone on BUS at once, where the family can; the answers may
+collide, so who does not answer may be there all the same.
 
 Examples:
 
     motorbus ping feetech:/dev/ttyACM0#1
     motorbus ping feetech:/dev/ttyACM0#1-6
+    motorbus ping feetech:/dev/ttyACM0 --broadcast
     motorbus ping feetech:sim,ids=1-6#1+3 --json""",
 )
 
@@ -30,6 +34,7 @@ Examples:
 @app.default
 def ping(
     *devices: Annotated[str, Parameter(name="BUS#ID")],
+    broadcast: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -39,24 +44,41 @@ def ping(
     ----------
     devices
         FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3 or feetech:/dev/ttyACM0#1-6
+    broadcast
+        Ask everyone at once.
     options
         Any option of the bus string, as a flag.
     """
     answers: list[dict[str, object]] = []
-    for bus, nodes in _wanted(devices).items():
+    for bus, nodes in _wanted(devices, broadcast).items():
         with opened(bus, options, output) as opening:
-            answers += [_ask(opening, bus, node) for node in nodes]
+            if broadcast:
+                answers += _shout(opening, bus)
+            else:
+                answers += [_ask(opening, bus, node) for node in nodes]
     output.document("motorbus.ping/1", {"devices": answers})
     rows = [(a["id"], "yes" if a["answers"] else "NO", a["milliseconds"]) for a in answers]
-    output.table("Ping", [">id", "answers", ">ms"], rows)
+    output.table("", [">id", "answers", ">ms"], rows)
     return _verdict(answers)
 
 
-def _wanted(devices: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+def _wanted(devices: tuple[str, ...], broadcast: bool) -> dict[str, tuple[int, ...]]:
     found = gathered(devices)
-    if not found or not all(found.values()):
+    if broadcast and any(found.values()):
+        raise RequestError("a broadcast asks everyone", expected="BUS without ids", advice="nothing was sent")
+    if not broadcast and not all(found.values()):
         raise RequestError("which device?", expected="BUS#ID, as feetech:/dev/ttyACM0#3")
     return found
+
+
+def _shout(opening: Bus, bus: str) -> list[dict[str, object]]:
+    ping_everyone = faces.offer(opening.family.name, "ping_everyone")
+    if ping_everyone is None:
+        raise RequestError(f"{opening.family.name} buses have no broadcast ping", advice="nothing was sent")
+    found = ping_everyone(opening)
+    if not found:
+        raise nobody(opening)
+    return [{"bus": bus, "id": node, "answers": True, "milliseconds": None} for node in found]
 
 
 def _ask(opening: Bus, bus: str, node: int) -> dict[str, object]:

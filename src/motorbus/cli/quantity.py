@@ -1,8 +1,12 @@
-"""Values of registers as people type and read them; the units themselves are `core/units.py`."""
+"""Values of registers as people type and read them; the units themselves are `core/units.py`.
+
+A value is in the unit of its row. What a raw value means may depend on a device's settings too (a servo can count
+velocity in two units), so where the device can convert, it does.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -11,35 +15,50 @@ if TYPE_CHECKING:
     from motorbus.core.entry import Entry, Value
 
 
-def value(entry: Entry, text: str) -> Value:
-    """What was typed for a row, in the row's unit: a choice by its name, `2048raw`, or a number with or without unit.
+class Typed(NamedTuple):
+    """What was typed for a row: a number, and whether it is raw."""
 
-    Raises RequestError when it is none of these.
+    number: Value
+    raw: bool
+
+
+def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
+    """A choice by its name, `2048raw`, or a number in the row's unit or with a unit of its own.
+
+    Raises RequestError when it is none of these, or not finite.
     """
-    named = {name.casefold(): raw for raw, name in entry.choices.items()}
+    named = {name.casefold(): number for number, name in entry.choices.items()}
     if text.casefold() in named:
-        return entry.to_value(named[text.casefold()])
-    raw = units.raw(text)
-    if raw is not None:
-        return entry.to_value(raw)
+        return Typed(named[text.casefold()], True)
+    said = units.raw(text)
+    if said is not None or raw:
+        return Typed(_whole(entry, text) if said is None else said, True)
     if entry.unit in units.QUANTITIES:
-        return units.parse(text, units.QUANTITIES[entry.unit])
-    return _number(entry, text)
+        return Typed(units.parse(text, units.QUANTITIES[entry.unit]), False)
+    return Typed(_whole(entry, text), True)
 
 
-def _number(entry: Entry, text: str) -> Value:
+def _whole(entry: Entry, text: str) -> int:
     try:
         return int(text, 0)
     except ValueError:
-        pass
-    try:
-        return float(text)
-    except ValueError:
         raise RequestError(
-            f"{entry.name}: {text!r} is not a number",
+            f"{entry.name}: {text!r} is not a whole number",
             expected=", ".join(entry.choices.values()) or f"{entry.low} to {entry.high}",
             advice="nothing was sent",
         ) from None
+
+
+def to_value(one: Any, entry: Entry, raw: int) -> Value:
+    """Raw value -> value in the row's unit, by the settings of this device."""
+    value: Value = one.value(entry, raw) if hasattr(one, "value") else entry.to_value(raw)
+    return value
+
+
+def to_raw(one: Any, entry: Entry, value: Value) -> int:
+    """Value in the row's unit -> raw value, by the settings of this device."""
+    raw: int = one.raw(entry, value) if hasattr(one, "raw") else entry.to_raw(value)
+    return raw
 
 
 def shown(number: Value | None, unit: str) -> str:

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import quantity
+from motorbus.cli import quantity, registers
 from motorbus.cli.exits import Exit
-from motorbus.cli.info import facts
 from motorbus.cli.output import Output
-from motorbus.cli.target import able, device, face, opened
-from motorbus.errors import RequestError
+from motorbus.cli.target import able, check_names, device, face, opened, table_of
 
 if TYPE_CHECKING:
-    from motorbus.core.entry import Table
     from motorbus.core.family import State
 
 app = App(
     name="read",
-    help_epilogue="""Values are in rad, rad/s, A, V, °C, s and fractions; `raw` is what stands on the wire.
-`motorbus info BUS#ID --registers` lists the names.
+    usage="Usage: motorbus read BUS#ID [NAME...] [OPTIONS]",
+    help_epilogue="""Values are in rad, rad/s, A, V, °C, s and fractions; `raw` is what stands on the
+wire. `motorbus info BUS#ID --registers` lists the names.
 
 Examples:
 
@@ -50,7 +48,8 @@ def read(
     options
         Any option of the bus string, as a flag.
     """
-    bus, node = device(device_)
+    bus, family, (node,) = device(device_)
+    check_names(family, names)
     with opened(bus, options, output) as opening:
         one = face(opening, node)
         if names:
@@ -63,30 +62,12 @@ def read(
 def _registers(one: Any, names: tuple[str, ...], output: Output) -> None:
     table = table_of(one)
     entries = [table[name] for name in names]
-    values = one.read(*names)
-    rows = [facts(entry, values[entry.name]) for entry in entries]
+    rows = registers.facts(one, entries, one.read(*names))
     output.document("motorbus.read/1", {"id": one.node, "registers": rows})
-    shown = [
-        (entry.name, quantity.shown(values[entry.name], entry.unit), row["raw"], row["meaning"])
-        for entry, row in zip(entries, rows, strict=True)
-    ]
-    output.table(f"#{one.node}", ["register", "value", ">raw", "meaning"], shown)
+    registers.show(f"#{one.node}", rows, output)
 
 
-def table_of(one: Any) -> Table:
-    """The register map of a device, by its own firmware. Raises RequestError when nobody knows it."""
-    identity = one.identify()
-    tables = one.bus.family.tables
-    if identity.table not in tables:
-        raise RequestError(
-            f"#{one.node}: firmware {identity.firmware} is unknown, so its registers have no names",
-            advice=f"`motorbus {one.bus.family.name}` has commands that take addresses",
-        )
-    found: Table = tables[identity.table]
-    return found
-
-
-UNITS = {
+UNITS: Final = {
     "position": "rad",
     "velocity": "rad/s",
     "load": "fraction",

@@ -58,12 +58,13 @@ def scan(
 
     asked = session.parse_ids(ids) if ids else target(bus).nodes
     with opened(target(bus).bus, options, output) as opening, output.progress("scanning") as bar:
-        found: list[Found] = []
+        early: list[Found] = []
+        found: list[Found] | None = None
         try:
             operation = opening.family.scan(asked, rates(baud, opening.family))
-            opening.run(operation, report=lambda event: _listen(event, found, bar))
+            found = opening.run(operation, report=lambda event: _listen(event, early, bar))
         finally:
-            _show(bus, found, output)
+            _show(bus, early if found is None else found, output)
         if not found:
             raise nobody(opening)
     return Exit.OK
@@ -82,13 +83,13 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
 def _listen(event: object, found: list[Found], bar: Bar) -> None:
     if isinstance(event, Found):
         found.append(event)
-        bar.say(f"  #{event.node}  {event.rate} bit/s  {_model(event)}")
+        bar.say(f"#{event.node} answers at {event.rate} bit/s")
     elif isinstance(event, Progress):
         bar.advance(event.done, event.total, event.what)
 
 
 def _model(one: Found) -> str:
-    return one.identity.model if one.identity else "does not say what it is"
+    return one.identity.model if one.identity else "?"
 
 
 def _show(bus: str, found: list[Found], output: Output) -> None:

@@ -1,49 +1,64 @@
-"""From the words BUS and BUS#ID to an open bus and its devices; what all commands share."""
+"""From the words BUS and BUS#ID to an open bus and its devices; what all commands share.
+
+Whatever can be refused without the port is refused before the port is opened.
+"""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from motorbus.errors import NoReply, RequestError
+from motorbus import families
+from motorbus.errors import DeviceError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from motorbus.bus.pump import Bus
+    from motorbus.cli.dry import DryBus
     from motorbus.cli.output import Output
+    from motorbus.core.entry import Table
+    from motorbus.core.family import Family
 
 
 class Target(NamedTuple):
-    """A bus as the user wrote it, and the nodes named on it; () when none was named."""
+    """A bus by its address, its family, and the nodes named on it; () when none was named."""
 
     bus: str
+    family: Family
     nodes: tuple[int, ...]
 
 
 def target(text: str) -> Target:
-    """BUS or BUS#ID or BUS#1-3+7. Raises RequestError when it is neither."""
+    """BUS or BUS#ID or BUS#1-3+7. Raises RequestError for a bad address, an unknown family or an impossible id."""
     from motorbus import session
 
     address = session.parse_address(text)
-    return Target(text.partition("#")[0], address.nodes)
+    family = families.load(address.family)
+    for node in address.nodes:
+        family.devices.blocking(None, node)  # checks its id when it is made; needs no bus for that
+    return Target(address.bus, family, address.nodes)
 
 
-def device(text: str) -> tuple[str, int]:
+def device(text: str) -> Target:
     """BUS#ID with exactly one id. Raises RequestError otherwise."""
     found = target(text)
     if len(found.nodes) != 1:
         raise RequestError(
-            f"{text}: exactly one device is needed", expected=f"{found.bus}#ID, as {found.bus}#1"
+            f"{text}: exactly one device is needed",
+            expected=f"BUS#ID, as {found.bus}#1",
+            advice="nothing was sent",
         )
-    return found.bus, found.nodes[0]
+    return found
 
 
 def gathered(texts: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """Several targets by bus, in the order they were named, each node once."""
+    """Several targets by bus, in the order they were named, each node once. Raises RequestError for none."""
     found: dict[str, dict[int, None]] = {}
     for one in map(target, texts):
         found.setdefault(one.bus, {}).update(dict.fromkeys(one.nodes))
+    if not found:
+        raise RequestError("which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0#3")
     return {bus: tuple(nodes) for bus, nodes in found.items()}
 
 
@@ -52,14 +67,14 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
     """An open bus, closed at the end; says what the user ought to know about the port."""
     from motorbus import session
 
-    with session.open(bus, **options) as found:
-        output.simulated = output.simulated or found.link.simulated
+    with session.open(bus, report=None, **options) as found:
+        output.simulated = output.simulated or found.simulated
         for warning in found.link.warnings:
             output.note(f"note: {warning}")
         yield found
 
 
-def face(bus: Bus, node: int) -> Any:
+def face(bus: Bus | DryBus, node: int) -> Any:
     """The device with its verbs; what it can do depends on its family."""
     return bus.family.devices.blocking(bus, node)
 
@@ -74,11 +89,30 @@ def able(one: Any, verb: str) -> Any:
         ) from None
 
 
+def table_of(one: Any) -> Table:
+    """The register map of a device, by its own firmware. Raises DeviceError when nobody knows it."""
+    identity = one.identify()
+    tables: Mapping[str, Table] = one.bus.family.tables
+    known: Table | None = getattr(one, "table", None) or tables.get(identity.table)
+    if known is None:
+        raise DeviceError(
+            f"#{one.node} is {identity.model} with firmware {identity.firmware}, whose registers nobody has described",
+            node=one.node,
+        )
+    return known
+
+
+def check_names(family: Family, names: Iterable[str]) -> None:
+    """Raise RequestError, with suggestions, for a register that no device of this family has."""
+    tables = list(family.tables.values())
+    for name in names:
+        if not any(name in table for table in tables):
+            tables[0][name]
+
+
 def everyone(bus: Bus, nodes: tuple[int, ...]) -> tuple[int, ...]:
-    """The nodes that were named, or every node that answers at the present rate."""
-    if nodes:
-        return nodes
-    found = tuple(one.node for one in bus.run(bus.family.scan()))
+    """The nodes that were named, or every node that answers at the present rate. Raises NoReply for none."""
+    found = nodes or tuple(one.node for one in bus.run(bus.family.scan()))
     if not found:
         raise nobody(bus)
     return found
@@ -87,7 +121,7 @@ def everyone(bus: Bus, nodes: tuple[int, ...]) -> tuple[int, ...]:
 def nobody(bus: Bus) -> NoReply:
     """The error for a bus on which nobody answered."""
     return NoReply(
-        f"{bus.link.name}: no device answers at {bus.link.rate} bit/s",
+        f"{bus.link.name}: no device answers at {bus.rate} bit/s",
         cause="no power, a loose cable, or devices set to another rate",
         advice=f"`motorbus scan {bus.family.name}:{bus.link.name} --baud all` looks at every rate",
     )

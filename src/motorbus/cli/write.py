@@ -2,51 +2,62 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from cyclopts import App, Parameter
 
-from motorbus import families
-from motorbus.cli import quantity
+from motorbus.cli import dry, quantity, registers
 from motorbus.cli.exits import Exit, NeedsConsent
-from motorbus.cli.info import facts
 from motorbus.cli.output import Output
-from motorbus.cli.read import table_of
-from motorbus.cli.target import device, face, opened, rehearsal, target
-from motorbus.core.entry import Entry, Storage, Value
+from motorbus.cli.target import check_names, device, face, opened, table_of
+from motorbus.core.entry import Storage
 from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
-    from motorbus.core.entry import Table
+    from collections.abc import Sequence
+
+    from motorbus.cli.quantity import Typed
+    from motorbus.core.entry import Entry, Value
+    from motorbus.core.family import Family
 
 app = App(
     name="write",
     usage="Usage: motorbus write BUS#ID NAME=VALUE... [OPTIONS]",
-    help_epilogue="""Values are in the unit of the register, or with one of their own: 90deg, 500ms.
-Registers kept in EEPROM need --yes; the device goes limp while they are written.
-With --raw the numbers are what stands on the wire; a register that moves the
-device then needs --expert too. --dry-run reads, shows each frame that would
-change something, explained, and sends none of those.
+    help_epilogue="""Values are in the unit of the register, or with one of their own: 90deg, 500ms,
+2048raw. Registers kept in EEPROM need --yes, and the device may go limp while
+they are written. With --raw every number is what stands on the wire; raw
+numbers for a register that moves the device need --expert too. --dry-run
+reads, shows each frame that would change something, and sends none of those.
 
 Examples:
 
-    motorbus write feetech:sim#1 goal_position=90deg
-    motorbus write feetech:sim#1 max_temperature=65 --yes
-    motorbus write feetech:sim#1 acceleration=20 --raw
-    motorbus write feetech:sim#1 torque_limit=50% --dry-run""",
+    motorbus write feetech:/dev/ttyACM0#3 goal_position=90deg
+    motorbus write feetech:/dev/ttyACM0#3 max_temperature=65 --yes
+    motorbus write feetech:/dev/ttyACM0#3 acceleration=20 --raw
+    motorbus write feetech:/dev/ttyACM0#3 torque_limit=50% --dry-run""",
 )
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+
+class Order(NamedTuple):
+    """One register, the value it shall have in the row's unit, and whether it was given raw."""
+
+    entry: Entry
+    value: Value
+    raw: bool
 
 
 @app.default
 def write(
     device_: Annotated[str, Parameter(name="BUS#ID")],
     /,
-    *assignments: Annotated[str, Parameter(name="NAME=VALUE", allow_leading_hyphen=False)],
-    raw: Annotated[bool, Parameter(negative="")] = False,
-    expert: Annotated[bool, Parameter(negative="")] = False,
-    yes: Annotated[bool, Parameter(negative="")] = False,
-    dry_run: Annotated[bool, Parameter(negative="")] = False,
+    *assignments: Annotated[str, Parameter(name="NAME=VALUE")],
+    raw: Flag = False,
+    expert: Flag = False,
+    yes: Flag = False,
+    dry_run: Flag = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -69,18 +80,61 @@ def write(
     options
         Any option of the bus string, as a flag.
     """
-    bus, node = device(device_)
-    typed = _typed(target(device_).family, assignments, raw)
+    bus, family, (node,) = device(device_)
+    wanted = _wanted(assignments, family, raw)
     with opened(bus, options, output) as opening:
-        one = face(opening, node)
+        rehearsal = dry.DryBus(opening)
+        one = face(rehearsal if dry_run else opening, node)
         table = table_of(one)
-        orders = [(table[name], _value(one, table[name], text, raw)) for name, text in typed.items()]
-        _permit(orders, output, raws=_raws(typed, raw), expert=expert, yes=yes or dry_run)
-        values = {entry.name: value for entry, value in orders}
-        if dry_run:
-            with rehearsal(opening, output) as dry:
-                face(dry, node).write(**values)
-            return Exit.OK
-        one.write(**values)
+        orders = [
+            _order(one, table[name], quantity.typed(table[name], text, raw=raw))
+            for name, text in wanted.items()
+        ]
+        _permit(orders, output, expert=expert, yes=yes or dry_run)
+        one.write(**{entry.name: value for entry, value, _ in orders})
+    if dry_run:
+        dry.show(rehearsal, output)
+    else:
         _show(one, orders, output)
     return Exit.OK
+
+
+def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, str]:
+    """Names and texts, refused as far as that needs no device: unknown names, texts that are no values."""
+    pairs = [assignment.partition("=")[::2] for assignment in assignments]
+    if not pairs or not all(name and text for name, text in pairs):
+        raise RequestError("what shall be written?", expected="NAME=VALUE, as goal_position=90deg")
+    if len(dict(pairs)) < len(pairs):
+        raise RequestError("a register is named twice", sent=" ".join(assignments), advice="nothing was sent")
+    wanted = dict(pairs)
+    check_names(family, wanted)
+    for table in family.tables.values():
+        for name in wanted.keys() & table.keys():
+            quantity.typed(table[name], wanted[name], raw=raw)
+    return wanted
+
+
+def _order(one: Any, entry: Entry, typed: Typed) -> Order:
+    value = quantity.to_value(one, entry, int(typed.number)) if typed.raw else typed.number
+    entry.encode(quantity.to_raw(one, entry, value))  # raises when it is out of range
+    return Order(entry, value, typed.raw)
+
+
+def _permit(orders: Sequence[Order], output: Output, *, expert: bool, yes: bool) -> None:
+    moving = [order.entry.name for order in orders if order.raw and order.entry.effect is Effect.MOTION]
+    if moving and not expert:
+        raise NeedsConsent(
+            f"{', '.join(moving)}: a raw value that moves the device",
+            advice="give the value in its unit, or say --expert; nothing was sent",
+        )
+    kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
+    if kept:
+        output.consent(f"write {', '.join(kept)} to EEPROM, where it survives power-off?", yes=yes)
+
+
+def _show(one: Any, orders: Sequence[Order], output: Output) -> None:
+    rows = registers.facts(
+        one, [order.entry for order in orders], {order.entry.name: order.value for order in orders}
+    )
+    output.document("motorbus.write/1", {"id": one.node, "registers": rows})
+    registers.show(f"Written to #{one.node}", rows, output)

@@ -293,3 +293,31 @@ def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
         return (yield from runnable)
     except MotorbusError as error:
         return error
+
+
+def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> Operation[T]:
+    """Carry out `runnable`, then `clean_up()`, whatever happens: an unlock is always followed by a lock.
+
+    An error or an interruption, at any line and even in the middle of the clean-up, is raised when the clean-up
+    has been carried out. Cleaning up must be harmless to repeat.
+    """
+    clean = False
+    try:
+        try:
+            return (yield from runnable)
+        finally:
+            yield from _insist(clean_up)
+            clean = True
+    finally:
+        if not clean:  # an interruption fell between the lines above
+            yield from _insist(clean_up)
+
+
+def _insist(clean_up: Callable[[], Runnable[object]]) -> Operation[None]:
+    try:
+        yield from clean_up()
+    except MotorbusError:
+        raise
+    except BaseException:
+        yield from clean_up()
+        raise

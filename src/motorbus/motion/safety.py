@@ -50,7 +50,7 @@ def _check(goal: Goal) -> None:
 def _refusal(goal: Goal, why: str, advice: str) -> LimitExceeded:
     return LimitExceeded(
         f"node {goal.node}: goal {goal.quantity} refused: {why}",
-        expected="" if goal.low is None else f"{goal.low:.6g} to {goal.high:.6g}",
+        expected="" if goal.low is None or goal.high is None else f"{goal.low:.6g} to {goal.high:.6g}",
         advice=f"{advice}; nothing was sent",
         node=goal.node,
     )

@@ -36,7 +36,7 @@ def _guarded(node: Node, lock: int, blocks: Sequence[Block]) -> Operation[None]:
         yield from disable_torque(node)
         yield from _put(node, _lock(lock, 0))
         for block in blocks:
-            yield from _stored(node, block)
+            yield from _stored(node, block._replace(effect=Effect.PERSISTENT))  # it is limp: nothing can move
         yield from _put(node, _lock(lock, 1))
         yield from verified(node, _lock(lock, 1), timeout=Timeout.STORE)
     except GeneratorExit:  # thrown away by whoever carried it out: nothing can be sent any more

@@ -72,12 +72,14 @@ def acknowledged(
     *,
     rank: Rank = Rank.CONTROL,
     timeout: Timeout = Timeout.REPLY,
+    after: Callable[[], None] = lambda: None,
 ) -> Exchange[None]:
     """A request that is answered by nothing but an acknowledgement; by silence at status return level 0."""
 
     def read(answer: Answer) -> None:
         for reply in answer.replies:
             node.heard(reply.data[4], answer.at)
+        after()
 
     answers = node.settings is None or node.settings.answers_writes
     return Exchange(
@@ -93,21 +95,24 @@ def acknowledged(
 
 
 def unanswered(
-    request: bytes, effect: Effect, goals: tuple[Goal, ...] = (), *, rank: Rank = Rank.CONTROL
+    request: bytes,
+    effect: Effect,
+    goals: tuple[Goal, ...] = (),
+    *,
+    rank: Rank = Rank.CONTROL,
+    after: Callable[[], None] = lambda: None,
 ) -> Exchange[None]:
     """A request to several servos, which none of them answers."""
-    return Exchange(request, (), _nothing, rank=rank, effect=effect, goals=goals)
-
-
-def _nothing(_: Answer) -> None:
-    return None
+    return Exchange(request, (), lambda _: after(), rank=rank, effect=effect, goals=goals)
 
 
 def write_block(
     node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
 ) -> Exchange[None]:
     """WRITE adjoining registers. The acknowledgement proves receipt, not more."""
-    return acknowledged(node, wire.write(node.node, block.address, block.data), block, rank=rank, timeout=timeout)
+    return acknowledged(
+        node, wire.write(node.node, block.address, block.data), block, rank=rank, timeout=timeout
+    )
 
 
 def confirmed(

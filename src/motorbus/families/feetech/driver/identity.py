@@ -20,13 +20,23 @@ from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, setting
 from motorbus.families.feetech.table import MODELS, STS, TABLES, map_for, model_number
 
 _HEAD: Final = 5
-_COMMON: Final = (
-    "firmware_major firmware_minor byte_order model_major model_minor id baud_rate status_return_level "
-    "min_position_limit max_position_limit max_temperature max_voltage min_voltage max_torque phase unload_mask "
-    "led_mask position_p position_d dead_band_cw dead_band_ccw torque_enable goal_position goal_velocity "
-    "present_position present_velocity present_load present_voltage present_temperature reg_write_pending "
-    "hardware_error moving"
-).split()
+_COMMON: Final = frozenset(
+    (
+        *("firmware_major", "firmware_minor", "byte_order", "model_major", "model_minor", "id", "baud_rate"),
+        *(
+            "status_return_level",
+            "min_position_limit",
+            "max_position_limit",
+            "max_temperature",
+            "max_voltage",
+        ),
+        *("min_voltage", "max_torque", "phase", "unload_mask", "led_mask", "position_p", "position_d"),
+        *("dead_band_cw", "dead_band_ccw", "torque_enable", "goal_position", "goal_velocity"),
+        *("present_position", "present_velocity", "present_load", "present_voltage", "present_temperature"),
+        *("reg_write_pending", "hardware_error", "moving"),
+    )
+)
+"""Rows that mean the same in every map, as far as FD 1.9.8.5 and the SDK headers tell."""
 _ONE_UNIT_IN_ALL_MAPS: Final = ("V", "°C", "fraction")
 
 
@@ -135,7 +145,7 @@ def common_table(order: str) -> Table:
     """The rows that all register maps share, read-only; what differs between maps in unit is a plain number."""
     return Table(
         "common",
-        [_commoner(STS[name], order) for name in _COMMON],
+        [_commoner(row, order) for row in STS.values() if row.name in _COMMON],
         title="what all FEETECH register maps share; nothing may be written",
     )
 
@@ -155,6 +165,6 @@ def unknown_map(node: Node, refusal: str) -> DeviceError:
         f"({identity.details['register_map']}) is not described: motorbus {refusal}",
         expected=f"a servo with one of the maps {', '.join(TABLES)}",
         cause="the same address means different things in different maps, so a guess could damage the servo",
-        advice="read() with the registers all maps share still works; nothing was written",
+        advice="read() the registers that all maps share, or disable_torque(); nothing was written",
         node=node.node,
     )

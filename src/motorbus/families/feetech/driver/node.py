@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, Value
 from motorbus.core.family import Identity
+from motorbus.core.operation import Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import alarms, velocity_scale
@@ -53,7 +54,8 @@ class Settings(NamedTuple):
 class Node:
     """One servo by its id, 0 to 253, and what is known of it.
 
-    `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s).
+    `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s);
+    `pending` what a REG WRITE from here ordered and no ACTION has carried out yet.
     """
 
     def __init__(self, node: int) -> None:
@@ -63,6 +65,7 @@ class Node:
         self.settings: Settings | None = None
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
+        self.pending: tuple[Goal, ...] = ()
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -99,7 +102,9 @@ class Node:
         """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RequestError(
-                f"{row.name}: {value!r} is not a number", advice="give a number; nothing was sent", node=self.node
+                f"{row.name}: {value!r} is not a number",
+                advice="give a number; nothing was sent",
+                node=self.node,
             )
         factor = self.settings.factors.get(row.name, 1) if self.settings else 1
         return row.to_raw(value / factor if factor != 1 else value)

@@ -13,8 +13,10 @@ from motorbus.core.entry import Entry, Storage, Table, Value
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.node import MANY_TURNS, PWM, SCALED, STEP, Node
+from motorbus.families.feetech.driver.node import MANY_TURNS, SCALED, STEP, Node
 from motorbus.families.feetech.table import TABLES
+
+_DUTY = 0.001
 
 
 class Order(NamedTuple):
@@ -67,9 +69,8 @@ def check_values(values: Mapping[str, Value]) -> None:
     """Raise RequestError for what no servo of any map would be given, before anything is sent."""
     for name, value in values.items():
         faults = [_fault(row, value) for row in _candidates(name)]
-        if fault := next(filter(None, faults), None):
-            if all(faults):
-                raise fault
+        if faults[0] is not None and all(faults):
+            raise faults[0]
 
 
 def _candidates(name: str) -> list[Entry]:
@@ -80,7 +81,9 @@ def _candidates(name: str) -> list[Entry]:
 def _fault(row: Entry, value: Value) -> RequestError | None:
     """What is wrong with this value whatever the settings of the servo are, which may scale some rows."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return RequestError(f"{row.name}: {value!r} is not a finite number", advice="give a number; nothing was sent")
+        return RequestError(
+            f"{row.name}: {value!r} is not a finite number", advice="give a number; nothing was sent"
+        )
     try:
         if row.name not in SCALED:
             _check(Order(row, row.to_raw(value)))
@@ -145,5 +148,5 @@ def _goals(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
     elif row.name == "goal_velocity":
         most = node.value(row, row.high)
         yield Goal(node.node, "velocity", value, -most, most)
-    elif row.name == "goal_time" and node.mode == PWM:
-        yield Goal(node.node, "load", raw * 0.001, -1.0, 1.0)
+    elif row.name == "goal_time":  # a duty in PWM mode; a time otherwise, and judged all the same
+        yield Goal(node.node, "load", raw * _DUTY, -1.0, 1.0)

@@ -27,11 +27,11 @@ class Span(NamedTuple):
     """Rows that one READ brings."""
 
     address: int
-    count: int
+    size: int
     rows: tuple[Entry, ...]
 
 
-def read(node: Node, *names: str) -> Operation[dict[str, Value]]:
+def read(node: Node, /, *names: str) -> Operation[dict[str, Value]]:
     """Registers in API units by name, all that can be read when none is named.
 
     Raises RequestError for an unknown name (nothing is sent then), NoReply when the servo is silent.
@@ -42,14 +42,14 @@ def read(node: Node, *names: str) -> Operation[dict[str, Value]]:
     return {name: node.value(table[name], raw) for name, raw in raws.items()}
 
 
-def read_raw(node: Node, *names: str) -> Operation[dict[str, int]]:
+def read_raw(node: Node, /, *names: str) -> Operation[dict[str, int]]:
     """Registers as raw values by name, all that can be read when none is named."""
     check_names(names)
     table = yield from known(node)
     rows = rows_of(table, names)
     found: dict[str, int] = {}
     for span in spans(rows):
-        data = yield from read_block(node, span.address, span.count, bytes)
+        data = yield from read_block(node, span.address, span.size, bytes)
         found.update(decode(span, data))
     return {row.name: found[row.name] for row in rows}
 
@@ -87,7 +87,7 @@ def _end(row: Entry) -> int:
     return row.address + row.size
 
 
-def write(node: Node, **values: Value) -> Operation[None]:
+def write(node: Node, /, **values: Value) -> Operation[None]:
     """Write registers by name, in API units; all are checked before the first is sent.
 
     Registers in EEPROM go through the guarded sequence: torque off (the servo goes limp and stays so), unlock,
@@ -104,7 +104,7 @@ def write(node: Node, **values: Value) -> Operation[None]:
         yield from confirmed(node, block)
 
 
-def reg_write(node: Node, **values: Value) -> Operation[None]:
+def reg_write(node: Node, /, **values: Value) -> Operation[None]:
     """REG WRITE: hand over a write of adjoining RAM registers that is carried out at the next ACTION.
 
     A second one replaces the first; a power cycle loses it. Never sent twice: raises OutcomeUnknown when it was
@@ -114,6 +114,7 @@ def reg_write(node: Node, **values: Value) -> Operation[None]:
     table = yield from writable(node)
     block = only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
     exchange = acknowledged(node, wire.reg_write(node.node, block.address, block.data), block)
+    node.pending = block.goals
     yield from exchange
     if not exchange.replies:
         yield from _pending(node, table, exchange)
@@ -134,11 +135,25 @@ def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[No
 
 def action(node: Node) -> Exchange[None]:
     """ACTION for this servo: carry out what REG WRITE left. Never sent twice; nothing pending does nothing."""
-    return acknowledged(
-        node, wire.action(node.node), Block(0, b"", Effect.MOTION, repeatable=False)
-    )
+    return acknowledged(node, wire.action(node.node), _released([node]), after=lambda: _carried_out([node]))
 
 
-def action_all() -> Exchange[None]:
-    """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers."""
-    return unanswered(wire.action(), Effect.MOTION)
+def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
+    """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers.
+
+    `nodes` are those whose goals were handed over here, for the gate to see once more.
+    """
+    block = _released(nodes)
+    return unanswered(wire.action(), block.effect, block.goals, after=lambda: _carried_out(nodes))
+
+
+def _released(nodes: Sequence[Node]) -> Block:
+    """What ACTION lets go. Goals handed over by others are not known; the gate has seen them at REG WRITE, if it
+    was asked, and ACTION is then no more than torque: leave to go for a goal."""
+    goals = tuple(goal for node in nodes for goal in node.pending)
+    return Block(0, b"", Effect.MOTION if goals else Effect.TORQUE, goals, repeatable=False)
+
+
+def _carried_out(nodes: Iterable[Node]) -> None:
+    for node in nodes:
+        node.pending = ()

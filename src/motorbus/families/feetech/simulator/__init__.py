@@ -20,21 +20,16 @@ OPTIONS = (Option("position", int, 2048, "where the servos stand at first, in ra
 """What a bus string may say of a simulated FEETECH bus beside ids and model."""
 
 
-def simulate(
-    ids: Iterable[int],
-    model_name: str = "",
-    *,
-    position: object = None,
-    **switches: object,
-) -> FeetechBus:
+def simulate(ids: Iterable[int], model_name: str = "", /, **options: object) -> FeetechBus:
     """A simulated bus with these ids, all of one model ("" is sts3215), at rest and limp.
 
-    `position` is where they stand in raw counts, for all or by id; the other options are the fields of `Switches`,
-    also as text. Raises RequestError for an unknown model or option, an impossible value, or no ids.
+    The option `position` is where they stand in raw counts, for all or as a mapping by id; the others are the
+    fields of `Switches`, also as text. Raises RequestError for an unknown model or option, an impossible value,
+    or no ids.
     """
-    return FeetechBus(
-        ids, model(model_name), position=_position(position), switches=Switches.from_options(switches)
-    )
+    position = _position(options.pop("position", None))
+    switches = Switches.from_options(options)
+    return FeetechBus(ids, model(model_name), position=position, switches=switches)
 
 
 def _position(position: object) -> int | Mapping[int, int] | None:

@@ -121,8 +121,8 @@ class FeetechBus:
         if isinstance(data, CanFrame):
             return
         self.now = max(self.now, at)
-        gap = self.switches.frame_gap
-        if gap and at - self._heard_at > gap and self._splitter.held:
+        began = at - len(data) * self._byte_time(None)
+        if self.switches.frame_gap and began - self._heard_at > self.switches.frame_gap:
             self._splitter = Splitter("instruction")
         self._heard_at = at
         for packet in self._splitter.feed(data):

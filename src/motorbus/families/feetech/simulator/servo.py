@@ -193,10 +193,10 @@ class Servo:
 
     @property
     def strong(self) -> bool:
-        """Whether the motor may push: torque on, no alarm that unloads it, a torque limit that moves anything."""
+        """Whether the motor may push: supply, torque on, no alarm that unloads it, a torque limit that moves it."""
         memory = self.memory
-        pushes = memory["torque_enable"] == 1 and memory["torque_limit"] >= motor.FEEBLE
-        return pushes and not self.error & memory["unload_mask"]
+        wanted = memory["torque_enable"] == 1 and memory["torque_limit"] >= motor.FEEBLE
+        return self.plugged and wanted and not self.error & memory["unload_mask"]
 
     @property
     def burden(self) -> float:
@@ -279,7 +279,7 @@ class Servo:
         self._count_anew(at)
         if switches.goal_at_power_up == "present" or switches.torque_at_power_up:
             memory["goal_position"] = FEEDBACK["present_position"](self, at)
-        self._deaf_until = at + switches.startup_time
+        self._deaf_until = at + switches.startup_time if switches.startup_time else -inf
         self._renamed()
         self._move(at)
 

@@ -16,7 +16,6 @@ from typing import Any
 from motorbus.core.family import Option
 from motorbus.errors import RequestError
 
-
 _YES = frozenset({"yes", "true", "on", "1"})
 _NO = frozenset({"no", "false", "off", "0"})
 

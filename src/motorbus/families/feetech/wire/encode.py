@@ -59,7 +59,11 @@ def encode_status(id: int, error: int, parameters: bytes = b"") -> bytes:
     if not 0 <= id <= MAX_ID:
         raise _bad_id(id)
     if not 0 <= error <= 0xFF:
-        raise RequestError(f"error byte {error} does not fit a byte", expected="0 to 255")
+        raise RequestError(
+            f"error byte {error} does not fit a byte",
+            expected="0 to 255",
+            advice="give the sum of the alarm bits; nothing was sent",
+        )
     if len(parameters) > MAX_PARAMETERS:
         raise _too_long("status", len(parameters))
     return frame(id, error, parameters)

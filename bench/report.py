@@ -1,0 +1,194 @@
+"""From samples to what people and programs read: one table on the terminal, the same in docs, all of it as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+from bench.figures import Spread, cost, ratio
+from bench.rounds import Sample
+from bench.startup import Cost
+from bench.workloads import WORKLOADS
+
+OURS = "motorbus"
+MICRO = 1e6
+processor = attrgetter("processor")
+wall = attrgetter("wall")
+
+
+class Results(NamedTuple):
+    """Everything one run of the bench found. `calls` is None where strace could not be had."""
+
+    machine: dict[str, str]
+    exchanges: int
+    rounds: int
+    wire: list[Sample]
+    memory: list[Sample]
+    calls: dict[tuple[str, str], dict[str, float]] | None
+    starts: list[Cost]
+    missing: list[str]
+
+
+class Table(NamedTuple):
+    """A heading, column names, and rows of text."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+def _micro(value: Spread, digits: int = 1) -> tuple[str, str]:
+    median, low, high = (part * MICRO for part in value)
+    return f"{median:.{digits}f}", f"{low:.{digits}f} – {high:.{digits}f}"
+
+
+def _ratio(samples: list[Sample], theirs: str, workload: str) -> str:
+    names = {sample.contender for sample in samples}
+    if theirs == OURS or OURS not in names:
+        return ""
+    found = ratio(samples, OURS, theirs, workload, processor)
+    return f"{found.median:.2f} ({found.low:.2f} – {found.high:.2f})"
+
+
+def _contenders(samples: list[Sample]) -> list[str]:
+    return sorted({sample.contender for sample in samples}, key=lambda name: (name != OURS, name))
+
+
+def _calls(results: Results, contender: str, workload: str) -> str:
+    if results.calls is None:
+        return "not measured"
+    return f"{sum(results.calls[contender, workload].values()):.1f}"
+
+
+def wire_tables(results: Results) -> Iterator[Table]:
+    """One table per workload on the pseudo-terminal."""
+    for workload in WORKLOADS.values():
+        rows = []
+        for name in _contenders(results.wire):
+            median, extent = _micro(cost(results.wire, name, workload.name, processor))
+            slow, _ = _micro(cost(results.wire, name, workload.name, wall))
+            calls = _calls(results, name, workload.name)
+            rows.append((name, median, extent, calls, slow, _ratio(results.wire, name, workload.name)))
+        yield Table(
+            f"{workload.name}: {workload.meaning}",
+            ("", "processor µs", "min – max", "system calls", "wall µs", f"{OURS} needs of it"),
+            rows,
+        )
+
+
+def memory_table(results: Results) -> Table:
+    """What the libraries themselves cost, without kernel and port."""
+    rows = []
+    for workload in WORKLOADS:
+        for name in _contenders(results.memory):
+            median, extent = _micro(cost(results.memory, name, workload, processor), 2)
+            rows.append((workload, name, median, extent, _ratio(results.memory, name, workload)))
+    return Table("In process", ("", "", "processor µs", "min – max", f"{OURS} needs of it"), rows)
+
+
+def start_table(results: Results) -> Table:
+    """What starting costs over an empty process."""
+    rows = [
+        (
+            start.name,
+            f"{start.seconds.median * 1e3:.1f}",
+            f"{start.seconds.low * 1e3:.1f} – {start.seconds.high * 1e3:.1f}",
+            str(start.modules),
+            ", ".join(start.heavy) or "none",
+        )
+        for start in results.starts
+    ]
+    return Table("Start-up", ("", "ms", "min – max", "modules", "heavy ones loaded"), rows)
+
+
+def tables(results: Results) -> list[Table]:
+    """All of them, in reading order."""
+    found = list(wire_tables(results))
+    if results.memory:
+        found.append(memory_table(results))
+    if results.starts:
+        found.append(start_table(results))
+    return found
+
+
+def as_text(table: Table) -> str:
+    """For a terminal."""
+    lines = [table.columns, *table.rows]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(table.columns))]
+    shown = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
+    return "\n".join([table.title, *(f"  {line.rstrip()}" for line in shown)])
+
+
+def as_markdown(table: Table) -> str:
+    """For a page."""
+    lines = [table.columns, tuple("---" for _ in table.columns), *table.rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def as_json(results: Results) -> str:
+    """All samples and figures, for programs."""
+    calls = results.calls
+    document: dict[str, Any] = {
+        "format": 1,
+        "machine": results.machine,
+        "exchanges": results.exchanges,
+        "rounds": results.rounds,
+        "wire": [sample._asdict() for sample in results.wire],
+        "memory": [sample._asdict() for sample in results.memory],
+        "system_calls": None
+        if calls is None
+        else [{"contender": who, "workload": what, "calls": each} for (who, what), each in calls.items()],
+        "start_up": [{**start._asdict(), "seconds": start.seconds._asdict()} for start in results.starts],
+        "missing": results.missing,
+    }
+    return json.dumps(document, indent=1) + "\n"
+
+
+_PAGE = """# Performance
+
+This page is written by `make bench`, which runs every contender side by side on one machine, in processes of
+their own and in shuffled rounds, and checks every value that was read and every goal that arrived. The numbers are
+of one run, on {machine}.
+
+{rounds} rounds of {exchanges} exchanges each. *{ours} needs of it* is our processor time divided by theirs, taken
+within each round: the median, and in brackets the least and the greatest. Below 1 is cheaper.
+
+## On a pseudo-terminal
+
+The other end is a responder in C that answers at once, so what differs is the library. Wall time here is mostly the
+kernel waking two processes and does not separate good libraries; on a real line the wire sets it. The *bare loop* is
+`os.write`, `poll`, `os.read` with no checks at all: the floor, not a library. System calls are counted by `strace`.
+In sync-write one exchange in 32 is followed by a reading that waits for the responder; its time is not counted, its
+system calls are.
+
+{wire}
+## In process
+
+The same exchanges with the answers handed over in memory: what the library itself costs. Only libraries in Python
+can be measured so.
+
+{memory}
+
+## Start-up
+
+Wall time of a whole process less that of an empty one, with compiled modules at hand.
+
+{start}
+"""
+
+
+def page(results: Results) -> str:
+    """docs/performance.md."""
+    machine = results.machine
+    wire = "".join(f"### {table.title}\n\n{as_markdown(table)}\n\n" for table in wire_tables(results))
+    return _PAGE.format(
+        machine=f"{machine['processor']} with {machine['cores']} cores, {machine['system']}, {machine['python']}",
+        rounds=results.rounds,
+        exchanges=results.exchanges,
+        ours=OURS,
+        wire=wire,
+        memory=as_markdown(memory_table(results)),
+        start=as_markdown(start_table(results)),
+    )

@@ -1,0 +1,142 @@
+"""THE FAMILY: what motorbus knows of it. Here belong `FAMILY`, the device classes, and figures of the wire's timing.
+
+Everything else is in the four rooms: `wire` (what the frames mean), `table` (what can be addressed), `driver` (what
+to say to get a thing done), `simulator` (how a real one behaves). A family imports motorbus.core and
+motorbus.errors only; driver and simulator never import each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from motorbus.core.entry import Table
+from motorbus.core.family import (
+    Devices,
+    Explanation,
+    Found,
+    Identity,
+    LinkNeeds,
+    Option,
+    Receiver,
+    Simulator,
+    Stop,
+)
+from motorbus.core.operation import ANY, Answer, CanFrame, Exchange, Operation, Runnable, Timeout
+from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+
+from . import driver, wire
+from .simulator import Metronomes
+from .table import TABLE
+
+RATE: Final = 500_000
+TURNAROUND: Final = {Timeout.REPLY: 0.005, Timeout.SCAN: 0.002, Timeout.STORE: 0.05}
+"""s that a servo may take to answer."""
+
+
+class _Verbs(driver.Node):
+    ping = verb(driver.ping)
+    identify = verb(driver.identify)
+    read = verb(driver.read)
+    write = verb(driver.write)
+    set_node_id = verb(driver.set_node_id)
+    position = verb(driver.position)
+    telemetry = verb(driver.telemetry)
+    move = verb(driver.move)
+    enable_torque = verb(driver.enable_torque)
+    disable_torque = verb(driver.disable_torque)
+    stop = verb(driver.stop)
+
+
+class Servo(_Verbs, Blocking):
+    """A Metronome on a blocking bus."""
+
+    def __init__(self, bus: BlockingRunner, node: int) -> None:
+        driver.Node.__init__(self, node)
+        Blocking.__init__(self, bus)
+
+
+class AsyncServo(_Verbs, Awaiting):
+    """A Metronome on an async bus."""
+
+    def __init__(self, bus: AsyncRunner, node: int) -> None:
+        driver.Node.__init__(self, node)
+        Awaiting.__init__(self, bus)
+
+
+class Template:
+    """Fulfils `motorbus.core.family.Family`; no state."""
+
+    name = "template"
+    link = LinkNeeds(
+        "frames",
+        RATE,
+        (RATE,),
+        (Option("temperature", float, 25.0, "of the simulated servos, in °C; an alarm above 80"),),
+    )
+    tables: Mapping[str, Table] = {TABLE.name: TABLE}
+    window = 2
+    devices = Devices(Servo, AsyncServo)
+
+    def lane(self, node: int) -> int:
+        """Each node has a lane of its own."""
+        return node
+
+    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+        """Seconds for the frames, each with the most stuff bits it can have."""
+        due = () if exchange.replies is ANY else exchange.replies
+        request = len(exchange.request.data if isinstance(exchange.request, CanFrame) else exchange.request)
+        return sum(_bits(length) for length in (request, *(one.length for one in due))) / rate
+
+    def turnaround(self, exchange: Exchange[Any]) -> float:
+        """A servo answers within `TURNAROUND`."""
+        return TURNAROUND[exchange.timeout]
+
+    def quiet_time(self, rate: int) -> float:
+        """A servo that is late is so by one EEPROM page at most."""
+        return 0.02
+
+    def echo_test(self) -> Exchange[Any] | None:
+        """A CAN controller does not hear itself."""
+        return None
+
+    def explain(self, data: bytes) -> list[Explanation]:
+        """Every frame in a run of bytes; see `wire.HEAD` for how frames stand in it."""
+        return wire.explain(data)
+
+    def receiver(self) -> Receiver:
+        """Answers, reports, noise."""
+        return wire.FrameReceiver()
+
+    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+        """256 objects whose values are known."""
+        return driver.proof(driver.Node(node), attempt)
+
+    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+        """They brake by themselves, so where they last were does not matter."""
+        return driver.stop_all(tuple(nodes))
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        """Model and firmware."""
+        return driver.identify(driver.Node(node))
+
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+        """Every id, or these."""
+        return driver.scan(ids, rates, usual=RATE)
+
+    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
+        """SI operations by capability."""
+        names = ("position", "telemetry", "move", "enable_torque", "disable_torque", "stop")
+        return {name: getattr(driver, name) for name in names}
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        """Raises RequestError for ids, models and options that do not exist."""
+        return Metronomes(ids, model, **options)
+
+
+def _bits(data: int) -> int:
+    """Bits of a frame with an 11-bit identifier and so many data bytes, space and stuff bits included."""
+    return 47 + 8 * data + (34 + 8 * data - 1) // 4
+
+
+FAMILY = Template()

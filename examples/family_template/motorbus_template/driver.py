@@ -1,0 +1,387 @@
+"""DRIVER: what to say to get a thing done. Here belong sequences, verification and guards; no bytes, no waiting.
+
+A function takes a node and returns an `Exchange` (one request, which can be kept and run again) or is a generator
+that yields steps. It never knows whether a blocking or an async bus carries it out. Verbs never call each other;
+these functions do. `node` holds what is known of a device and is filled by them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Final, TypeVar
+
+from motorbus.core.entry import Entry, Storage, Value
+from motorbus.core.family import Found, Identity, State, Stop
+from motorbus.core.operation import (
+    Alone,
+    Answer,
+    Due,
+    Effect,
+    Exchange,
+    Goal,
+    Listen,
+    Notice,
+    Operation,
+    Progress,
+    Rank,
+    Report,
+    Timeout,
+    Together,
+    Tune,
+    outcome,
+)
+from motorbus.errors import (
+    DeviceError,
+    LimitExceeded,
+    MotorbusError,
+    NoReply,
+    RequestError,
+    Stalled,
+    VerificationFailed,
+)
+
+from . import wire
+from .table import TABLE
+
+T = TypeVar("T")
+
+PATIENCE: Final = 0.25
+"""s to wait for a report of arrival before asking; a report may be lost, so it is never all that is waited for."""
+
+
+class Node:
+    """One servo by its id, 1 to 63, and what is known of it. `limits` in rad; None when not read yet."""
+
+    def __init__(self, node: int) -> None:
+        if node not in wire.NODES:
+            raise RequestError(f"{node!r} is not the id of one servo", expected="1 to 63")
+        self.node: Final = node
+        self.limits: tuple[float, float] | None = None
+        self.alarm: tuple[str, ...] = ()
+        self.at = -math.inf
+
+
+# --- single exchanges ---------------------------------------------------------------------------------------
+
+
+def exchange(
+    node: Node,
+    command: wire.Command,
+    index: int = 0,
+    subindex: int = 0,
+    value: bytes = b"",
+    *,
+    take: Callable[[bytes], T],
+    rank: Rank = Rank.POLL,
+    effect: Effect = Effect.NONE,
+    goals: tuple[Goal, ...] = (),
+    timeout: Timeout = Timeout.REPLY,
+    tells_position: bool = False,
+) -> Exchange[T]:
+    """One request to one node; `take` makes a value of the four bytes of the answer.
+
+    Everything here is repeatable: a goal is absolute. A relative move would have to say `repeatable=False`.
+    """
+
+    def read(answer: Answer) -> T:
+        data = answer.replies[0].data
+        node.alarm, node.at = wire.alarms(data[3]), answer.at
+        if data[3] & 0x0F:
+            raise _refused(node, data[3] & 0x0F, index, subindex)
+        return take(data[4:])
+
+    return Exchange(
+        wire.encode_request(node.node, command, index, subindex, value),
+        (Due(node.node, (int(command), index, subindex), wire.LENGTH),),
+        read,
+        lane=node.node,
+        rank=rank,
+        effect=effect,
+        goals=goals,
+        timeout=timeout,
+        repeatable=True,
+        tells_position=tells_position,
+    )
+
+
+def read_row(node: Node, row: Entry) -> Exchange[int]:
+    """The raw value of one object."""
+    return exchange(
+        node,
+        wire.Command.READ,
+        row.address,
+        row.subindex or 0,
+        take=lambda data: row.decode(data[-row.size :]),
+    )
+
+
+def write_row(node: Node, row: Entry, raw: int, *goals: Goal) -> Exchange[None]:
+    """Write one object. Raises RequestError when the raw value is out of range."""
+    return exchange(
+        node,
+        wire.Command.WRITE,
+        row.address,
+        row.subindex or 0,
+        row.encode(raw),
+        take=_nothing,
+        rank=Rank.CONTROL,
+        effect=row.effect,
+        goals=goals,
+        timeout=Timeout.STORE if row.storage is Storage.EEPROM else Timeout.REPLY,
+    )
+
+
+def proof(node: Node, attempt: int = 0, timeout: Timeout = Timeout.REPLY) -> Exchange[bool]:
+    """Ask for something whose answer is known beforehand and differs with `attempt`."""
+    subindex = attempt & 0xFF
+    right = bytes((~subindex & 0xFF,))
+    return exchange(
+        node, wire.Command.READ, wire.PROOF, subindex, take=lambda data: data[-1:] == right, timeout=timeout
+    )
+
+
+def position(node: Node) -> Exchange[float]:
+    """Present position, rad."""
+    row = TABLE["present_position"]
+    return exchange(
+        node,
+        wire.Command.READ,
+        row.address,
+        row.subindex or 0,
+        take=lambda data: float(row.to_value(row.decode(data))),
+        tells_position=True,
+    )
+
+
+def stop(node: Node) -> Exchange[None]:
+    """Brake and hold; torque stays as it is. Goes before everything else and needs to know nothing."""
+    return exchange(node, wire.Command.STOP, take=_nothing, rank=Rank.STOP, effect=Effect.MOTION)
+
+
+def disable_torque(node: Node) -> Exchange[None]:
+    """Torque off: it goes limp where it is."""
+    return write_row(node, TABLE["torque_enable"], 0)
+
+
+def _nothing(data: bytes) -> None:
+    """An answer without a value."""
+
+
+def _refused(node: Node, code: int, index: int, subindex: int) -> DeviceError:
+    row = TABLE.at(index, subindex)
+    name = row.name if row else f"0x{index:02X}:{subindex}"
+    why = wire.REFUSALS.get(code, f"refusal {code}")
+    return DeviceError(f"node {node.node} refused {name}: {why}", code=code, register=name, node=node.node)
+
+
+# --- who is there -------------------------------------------------------------------------------------------
+
+
+def ping(node: Node) -> Operation[bool]:
+    """Is it there? Silence is the answer False."""
+    try:
+        return (yield from proof(node))
+    except NoReply:
+        return False
+
+
+def identify(node: Node) -> Operation[Identity]:
+    """Model and firmware. Unknown firmware would get table "": readable, never written."""
+    model = yield from read_row(node, TABLE["model"])
+    firmware = yield from read_row(node, TABLE["firmware"])
+    name = TABLE["model"].choices.get(model, f"unknown model 0x{model:04X}")
+    known = TABLE.name if model in TABLE["model"].choices else ""
+    return Identity(node.node, name, f"{firmware >> 8}.{firmware & 0xFF}", known, {"model_number": model})
+
+
+def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, usual: int) -> Operation[list[Found]]:
+    """Ask every id, two at a time because each has a lane of its own; whoever is silent is asked once more."""
+    nodes = ids or tuple(wire.NODES)
+    found: list[Found] = []
+    for rate in rates or (usual,):
+        if rates:
+            yield from Tune(rate)
+        here: dict[int, Found] = {}
+        for _ in range(2):
+            silent = [node for node in nodes if node not in here]
+            looks = yield from Together([_look(Node(node), rate) for node in silent])
+            here |= {one.node: one for one in looks if one is not None}
+        yield from Report(Progress(len(nodes), len(nodes), f"{rate} bit/s"))
+        found += [here[node] for node in nodes if node in here]
+    return found
+
+
+def _look(node: Node, rate: int) -> Operation[Found | None]:
+    heard = yield from outcome(proof(node, timeout=Timeout.SCAN))
+    if heard is not True:
+        return None
+    identity = yield from outcome(identify(node))
+    found = Found(node.node, rate, None if isinstance(identity, MotorbusError) else identity)
+    yield from Report(found)
+    return found
+
+
+# --- objects by name ----------------------------------------------------------------------------------------
+
+
+def read(node: Node, *names: str) -> Operation[dict[str, Value]]:
+    """Objects in API units by name, all when none is named. Raises RequestError for an unknown name."""
+    rows = [TABLE[name] for name in names or TABLE if TABLE[name].readable]
+    values: dict[str, Value] = {}
+    for row in rows:
+        values[row.name] = row.to_value((yield from read_row(node, row)))
+    return values
+
+
+def write(node: Node, /, **values: Value) -> Operation[None]:
+    """Write objects by name, in API units; all are checked before the first is sent.
+
+    What lies in EEPROM goes through the guarded sequence. Raises RequestError for what cannot or must not be
+    written so, VerificationFailed when EEPROM reads back different.
+    """
+    orders = [(TABLE[name], _checked(TABLE[name], value)) for name, value in values.items()]
+    kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
+    if kept:
+        yield from Alone(_guarded(node, kept))
+    for row, raw in orders:
+        if row.effect is Effect.MOTION:
+            yield from write_row(node, row, raw, (yield from _goal(node, raw)))
+        elif row.storage is not Storage.EEPROM:
+            yield from write_row(node, row, raw)
+
+
+def set_node_id(node: Node, new: int) -> Operation[None]:
+    """Give it another id, 1 to 63, which it takes at its next power-up."""
+    TABLE["node_id"].encode(new)
+    yield from Alone(_guarded(node, [(TABLE["node_id"], new)]))
+
+
+def _checked(row: Entry, value: Value) -> int:
+    """The raw value to write. Raises RequestError when this may not be written by name."""
+    raw = row.to_raw(value)
+    refusal = ""
+    if not row.writable:
+        refusal = "it can only be read"
+    elif row.protected:
+        refusal = "a verb of its own writes it"
+    elif row.name == "torque_enable" and raw:
+        refusal = "it could jump to an old goal; enable_torque() first makes the goal the present position"
+    if refusal:
+        raise RequestError(f"{row.name} is not written by name: {refusal}", advice="nothing was sent")
+    row.encode(raw)
+    return raw
+
+
+def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> Operation[None]:
+    """Unlock, write, read back, and lock again whatever happens, Ctrl-C and a second Ctrl-C included.
+
+    The unlock stands inside the `try`, for it may have been heard although its answer was not.
+    """
+    node.limits = None
+    try:
+        yield from write_row(node, TABLE["lock"], 0)
+        for row, raw in orders:
+            yield from write_row(node, row, raw)
+            found = yield from read_row(node, row)
+            if found != raw:
+                raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
+        yield from write_row(node, TABLE["lock"], 1)
+    except GeneratorExit:  # thrown away by whoever carried it out: nothing can be said any more
+        raise
+    except BaseException:
+        yield from _relock(node)
+        raise
+
+
+def _relock(node: Node) -> Operation[None]:
+    try:
+        yield from write_row(node, TABLE["lock"], 1)
+    except GeneratorExit:
+        raise
+    except BaseException:
+        yield from write_row(node, TABLE["lock"], 1)
+
+
+# --- moving -------------------------------------------------------------------------------------------------
+
+
+def enable_torque(node: Node) -> Operation[None]:
+    """Torque on without a jump: the goal becomes the present position first."""
+    here = yield from read_row(node, TABLE["present_position"])
+    yield from write_row(node, TABLE["goal_position"], here, (yield from _goal(node, here)))
+    yield from write_row(node, TABLE["torque_enable"], 1)
+
+
+def move(
+    node: Node, to: float, *, velocity: float | None = None, wait: bool = True, tolerance: float = 0.01
+) -> Operation[None]:
+    """Move to `to` rad, at most at `velocity` rad/s; returns when it is there, at once with `wait=False`.
+
+    Raises LimitExceeded when `to` is not finite (and the gate does outside the limits), Stalled when it stopped
+    elsewhere.
+    """
+    if not math.isfinite(to):
+        raise LimitExceeded(f"node {node.node}: {to} is no position", advice="give a number in rad")
+    row = TABLE["goal_position"]
+    goal = yield from _goal(node, row.to_raw(to))
+    if velocity is not None:
+        yield from write(node, move_velocity=velocity)
+    yield from write_row(node, row, row.to_raw(to), goal)
+    if wait:
+        yield from _arrival(node, to, tolerance)
+
+
+def _arrival(node: Node, to: float, tolerance: float) -> Operation[None]:
+    """Wait for the report, and ask now and then: it may have been sent before we listened."""
+    while (yield from read_row(node, TABLE["moving"])):
+        yield from Listen(partial(_is_arrival, node.node), PATIENCE)
+    here = yield from position(node)
+    if abs(here - to) > tolerance:
+        raise Stalled(f"node {node.node} stands at {here:.4g} rad, not at {to:.4g} rad", node=node.node)
+
+
+def _is_arrival(node: int, notice: Notice) -> bool:
+    return notice.node == node and notice.kind == "arrived"
+
+
+def _goal(node: Node, raw: int) -> Operation[Goal]:
+    """What this raw goal orders, with the limits the device itself declares, for the gate to judge."""
+    if node.limits is None:
+        limits = yield from read(node, "min_position", "max_position")
+        node.limits = limits["min_position"], limits["max_position"]
+    return Goal(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *node.limits)
+
+
+def telemetry(node: Node) -> Operation[State]:
+    """One sample: position (rad), temperature (°C), moving, alarm."""
+    here = yield from position(node)
+    at = node.at
+    others = yield from read(node, "moving", "present_temperature")
+    return State(
+        at=at,
+        position=here,
+        temperature=others["present_temperature"],
+        moving=bool(others["moving"]),
+        alarm=node.alarm,
+    )
+
+
+def stop_all(nodes: tuple[int, ...]) -> Stop:
+    """What an emergency stop sends: everyone at once, then each known node until it acknowledges."""
+    everyone = Exchange[Answer](
+        wire.encode_request(wire.EVERYONE, wire.Command.STOP), rank=Rank.STOP, effect=Effect.MOTION
+    )
+    each = [_plain(stop(Node(node))) for node in nodes]
+    return Stop(
+        (everyone, *each),
+        "each node that acknowledged brakes and then holds where it came to rest; its torque stays as it was",
+    )
+
+
+def _plain(one: Exchange[None]) -> Exchange[Answer]:
+    """The same exchange without a reading of its answer: an alarm must not count as a missing acknowledgement."""
+    return Exchange(
+        one.request, one.replies, lane=one.lane, rank=one.rank, effect=one.effect, repeatable=True
+    )

@@ -1,0 +1,30 @@
+"""What one family can do beyond the common verbs, for common commands that use it where it is there.
+
+A family's face is the module of its name in this folder. Apart from its own commands it may offer
+
+    move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, all begun in the same instant
+    Train(bus, nodes)                                          what a control loop of several nodes does each cycle
+    ping_everyone(bus)                                         the nodes that answer one broadcast
+
+A family that lacks one of them is served by the common verbs, or the command says that it cannot be done.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from motorbus import families
+
+
+def names() -> list[str]:
+    """The families that have a face here."""
+    return [name for name in families.names() if find_spec(f"motorbus.cli.{name}")]
+
+
+def offer(family: str, what: str) -> Any:
+    """What the face of this family offers by this name, or None."""
+    if family not in names():
+        return None
+    return getattr(import_module(f"motorbus.cli.{family}"), what, None)

@@ -1,0 +1,148 @@
+"""`motorbus move`: one device, or several in the same instant, to positions that are checked beforehand."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from cyclopts import App, Parameter
+
+from motorbus.cli import dry, faces
+from motorbus.cli.exits import Exit
+from motorbus.cli.output import Output
+from motorbus.cli.target import able, face, opened, target
+from motorbus.core import units
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from motorbus.bus.pump import Bus
+    from motorbus.cli.dry import DryBus
+
+app = App(
+    name="move",
+    usage="Usage: motorbus move BUS#ID=POSITION... [OPTIONS]",
+    help_epilogue="""Positions are in rad, or with a unit: 90deg, 0.25turn. Torque goes on by itself.
+A way of more than 180 degrees needs --yes. The goal must lie inside the limits
+of the device. Several devices of one bus begin in the same instant where their
+family can do that. Ctrl-C ends the waiting, not the motion: `motorbus stop`.
+
+Examples:
+
+    motorbus move feetech:/dev/ttyACM0#3=90deg
+    motorbus move feetech:/dev/ttyACM0#3=-0.5 --velocity 1.5
+    motorbus move feetech:COM7#1+2=0 feetech:COM7#3=0.3 --no-wait
+    motorbus move feetech:/dev/ttyACM0#3=90deg --dry-run""",
+)
+
+FAR: Final = math.pi
+"""rad; a way that is longer needs consent."""
+
+Flag = Annotated[bool, Parameter(negative="")]
+Goals = dict[int, float]
+
+
+@app.default
+def move(
+    *goals: Annotated[str, Parameter(name="BUS#ID=POSITION")],
+    velocity: str = "",
+    acceleration: str = "",
+    wait: bool = True,
+    yes: Flag = False,
+    dry_run: Flag = False,
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Move devices to positions, several of them together.
+
+    Parameters
+    ----------
+    goals
+        Devices and where they shall go.
+    velocity
+        At most so fast, in rad/s or as 90deg/s; the maximum of the device when left out.
+    acceleration
+        At most so steep, in rad/s² or as 500deg/s2; the maximum when left out.
+    wait
+        Return when all are in position, or at once.
+    yes
+        Do not ask before a way of more than 180 degrees.
+    dry_run
+        Show the frames that would be sent, and send none of them.
+    options
+        Any option of the bus string, as a flag.
+    """
+    bounds = _bounds(velocity, acceleration)
+    results = []
+    for bus, wanted in _wanted(goals).items():
+        with opened(bus, options, output) as opening:
+            _consent(opening, wanted, output, yes=yes or dry_run)
+            if dry_run:
+                rehearsal = dry.DryBus(opening)
+                _move(rehearsal, wanted, {**bounds, "wait": False})
+                dry.show(rehearsal, output)
+                continue
+            _move(opening, wanted, {**bounds, "wait": wait})
+            results += [_result(opening, bus, node, goal) for node, goal in wanted.items()]
+    if results:
+        output.document("motorbus.move/1", {"devices": results})
+        shown = [
+            (f"{r['bus']}#{r['id']}", *(units.show(r[key], "position") for key in ("goal", "present")))
+            for r in results
+        ]
+        output.table("", ["device", "goal", "present"], shown)
+    return Exit.OK
+
+
+def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
+    """Goals in rad by bus and node. Raises RequestError for what is no device or no finite position."""
+    found: dict[str, Goals] = {}
+    for text in texts:
+        devices, _, position = text.rpartition("=")
+        bus, _, nodes = target(devices) if "#" in devices else _nowhere(text)
+        goals = found.setdefault(bus, {})
+        if not goals.keys().isdisjoint(nodes):
+            raise RequestError(f"{text}: a device is named twice", advice="nothing was sent")
+        goals.update(dict.fromkeys(nodes, units.parse(position, "position")))
+    if not found:
+        raise RequestError(
+            "which device, and where to?", expected="BUS#ID=POSITION, as feetech:/dev/ttyACM0#3=90deg"
+        )
+    return found
+
+
+def _nowhere(text: str) -> Any:
+    raise RequestError(
+        f"{text!r} names no device and position", expected="BUS#ID=POSITION", advice="nothing was sent"
+    )
+
+
+def _bounds(velocity: str, acceleration: str) -> dict[str, float | None]:
+    return {
+        "velocity": units.parse(velocity, "velocity") if velocity else None,
+        "acceleration": units.parse(acceleration, "acceleration") if acceleration else None,
+    }
+
+
+def _consent(bus: Bus, goals: Goals, output: Output, *, yes: bool) -> None:
+    ways = {node: abs(goal - able(face(bus, node), "position")()) for node, goal in goals.items()}
+    far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways.items() if way > FAR]
+    if far:
+        output.consent(f"move {', '.join(far)}?", yes=yes)
+
+
+def _move(bus: Bus | DryBus, goals: Goals, how: Mapping[str, Any]) -> None:
+    together = faces.offer(bus.family.name, "move_together")
+    if together is not None and len(goals) > 1:
+        together(bus, goals, **how)
+        return
+    for node, goal in goals.items():
+        able(face(bus, node), "move")(goal, **{**how, "wait": how["wait"] and len(goals) == 1})
+    if how["wait"] and len(goals) > 1:
+        for node, goal in goals.items():
+            able(face(bus, node), "move")(goal, **how)
+
+
+def _result(opening: Bus, bus: str, node: int, goal: float) -> dict[str, Any]:
+    return {"bus": bus, "id": node, "goal": goal, "present": face(opening, node).position()}

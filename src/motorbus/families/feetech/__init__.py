@@ -1,0 +1,151 @@
+"""FEETECH SCS, SMS, STS and HLS servos on a half-duplex serial bus; so far the STS register map.
+
+`Servo` and `AsyncServo` are one servo each; the functions serve several at once, or are kept for a loop. `FAMILY`
+is what the rest of motorbus knows of these servos.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, Final
+
+from motorbus.core.entry import Table
+from motorbus.core.family import (
+    Devices,
+    Explanation,
+    Found,
+    Identity,
+    LinkNeeds,
+    Option,
+    Receiver,
+    Simulator,
+    Stop,
+)
+from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.families.feetech import driver, wire
+from motorbus.families.feetech.driver import (
+    AsyncServo,
+    GroupResult,
+    Node,
+    Positions,
+    Promise,
+    Servo,
+    action_all,
+    disable_torque_all,
+    line,
+    prepare_all,
+    scan,
+    sync_read,
+    sync_read_positions,
+    sync_write,
+    sync_write_positions,
+)
+from motorbus.families.feetech.table import BAUD_CODES, MODELS, TABLES
+
+__all__ = [
+    "FAMILY",
+    "AsyncServo",
+    "Feetech",
+    "GroupResult",
+    "Node",
+    "Positions",
+    "Promise",
+    "Servo",
+    "action_all",
+    "disable_torque_all",
+    "prepare_all",
+    "scan",
+    "sync_read",
+    "sync_read_positions",
+    "sync_write",
+    "sync_write_positions",
+]
+
+_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
+    "state": driver.telemetry,
+    "position": driver.position,
+    "velocity": driver.velocity,
+    "load": driver.load,
+    "current": driver.current,
+    "voltage": driver.voltage,
+    "temperature": driver.temperature,
+    "enable_torque": driver.enable_torque,
+    "disable_torque": driver.disable_torque,
+    "move": driver.move,
+    "stop": driver.stop,
+}
+_DESCRIBED: Final = ("STS", "HTS")
+"""Models whose names begin so have the STS map; identify() tells for sure."""
+
+
+class Feetech:
+    """The family of FEETECH servos; see `motorbus.core.family.Family` for each member."""
+
+    name: Final = "feetech"
+    tables: Final[Mapping[str, Table]] = TABLES
+    window: Final = 1
+    devices: Final = Devices(Servo, AsyncServo)
+
+    @cached_property
+    def link(self) -> LinkNeeds:
+        from motorbus.families.feetech.simulator import OPTIONS
+
+        usual = BAUD_CODES[0]
+        options = (
+            Option(
+                "baud", int, usual, "rate of the bus in bit/s; servos of the STS series ship with 1000000"
+            ),
+            Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
+            Option("model", str, "sts3215", "model of the simulated servos"),
+        )
+        return LinkNeeds("bytes", usual, tuple(BAUD_CODES.values()), (*options, *OPTIONS))
+
+    def lane(self, node: int) -> int:
+        return 0
+
+    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+        return line.air_time(exchange, rate)
+
+    def turnaround(self, exchange: Exchange[Any]) -> float:
+        return line.turnaround(exchange)
+
+    def quiet_time(self, rate: int) -> float:
+        return line.quiet_time(rate)
+
+    def echo_test(self) -> Exchange[Any]:
+        return line.echo_test()
+
+    def explain(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.feetech.explain import explain
+
+        return explain(data)
+
+    def receiver(self) -> Receiver:
+        return wire.StatusReceiver()
+
+    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+        return line.probe(node, attempt)
+
+    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+        return line.stop(nodes)
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        return driver.identify(Node(node))
+
+    def scan(
+        self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, rate: int = BAUD_CODES[0]
+    ) -> Operation[list[Found]]:
+        return scan(ids, rates, rate=rate)
+
+    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
+        names = {known.name for known in MODELS.values()}
+        return _AXIS if model.upper() in names and model.upper().startswith(_DESCRIBED) else {}
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        from motorbus.families.feetech.simulator import simulate
+
+        return simulate(ids, model, **options)
+
+
+FAMILY: Final = Feetech()

@@ -1,0 +1,119 @@
+"""What a servo feels: one READ of its feedback block, or one quantity of it.
+
+The block from 56 to 70 comes whole in 21 bytes, which is hardly more than one quantity costs. Each quantity is a
+verb of its own too; once the servo is known it is a single exchange that can be kept and run again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+from motorbus.core.entry import Entry, Table
+from motorbus.core.family import State
+from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
+from motorbus.families.feetech.driver.identity import known, unknown_map
+from motorbus.families.feetech.driver.node import Node
+
+T = TypeVar("T")
+
+FEEDBACK: Final = 15
+"""Bytes of the feedback block, registers 56 to 70."""
+
+
+def telemetry(node: Node) -> Runnable[State]:
+    """One sample of everything: position, velocity, load, current, voltage, temperature, moving, alarm.
+
+    In API units (rad, rad/s, fraction of the duty, A, V, °C). What the servo does not measure, or what cannot be
+    told without knowing its register map, is None.
+    """
+    if node.table is None or node.settings is None:
+        return _after(node, telemetry)
+    return state_exchange(node, node.table)
+
+
+def state_exchange(node: Node, table: Table) -> Exchange[State]:
+    """As `telemetry`, of a servo that is known."""
+
+    def take(data: bytes) -> State:
+        return state_of(node, table, data)
+
+    return read_block(node, PRESENT, FEEDBACK, take)
+
+
+def state_of(node: Node, table: Table, data: bytes) -> State:
+    """What the bytes of the feedback block say."""
+
+    def value(name: str) -> float | None:
+        if name not in table or not table[name].unit:
+            return None
+        row = table[name]
+        return float(node.value(row, _raw(row, data)))
+
+    moving = table["moving"]
+    tells_current = node.settings is not None and node.settings.tells_current
+    return State(
+        at=node.at,
+        position=value("present_position"),
+        velocity=value("present_velocity"),
+        load=value("present_load"),
+        current=value("present_current") if tells_current else None,
+        voltage=value("present_voltage"),
+        temperature=value("present_temperature"),
+        moving=bool(_raw(moving, data) & 1),
+        alarm=node.alarm,
+    )
+
+
+def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> Operation[T]:
+    yield from known(node)
+    return (yield from say(node))
+
+
+def _raw(row: Entry, data: bytes) -> int:
+    return row.decode(data[row.address - PRESENT : row.address - PRESENT + row.size])
+
+
+def position(node: Node) -> Runnable[float]:
+    """Present position, rad. Raises DeviceError when the register map is not known."""
+    return _quantity(node, "present_position")
+
+
+def velocity(node: Node) -> Runnable[float]:
+    """Present velocity, rad/s. Raises DeviceError when the register map is not known."""
+    return _quantity(node, "present_velocity")
+
+
+def load(node: Node) -> Runnable[float]:
+    """Duty of the power stage as a fraction, -1 to 1; it is not the torque."""
+    return _quantity(node, "present_load")
+
+
+def current(node: Node) -> Runnable[float]:
+    """Supply current, A. Raises DeviceError when the register map is not known."""
+    return _quantity(node, "present_current")
+
+
+def voltage(node: Node) -> Runnable[float]:
+    """Supply voltage, V."""
+    return _quantity(node, "present_voltage")
+
+
+def temperature(node: Node) -> Runnable[float]:
+    """Temperature inside, °C."""
+    return _quantity(node, "present_temperature")
+
+
+def _quantity(node: Node, name: str) -> Runnable[float]:
+    """One row: an exchange when the servo is known, else an operation that asks it first."""
+    if node.table is None or node.settings is None:
+        return _after(node, lambda same: _quantity(same, name))
+    if name not in node.table or not node.table[name].unit:
+        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+    row = node.table[name]
+
+    def take(data: bytes) -> float:
+        return float(node.value(row, row.decode(data)))
+
+    return read_block(node, row.address, row.size, take)

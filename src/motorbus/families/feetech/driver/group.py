@@ -1,0 +1,237 @@
+"""Many servos in one packet: SYNC READ with partial results, SYNC WRITE split to what a packet can carry.
+
+A silent servo costs its own value and nobody else's. Ids alone say nothing of register maps, limits and units, so
+whoever is named by id is read first (registers 0 to 39, by SYNC READ as well); a servo object that is prepared
+costs nothing more. Trains of replies are kept short, for a stop must wait until a train has passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple, TypeVar
+
+from motorbus.core.entry import Table, Value
+from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outcome
+from motorbus.errors import MotorbusError, NoReply, RequestError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import PRESENT, Block, unanswered
+from motorbus.families.feetech.driver.identity import learn, unknown_map
+from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
+from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
+from motorbus.families.feetech.driver.registers import Span, decode, rows_of, spans
+
+T = TypeVar("T")
+
+RATE: Final = 1_000_000
+"""bit/s taken for granted where nobody says otherwise: how STS servos ship."""
+AIR: Final = 0.004
+"""s of air that one train of replies may need, so that a stop need not wait longer."""
+_MOST_IDS: Final = 251
+_BITS: Final = 10
+
+
+class GroupResult(NamedTuple):
+    """What a group read brought: values by id and name in API units, the error of each id that is missing, the
+    alarm bits by id, and when the last reply came (s on the link's clock; -inf when none did)."""
+
+    values: dict[int, dict[str, Value]]
+    errors: dict[int, MotorbusError]
+    alarms: dict[int, tuple[str, ...]]
+    at: float
+
+
+# -- read ----------------------------------------------------------------------------------------------------
+
+
+def sync_read(
+    names: Sequence[str], ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
+) -> Operation[GroupResult]:
+    """These registers of all these servos, by as few SYNC READs as keep each train of replies within `air` s.
+
+    `rate` is the rate of the bus in bit/s. Who does not answer has an error in the result, and the others their
+    values. Raises RequestError for an unknown name; nothing is sent then.
+    """
+    check_names(names)
+    nodes = distinct(ids)
+    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    raws: dict[int, dict[str, int]] = {node.node: {} for node in nodes if node.node not in errors}
+    for table, group in _by_table(node for node in nodes if node.node in raws):
+        for span in spans(rows_of(table, names)):
+            yield from _sync_read_span(span, group, raws, errors, rate, air)
+    answered = [node for node in nodes if node.node not in errors]
+    return GroupResult(
+        {node.node: _values(node, names, raws[node.node]) for node in answered},
+        errors,
+        {node.node: node.alarm for node in answered},
+        max((node.at for node in answered), default=float("-inf")),
+    )
+
+
+def prepare_all(
+    ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
+) -> Operation[dict[int, MotorbusError]]:
+    """Read identity, limits, mode and units of all of these that are not known yet; the errors by id."""
+    nodes = [node for node in distinct(ids) if node.table is None or node.settings is None]
+    errors: dict[int, MotorbusError] = {}
+    for part in trains(nodes, IMAGE, rate, air):
+        images = yield from collected(block_of_each(part, 0, IMAGE), part, errors)
+        for node in part:
+            if node.node in images:
+                learn(node, images[node.node])
+    return errors
+
+
+def _sync_read_span(
+    span: Span,
+    group: Sequence[Node],
+    raws: dict[int, dict[str, int]],
+    errors: dict[int, MotorbusError],
+    rate: int,
+    air: float,
+) -> Operation[None]:
+    here = [node for node in group if node.node not in errors]
+    for part in trains(here, span.size, rate, air):
+        found = yield from collected(block_of_each(part, span.address, span.size), part, errors)
+        for id, data in found.items():
+            raws[id].update(decode(span, data))
+
+
+def block_of_each(nodes: Sequence[Node], address: int, count: int) -> Exchange[dict[int, bytes]]:
+    """SYNC READ one block of each; the value holds the bytes of those who answered."""
+
+    def read(answer: Answer) -> dict[int, bytes]:
+        return dict(_heard(by_id, answer))
+
+    by_id = {node.node: node for node in nodes}
+    return sync_exchange(nodes, address, count, read)
+
+
+def sync_exchange(
+    nodes: Sequence[Node], address: int, count: int, read: Callable[[Answer], T]
+) -> Exchange[T]:
+    """SYNC READ one block of each of these, in this order."""
+    size = wire.OVERHEAD + count
+    return Exchange(
+        wire.sync_read(address, count, [node.node for node in nodes]),
+        tuple(Due(node.node, node.node, size) for node in nodes),
+        read,
+        repeatable=True,
+        tells_position=address == PRESENT and count > 1,
+    )
+
+
+def collected(
+    exchange: Exchange[dict[int, bytes]], nodes: Sequence[Node], errors: dict[int, MotorbusError]
+) -> Operation[dict[int, bytes]]:
+    """What came; who did not answer gets an error. A failed exchange is the error of everyone in it."""
+    found = yield from outcome(exchange)
+    if isinstance(found, MotorbusError):
+        errors.update({node.node: found for node in nodes})
+        return {}
+    for node in nodes:
+        if node.node not in found:
+            errors[node.node] = _silent(node, exchange)
+    return found
+
+
+def trains(nodes: Sequence[Node], count: int, rate: int, air: float) -> Iterator[Sequence[Node]]:
+    """Divide nodes so that the replies of each part, with `count` bytes each, need at most `air` s (but one may)."""
+    each = (wire.OVERHEAD + count) * _BITS / rate
+    most = int(min(max(air / each, 1), _MOST_IDS))
+    for start in range(0, len(nodes), most):
+        yield nodes[start : start + most]
+
+
+def distinct(ids: Iterable[int | Node]) -> list[Node]:
+    """Each as a node. Raises RequestError when one is there twice or there is none."""
+    wanted = list(ids)
+    nodes = as_nodes(wanted)
+    if len(nodes) == len(wanted) > 0:
+        return nodes
+    raise RequestError(
+        "an id is named twice" if nodes else "no servo is named",
+        advice="name each servo once; nothing was sent",
+    )
+
+
+def _heard(by_id: Mapping[int, Node], answer: Answer) -> Iterator[tuple[int, bytes]]:
+    for reply in answer.replies:
+        frame = reply.data
+        by_id[frame[2]].heard(frame[4], answer.at)
+        yield frame[2], frame[5:-1]
+
+
+def _by_table(nodes: Iterable[Node]) -> Iterator[tuple[Table, list[Node]]]:
+    groups: dict[str, tuple[Table, list[Node]]] = {}
+    for node in nodes:
+        assert node.table is not None
+        key = f"{node.table.name} {node.table['present_position'].order}"
+        groups.setdefault(key, (node.table, []))[1].append(node)
+    yield from groups.values()
+
+
+def _values(node: Node, names: Sequence[str], raws: Mapping[str, int]) -> dict[str, Value]:
+    assert node.table is not None
+    return {row.name: node.value(row, raws[row.name]) for row in rows_of(node.table, names)}
+
+
+def _silent(node: Node, exchange: Exchange[object]) -> NoReply:
+    return NoReply(
+        f"node {node.node} did not answer a SYNC READ",
+        sent=exchange.request,
+        cause="no such id on this bus, no power, a loose cable, or a model without SYNC READ",
+        advice="`motorbus scan BUS` lists who answers",
+        node=node.node,
+    )
+
+
+# -- write ---------------------------------------------------------------------------------------------------
+
+
+def sync_write(
+    values: Mapping[int, Mapping[str, Value]] | Mapping[Node, Mapping[str, Value]],
+    *,
+    rate: int = RATE,
+    air: float = AIR,
+) -> Operation[None]:
+    """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
+
+    One packet serves up to 83 servos with two bytes each; more are split, and then not simultaneous. Nobody
+    acknowledges a SYNC WRITE: follow it with sync_read() when it matters. All or nothing: raises NoReply or
+    DeviceError, with nothing written, when a servo that must be asked first is silent or unknown.
+    """
+    for orders in values.values():
+        check_values(orders)
+    nodes = distinct(values)
+    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    if errors:
+        raise next(iter(errors.values()))
+    blocks = [_block(node, orders) for node, orders in zip(nodes, values.values(), strict=True)]
+    for exchange in sync_writes([node.node for node in nodes], blocks):
+        yield from exchange
+
+
+def sync_writes(ids: Sequence[int], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
+    """These blocks, all of the same registers, as few SYNC WRITEs as can carry them."""
+    first = blocks[0]
+    for id, block in zip(ids, blocks, strict=True):
+        if (block.address, len(block.data)) != (first.address, len(first.data)):
+            raise RequestError(
+                f"node {id} is to get other registers than node {ids[0]}",
+                expected="the same registers for every servo of a SYNC WRITE",
+                advice="write() them one by one; nothing was sent",
+                node=id,
+            )
+    capacity = wire.sync_write_capacity(len(first.data))
+    for start in range(0, len(blocks), capacity):
+        part = blocks[start : start + capacity]
+        items = [(id, block.data) for id, block in zip(ids[start : start + capacity], part, strict=True)]
+        goals: tuple[Goal, ...] = tuple(goal for block in part for goal in block.goals)
+        yield unanswered(wire.sync_write(first.address, items), max(b.effect for b in part), goals)
+
+
+def _block(node: Node, values: Mapping[str, Value]) -> Block:
+    if not node.writable:
+        raise unknown_map(node, "refuses to write to it")
+    assert node.table is not None
+    return only_block(node, orders_of(node, node.table, values), "SYNC WRITE")

@@ -1,0 +1,111 @@
+"""What the bus must know of FEETECH lines: how long things take, what proves that a node is in step, how to stop.
+
+All figures come with their source; none is measured by this project.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+from motorbus.core.family import Stop
+from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Timeout
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.motion import Promise
+from motorbus.families.feetech.driver.torque import LIMP
+
+BITS: Final = 10
+"""On the wire for each byte: start, eight of data, stop. Source: FEETECH protocol manual V1.01."""
+RETURN_DELAY: Final = 254 * 2e-6
+"""s; the longest pause before a reply that register 7 can ask for. Source: STS3215 memory table V3.6."""
+PROCESSING: Final = 0.001
+"""s a servo may take to make up a reply. With adapter and margin, which the bus adds, a unicast reply may take
+about twice the 2 ms that python-st3215 gives and that users found too short."""
+SCAN: Final = 0.010
+"""s to wait for an id that is probably not there. Source: servolab."""
+STORE: Final = 0.100
+"""s for a write to flash: more than 21 ms were measured by a public recovery tool; 50 to 100 ms are advised."""
+COLLISION: Final = 0.8
+"""s in which all servos have answered a broadcast PING at 1 Mbaud. Source: rustypot."""
+
+_LONGEST: Final = wire.MAX_LENGTH + 4
+_ADAPTER: Final = 0.016
+"""s; latency timer of an FTDI adapter as shipped. Source: ROBOTIS-GIT/DynamixelSDK#330."""
+_SCHEDULING: Final = 0.005
+"""s; how late a loaded host may run between two bytes that belong together."""
+
+ID: Final = 5
+PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
+"""Bytes a probe reads from register 5 on. Never 2, whose reply is as long as the echo of its request, and none
+of the lengths in common use: 1, 2, 4, 5 (identify), 6, 7 (commands), 8, 11, 15 (feedback), 40 (settings)."""
+
+
+def air_time(exchange: Exchange[Any], rate: int) -> float:
+    """s on the wire for the request and all replies due; nothing for pauses, which may be none (register 7)."""
+    if exchange.replies is ANY:
+        replies = (wire.MAX_ID + 1) * wire.OVERHEAD
+    else:
+        replies = sum(due.length for due in exchange.replies)
+    return (len(exchange.request) + replies) * BITS / rate
+
+
+def turnaround(exchange: Exchange[Any]) -> float:
+    """s that servos may think: once about the request, and a return delay before each reply."""
+    if exchange.replies is ANY:
+        return COLLISION
+    pauses = RETURN_DELAY * len(exchange.replies)
+    thinking = {Timeout.REPLY: PROCESSING + pauses, Timeout.SCAN: SCAN, Timeout.STORE: STORE + pauses}
+    return thinking[exchange.timeout]
+
+
+def quiet_time(rate: int) -> float:
+    """s after which nothing of an old exchange can still be under way: about 40 ms at 1 Mbaud.
+
+    The longest reply, a return delay, the latency timer of the adapter both ways, and a margin for the host.
+    """
+    return _LONGEST * BITS / rate + RETURN_DELAY + 2 * _ADAPTER + _SCHEDULING
+
+
+def echo_test() -> Exchange[None]:
+    """READ of one byte, the id of node 1: the echo has eight bytes and an answer seven."""
+    return Exchange(
+        wire.read(1, ID, 1), (Due(1, 1, wire.OVERHEAD + 1),), _nothing, timeout=Timeout.SCAN, repeatable=True
+    )
+
+
+def probe(node: int, attempt: int) -> Exchange[bool]:
+    """READ that begins with the id register, in a length that few other reads have; True when the id is right."""
+    count = PROBES[attempt % len(PROBES)]
+
+    def read(answer: Answer) -> bool:
+        return bool(answer.replies) and answer.replies[0].data[5] == node
+
+    return Exchange(
+        wire.read(node, ID, count), (Due(node, node, wire.OVERHEAD + count),), read, repeatable=True
+    )
+
+
+def stop(nodes: Iterable[int]) -> Stop:
+    """Torque off for everyone at once, then for each node until it acknowledges. An arm goes limp."""
+    everyone: Exchange[Answer] = Exchange(
+        wire.write(wire.BROADCAST, LIMP.address, LIMP.data),
+        (),
+        rank=Rank.STOP,
+        effect=LIMP.effect,
+        repeatable=True,
+    )
+    return Stop((everyone, *(_limp(node) for node in sorted(nodes))), Promise.TORQUE_OFF_ACCEPTED.value)
+
+
+def _limp(node: int) -> Exchange[Answer]:
+    return Exchange(
+        wire.write(node, LIMP.address, LIMP.data),
+        (Due(node, node, wire.OVERHEAD),),
+        rank=Rank.STOP,
+        effect=LIMP.effect,
+        repeatable=True,
+    )
+
+
+def _nothing(_: Answer) -> None:
+    return None

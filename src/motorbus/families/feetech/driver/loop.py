@@ -1,0 +1,107 @@
+"""Prepared group operations: exchanges that a control loop makes once, or in microseconds, and runs each cycle.
+
+They need servos that are prepared (limits, mode and units known), and ask nobody anything themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Answer, Exchange, Goal
+from motorbus.errors import LimitExceeded, RequestError
+from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
+from motorbus.families.feetech.driver.node import POSITION, Node
+
+
+class Positions(NamedTuple):
+    """Positions in rad by id of all who answered, the ids of those who did not, and when (s on the link's clock)."""
+
+    values: dict[int, float]
+    missing: tuple[int, ...]
+    at: float
+
+
+def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[Positions]:
+    """The present positions of all of these in one exchange, which may be kept and run again.
+
+    Raises RequestError when a servo is not prepared, or when the replies would need more than `air` s at `rate`
+    bit/s (give a greater `air`, or divide the servos). A single servo that is silent raises NoReply when run.
+    """
+    nodes = distinct(servos)
+    rows = {node.node: _row(node, "present_position") for node in nodes}
+    row = next(iter(rows.values()))
+    if len(list(trains(nodes, row.size, rate, air))) > 1:
+        raise RequestError(
+            f"the replies of {len(nodes)} servos need more than {air * 1000:.3g} ms of air at {rate} bit/s, and a "
+            "stop would have to wait as long",
+            advice="divide the servos, or give a greater `air`; nothing was sent",
+        )
+    by_id = {node.node: node for node in nodes}
+
+    def read(answer: Answer) -> Positions:
+        return Positions(_positions(by_id, rows, answer), answer.missing, answer.at)
+
+    return sync_exchange(nodes, row.address, row.size, read)
+
+
+def _positions(nodes: Mapping[int, Node], rows: Mapping[int, Entry], answer: Answer) -> dict[int, float]:
+    found: dict[int, float] = {}
+    for reply in answer.replies:
+        frame = reply.data
+        node, row = nodes[frame[2]], rows[frame[2]]
+        node.heard(frame[4], answer.at)
+        found[node.node] = node.value(row, row.decode(frame[5:-1]))
+    return found
+
+
+def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> Exchange[None]:
+    """Goal positions in rad for all of these, in one packet that nobody acknowledges.
+
+    Raises RequestError when a servo is not prepared, is not in position mode, or there are too many for a packet;
+    LimitExceeded when a position is not a finite number. The gate judges the limits.
+    """
+    nodes = distinct(servos)
+    if len(positions) != len(nodes):
+        raise RequestError(f"{len(positions)} positions for {len(nodes)} servos", advice="nothing was sent")
+    blocks = [_goal(node, to) for node, to in zip(nodes, positions, strict=True)]
+    exchanges = list(sync_writes([node.node for node in nodes], blocks))
+    if len(exchanges) > 1:
+        raise RequestError(
+            f"one packet cannot carry the goals of {len(nodes)} servos",
+            advice="divide them; nothing was sent",
+        )
+    return exchanges[0]
+
+
+def _goal(node: Node, to: float) -> Block:
+    row = _row(node, "goal_position")
+    if node.mode != POSITION:
+        raise RequestError(
+            f"node {node.node} cannot go to a position in operating mode {node.mode}",
+            expected="operating mode 0, position",
+            advice="write(operating_mode=0) puts it into position mode; nothing was sent",
+            node=node.node,
+        )
+    if not math.isfinite(to):
+        raise LimitExceeded(
+            f"node {node.node}: {to} is no position",
+            advice="give a number in rad; nothing was sent",
+            node=node.node,
+        )
+    raw = node.raw(row, to)
+    order = Goal(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+    return Block(row.address, row.encode(raw), row.effect, (order,))
+
+
+def _row(node: Node, name: str) -> Entry:
+    if node.table is None or node.limits is None:
+        raise RequestError(
+            f"node {node.node} is not prepared: its limits and units are not known",
+            advice="call prepare() on each servo once before the loop, or run prepare_all(); nothing was sent",
+            node=node.node,
+        )
+    return node.table[name]

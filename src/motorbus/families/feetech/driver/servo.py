@@ -1,0 +1,50 @@
+"""The servo as a user holds it: one list of verbs, blocking on `Servo`, awaitable on `AsyncServo`."""
+
+from __future__ import annotations
+
+from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.families.feetech.driver import feedback, identity, motion, registers, torque
+from motorbus.families.feetech.driver.node import Node
+
+
+class ServoVerbs(Node):
+    """What can be said to a servo. Values are in rad, rad/s, rad/s², A, V, °C and fractions.
+
+    Making one costs nothing and sends nothing; the first verb that has to know the servo asks it.
+    """
+
+    ping = verb(identity.ping)
+    identify = verb(identity.identify)
+    prepare = verb(identity.prepare)
+    read = verb(registers.read)
+    read_raw = verb(registers.read_raw)
+    write = verb(registers.write)
+    reg_write = verb(registers.reg_write)
+    action = verb(registers.action)
+    position = verb(feedback.position)
+    velocity = verb(feedback.velocity)
+    load = verb(feedback.load)
+    current = verb(feedback.current)
+    voltage = verb(feedback.voltage)
+    temperature = verb(feedback.temperature)
+    telemetry = verb(feedback.telemetry)
+    enable_torque = verb(motion.enable_torque)
+    disable_torque = verb(torque.disable_torque)
+    move = verb(motion.move)
+    stop = verb(motion.stop)
+
+
+class Servo(ServoVerbs, Blocking):
+    """One servo on a blocking bus: `Servo(bus, 3).position()`."""
+
+    def __init__(self, bus: BlockingRunner, node: int) -> None:
+        ServoVerbs.__init__(self, node)
+        Blocking.__init__(self, bus)
+
+
+class AsyncServo(ServoVerbs, Awaiting):
+    """One servo on an async bus: `await AsyncServo(bus, 3).position()`."""
+
+    def __init__(self, bus: AsyncRunner, node: int) -> None:
+        ServoVerbs.__init__(self, node)
+        Awaiting.__init__(self, bus)

@@ -1,0 +1,118 @@
+"""The least that answers like FEETECH servos: enough to exercise the bus, with a lock to leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from script import admit_all
+
+from motorbus.bus.aio import AsyncBus
+from motorbus.bus.pump import Bus
+from motorbus.core.family import SimulatedNode
+from motorbus.core.operation import Answer, Data, Due, Effect, Exchange, Operation, afterwards
+from motorbus.families.feetech import FAMILY, wire
+from motorbus.link.base import Line
+from motorbus.link.memory import MemoryLink
+
+LOCK = 55
+DELAY = 0.0001
+
+
+class Responder:
+    """Servos 1 to 20, each 128 bytes of memory in which register 5 is the id and everything may be written."""
+
+    def __init__(self, ids: range = range(1, 21)) -> None:
+        self.memory = {node: bytearray(128) for node in ids}
+        for node, memory in self.memory.items():
+            memory[5], memory[LOCK], memory[56] = node, 1, node
+        self.dead: set[int] = set()
+        self.heard: list[wire.InstructionPacket] = []
+        self._splitter = wire.Splitter("instruction")
+        self._out: list[tuple[float, Data]] = []
+        self.rate = 0
+
+    @property
+    def nodes(self) -> Mapping[int, SimulatedNode]:
+        return {}
+
+    def receive(self, data: Data, at: float) -> None:
+        assert isinstance(data, bytes)
+        for packet in self._splitter.feed(data):
+            if isinstance(packet, wire.InstructionPacket):
+                self.heard.append(packet)
+                self._carry_out(packet, at)
+
+    def _carry_out(self, packet: wire.InstructionPacket, at: float) -> None:
+        parameters = packet.parameters
+        if packet.instruction == wire.Instruction.SYNC_READ:
+            for node in parameters[2:]:
+                self._answer(node, at, self._read(node, parameters[0], parameters[1]))
+        elif packet.instruction == wire.Instruction.READ:
+            self._answer(packet.id, at, self._read(packet.id, parameters[0], parameters[1]))
+        elif packet.instruction == wire.Instruction.WRITE and packet.id in self.memory:
+            if packet.id not in self.dead:
+                self.memory[packet.id][parameters[0] : parameters[0] + len(parameters) - 1] = parameters[1:]
+            self._answer(packet.id, at)
+        elif packet.instruction == wire.Instruction.PING:
+            self._answer(packet.id, at)
+
+    def _read(self, node: int, address: int, count: int) -> bytes:
+        return bytes(self.memory[node][address : address + count]) if node in self.memory else b""
+
+    def _answer(self, node: int, at: float, data: bytes = b"") -> None:
+        if node in self.memory and node not in self.dead:
+            self._out.append((at + DELAY, wire.encode_status(node, 0, data)))
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        ready = [item for item in self._out if item[0] <= to]
+        self._out = [item for item in self._out if item[0] > to]
+        return ready
+
+    def due(self) -> float | None:
+        return min((at for at, _ in self._out), default=None)
+
+    def tune(self, rate: int) -> None:
+        self.rate = rate
+
+
+def first_byte(answer: Answer) -> int:
+    return answer.replies[0].data[5]
+
+
+def position(node: int) -> Exchange[int]:
+    """The low byte of register 56, which is the id."""
+    return Exchange(wire.read(node, 56, 2), (Due(node, node, 8),), first_byte, repeatable=True)
+
+
+def positions(*nodes: int) -> Exchange[Answer]:
+    return Exchange(wire.sync_read(56, 2, nodes), tuple(Due(n, n, 8) for n in nodes), repeatable=True)
+
+
+def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Exchange[Answer]:
+    return Exchange(
+        wire.write(node, address, bytes([value])), (Due(node, node, 6),), effect=effect, repeatable=True
+    )
+
+
+def guarded(node: int, value: int) -> Operation[None]:
+    """Unlock, write, lock: whatever happens in between, the lock is closed at the end."""
+
+    def change() -> Operation[None]:
+        yield from write(node, LOCK, 0, Effect.PERSISTENT)
+        yield from write(node, 20, value, Effect.PERSISTENT)
+        yield from position(node)
+
+    return afterwards(change(), lambda: write(node, LOCK, 1, Effect.PERSISTENT))
+
+
+def memory_bus(line: Line | None = None, **options: Any) -> tuple[Bus, Responder]:
+    responder = Responder()
+    link = MemoryLink(responder, line=line, **options)
+    return Bus(link, FAMILY, admit=admit_all), responder
+
+
+def async_bus(line: Line | None = None, **options: Any) -> tuple[AsyncBus, Responder]:
+    responder = Responder()
+    link = MemoryLink(responder, line=line, **options)
+    return AsyncBus(link, FAMILY, admit=admit_all), responder

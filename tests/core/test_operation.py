@@ -1,0 +1,83 @@
+"""Steps are values; `yield from` gives each the type of its answer."""
+
+from __future__ import annotations
+
+from typing import assert_type
+
+import pytest
+
+from motorbus.core.operation import (
+    Alone,
+    Answer,
+    Due,
+    Exchange,
+    Listen,
+    Notice,
+    Operation,
+    Pause,
+    Report,
+    Step,
+    Together,
+    Tune,
+    outcome,
+)
+from motorbus.errors import MotorbusError, NoReply
+
+
+def number(value: int) -> Exchange[int]:
+    return Exchange(bytes([value]), (Due(1, 1, 1),), lambda answer: answer.replies[0].data[0])
+
+
+def everything() -> Operation[str]:
+    one = yield from number(1)
+    assert_type(one, int)
+    several = yield from Together([number(2), number(3)])
+    assert_type(several, list[int])
+    alone = yield from Alone(number(4))
+    assert_type(alone, int)
+    yield from Pause(0.1)
+    notice = yield from Listen(lambda n: True, 1.0)
+    assert_type(notice, Notice | None)
+    yield from Tune(500_000)
+    yield from Report("event")
+    return f"{one} {several} {alone} {notice}"
+
+
+def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
+    operation = everything()
+    kinds: list[type[Step]] = []
+    answers: list[object] = [1, [2, 3], 4, None, None, None, None]
+    step = next(operation)
+    with pytest.raises(StopIteration) as end:
+        for answer in answers:
+            kinds.append(type(step))
+            step = operation.send(answer)
+    assert kinds == [Exchange, Together, Alone, Pause, Listen, Tune, Report]
+    assert end.value.value == "1 [2, 3] 4 None"
+
+
+def test_an_exchange_is_plain_data_with_a_reader() -> None:
+    exchange = number(7)
+    assert exchange.request == b"\x07"
+    assert exchange.replies == (Due(1, 1, 1),)
+    assert exchange.read is not None
+    assert not exchange.repeatable
+    assert not hasattr(exchange, "__dict__")
+    assert "07" in repr(exchange)
+
+
+def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
+    operation: Operation[int | MotorbusError] = outcome(number(1))
+    next(operation)
+    with pytest.raises(StopIteration) as end:
+        operation.throw(NoReply("silent"))
+    assert isinstance(end.value.value, NoReply)
+    operation = outcome(number(1))
+    next(operation)
+    with pytest.raises(KeyboardInterrupt):
+        operation.throw(KeyboardInterrupt())
+
+
+def test_an_answer_without_reader_is_the_answer() -> None:
+    plain: Exchange[Answer] = Exchange(b"\x01", (Due(1, 1, 1),))
+    assert plain.read is None

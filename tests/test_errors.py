@@ -1,0 +1,47 @@
+"""One tree, and every message says what was sent, what came, what was due, why, and what to do."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+from motorbus import errors
+
+CLASSES = [
+    kind for _, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, errors.MotorbusError)
+]
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
+def test_every_class_is_in_the_drawing_and_has_a_meaning(kind: type[errors.MotorbusError]) -> None:
+    assert kind.__name__ in (errors.__doc__ or "")
+    assert kind.__doc__
+    assert issubclass(kind, errors.MotorbusError)
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
+def test_every_class_carries_the_parts_of_its_message(kind: type[errors.MotorbusError]) -> None:
+    error = kind("it failed", sent=b"\x01\x02", received=b"", expected="6 bytes", cause="a cable", advice="look")
+    assert str(error).splitlines() == [
+        "it failed",
+        "  sent: 01 02",
+        "  expected: 6 bytes",
+        "  likely cause: a cable",
+        "  what to do: look",
+    ]
+    assert error.summary == "it failed"
+    assert (error.sent, error.advice, error.node) == (b"\x01\x02", "look", None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "builtin"),
+    [(errors.LinkError, OSError), (errors.NoReply, TimeoutError), (errors.RequestError, ValueError)],
+)
+def test_errors_that_python_knows_are_those_too(kind: type[Exception], builtin: type[Exception]) -> None:
+    assert issubclass(kind, builtin)
+
+
+def test_a_device_error_carries_code_and_register() -> None:
+    error = errors.DeviceError("no", code=7, register="lock", node=3)
+    assert (error.code, error.register, error.node) == (7, "lock", 3)
