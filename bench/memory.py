@@ -54,5 +54,6 @@ class Wire:
         if node not in IDS:
             return b""
         if code == READ:
-            return packet(node, 0, MEMORY[request[5] : request[5] + request[6]])
+            registers = MEMORY[:5] + bytes((node,)) + MEMORY[6:]
+            return packet(node, 0, registers[request[5] : request[5] + request[6]])
         return packet(node, 0) if code in (PING, WRITE) else b""

@@ -22,7 +22,9 @@ def test_every_class_is_in_the_drawing_and_has_a_meaning(kind: type[errors.Motor
 
 @pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
 def test_every_class_carries_the_parts_of_its_message(kind: type[errors.MotorbusError]) -> None:
-    error = kind("it failed", sent=b"\x01\x02", received=b"", expected="6 bytes", cause="a cable", advice="look")
+    error = kind(
+        "it failed", sent=b"\x01\x02", received=b"", expected="6 bytes", cause="a cable", advice="look"
+    )
     assert str(error).splitlines() == [
         "it failed",
         "  sent: 01 02",

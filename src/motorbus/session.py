@@ -197,7 +197,9 @@ def _link(opening: Opening) -> Link:
     if opening.port == "sim":
         ids = parse_ids(str(opening.options.pop("ids", "1")))
         model = str(opening.options.pop("model", ""))
-        return Simulation(opening.family, ids, model=model, clock="real", **opening.options).link(opening.rate)
+        return Simulation(opening.family, ids, model=model, clock="real", **opening.options).link(
+            opening.rate
+        )
     if opening.port.startswith("sim:"):
         return find(opening.port.removeprefix("sim:"), opening.family.name).link(opening.rate)
     return open_link(opening.port, rate=opening.rate, kind=opening.family.link.kind)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from script import admit_all
-
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.family import SimulatedNode
@@ -14,6 +12,7 @@ from motorbus.core.operation import Answer, Data, Due, Effect, Exchange, Operati
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
+from tests.bus.script import admit_all
 
 LOCK = 55
 DELAY = 0.0001

@@ -19,7 +19,11 @@ def admit_all(exchange: Exchange[Any]) -> None:
 def position(node: int, **options: Any) -> Exchange[Answer]:
     """READ two bytes at 56, repeatable."""
     return Exchange(
-        wire.read(node, 56, 2), (Due(node, node, READ_LENGTH),), repeatable=True, tells_position=True, **options
+        wire.read(node, 56, 2),
+        (Due(node, node, READ_LENGTH),),
+        repeatable=True,
+        tells_position=True,
+        **options,
     )
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from typing import Any
 
 import pytest
-from responder import LOCK, async_bus, guarded, memory_bus, position, positions
 
 from motorbus.core.operation import Operation, Together
 from motorbus.errors import LinkLost, NoReply
+from tests.bus.responder import LOCK, async_bus, guarded, memory_bus, position, positions
 
 
 def single(node: int) -> Operation[int]:
@@ -76,9 +77,8 @@ def test_a_task_cancelled_at_any_await_leaves_the_bus_usable(virtual: bool, step
             for _ in range(steps):
                 await asyncio.sleep(0)
             task.cancel()
-            with pytest.raises(asyncio.CancelledError):
+            with contextlib.suppress(asyncio.CancelledError):  # or it had ended before
                 await task
-                raise asyncio.CancelledError  # it had ended before: nothing to cancel
             assert responder.memory[1][LOCK] == 1
             assert await bus.run(position(1)) == 1
             assert await bus.run(single(2)) == 2

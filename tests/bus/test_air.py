@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from script import Script, ping, position, positions, reply
 
 from motorbus.errors import ChecksumError, NoReply
 from motorbus.families.feetech import wire
+from tests.bus.script import Script, ping, position, positions, reply
 
 
 def test_arriving_bytes_do_not_move_the_deadline() -> None:
@@ -178,8 +178,8 @@ def test_statistics_balance() -> None:
     assert (ledger.of(1).sent, ledger.of(1).ok) == (2, 2)
     assert ledger.of(5).errors["silence"] == 1
     assert sum(ledger.of(1).latency) == 2
-    for node in ledger.nodes.values():
-        assert node.sent == node.ok + sum(node.errors.values())
+    for one in ledger.nodes.values():
+        assert one.sent == one.ok + sum(one.errors.values())
 
 
 def test_surplus_between_exchanges_taints_those_asked_lately() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from responder import LOCK, guarded, memory_bus, position, positions, write
 
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import (
@@ -21,6 +20,7 @@ from motorbus.core.operation import (
     outcome,
 )
 from motorbus.errors import MotorbusError, NoReply, RequestError
+from tests.bus.responder import LOCK, guarded, memory_bus, position, positions, write
 
 
 def test_an_operation_gets_its_answers_and_returns_its_value() -> None:
@@ -84,7 +84,8 @@ def test_outcomes_are_collected_in_order() -> None:
     responder.dead = {2}
 
     def several() -> Operation[list[int | MotorbusError]]:
-        return (yield from Together([outcome(position(n)) for n in (1, 2, 3)]))
+        tries: list[Operation[int | MotorbusError]] = [outcome(position(n)) for n in (1, 2, 3)]
+        return (yield from Together(tries))
 
     one, two, three = bus.run(several())
     assert (one, three) == (1, 3)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from script import position, positions, reply
 
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.core.operation import Reply
+from tests.bus.script import position, positions, reply
 
 
 def test_a_ticket_is_settled_once_and_wakes_once() -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from script import position
-
 from motorbus.bus.trust import FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
 from motorbus.core.operation import Due
 from motorbus.families.feetech import FAMILY
+from tests.bus.script import position
 
 DUE = Due(1, 1, 8)
 QUIET = 0.04

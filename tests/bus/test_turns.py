@@ -6,7 +6,6 @@ from math import inf
 from typing import Any
 
 import pytest
-from script import Script, admit_all, ping, position, positions, reply
 
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Timer
 from motorbus.bus.turns import RETRIES
@@ -22,6 +21,7 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import Interrupted, LimitExceeded, LinkLost, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
+from tests.bus.script import Script, admit_all, ping, position, positions, reply
 
 
 def write(node: int, *, effect: Effect = Effect.NONE, rank: Rank = Rank.POLL, repeatable: bool = True) -> Any:

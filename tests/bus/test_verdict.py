@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from script import position, reply
 
 from motorbus.bus import verdict
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import Due, Effect, Exchange, Reply
+from motorbus.core.operation import Answer, Due, Effect, Exchange, Reply
 from motorbus.errors import ChecksumError, FramingError, NoReply, OutcomeUnknown, UnexpectedReply
+from tests.bus.script import position, reply
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,9 @@ def test_the_fault_of_a_try_is_the_worst_thing_seen() -> None:
 
 
 def test_a_write_that_was_not_confirmed_is_unknown_and_shows_what_came() -> None:
-    write = Exchange(b"\x01\x02", (Due(3, 3, 6),), effect=Effect.PERSISTENT, repeatable=True)
+    write: Exchange[Answer] = Exchange(
+        b"\x01\x02", (Due(3, 3, 6),), effect=Effect.PERSISTENT, repeatable=True
+    )
     flight = Flight(write)
     flight.take(Reply(0, 3, reply(3)[:6]))
     found = verdict.error(flight, "surplus", 2)

@@ -13,7 +13,13 @@ from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 
 PLAIN = Entry(
-    name="plain", address=5, size=1, access=Access.READ_WRITE, storage=Storage.RAM, high=253, source="manual 1"
+    name="plain",
+    address=5,
+    size=1,
+    access=Access.READ_WRITE,
+    storage=Storage.RAM,
+    high=253,
+    source="manual 1",
 )
 SIGNED = Entry(
     name="goal_position",

@@ -19,6 +19,7 @@ from motorbus.core.operation import (
     Step,
     Together,
     Tune,
+    afterwards,
     outcome,
 )
 from motorbus.errors import MotorbusError, NoReply
@@ -48,10 +49,12 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
     kinds: list[type[Step]] = []
     answers: list[object] = [1, [2, 3], 4, None, None, None, None]
     step = next(operation)
+    for answer in answers[:-1]:
+        kinds.append(type(step))
+        step = operation.send(answer)
+    kinds.append(type(step))
     with pytest.raises(StopIteration) as end:
-        for answer in answers:
-            kinds.append(type(step))
-            step = operation.send(answer)
+        operation.send(answers[-1])
     assert kinds == [Exchange, Together, Alone, Pause, Listen, Tune, Report]
     assert end.value.value == "1 [2, 3] 4 None"
 
@@ -81,3 +84,63 @@ def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
 def test_an_answer_without_reader_is_the_answer() -> None:
     plain: Exchange[Answer] = Exchange(b"\x01", (Due(1, 1, 1),))
     assert plain.read is None
+
+
+def guarded(log: list[str], fail: BaseException | None = None) -> Operation[int]:
+    def body() -> Operation[int]:
+        value = yield from number(1)
+        if fail is not None:
+            raise fail
+        return value
+
+    def lock() -> Exchange[int]:
+        log.append("lock")
+        return number(9)
+
+    return afterwards(body(), lock)
+
+
+def test_afterwards_cleans_up_and_returns_the_value() -> None:
+    log: list[str] = []
+    operation = guarded(log)
+    next(operation)
+    lock = operation.send(7)
+    assert isinstance(lock, Exchange)
+    assert lock.request == b"\x09"
+    with pytest.raises(StopIteration) as end:
+        operation.send(None)
+    assert end.value.value == 7
+    assert log == ["lock"]
+
+
+@pytest.mark.parametrize("error", [NoReply("silent"), KeyboardInterrupt(), ValueError("bug")])
+def test_afterwards_cleans_up_after_any_error(error: BaseException) -> None:
+    log: list[str] = []
+    operation = guarded(log, error)
+    next(operation)
+    operation.send(7)
+    assert log == ["lock"]
+    with pytest.raises(type(error)):
+        operation.send(None)
+
+
+def test_an_interruption_of_the_clean_up_repeats_it() -> None:
+    log: list[str] = []
+    operation = guarded(log)
+    next(operation)
+    operation.send(7)
+    operation.throw(KeyboardInterrupt())
+    assert log == ["lock", "lock"]
+    with pytest.raises(KeyboardInterrupt):
+        operation.send(None)
+
+
+def test_a_clean_up_that_fails_is_not_repeated_for_ever() -> None:
+    log: list[str] = []
+    operation = guarded(log)
+    next(operation)
+    operation.send(7)
+    step = operation.throw(NoReply("silent"))
+    assert isinstance(step, Exchange)
+    with pytest.raises(NoReply):
+        operation.throw(NoReply("silent"))

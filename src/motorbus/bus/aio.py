@@ -57,7 +57,7 @@ class AsyncBus(BusFace):
                 while not run.advance():
                     crank(self.link, self.turns, inf)
                 raise
-            except BaseException as interruption:  # noqa: BLE001 - it is raised again by result()
+            except BaseException as interruption:
                 run.interrupt(interruption)
         return run.result()
 

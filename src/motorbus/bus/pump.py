@@ -39,7 +39,7 @@ class Bus(BusFace):
                 while not run.advance():
                     self._turn()
                 break
-            except BaseException as interruption:  # noqa: BLE001 - it is raised again by result()
+            except BaseException as interruption:
                 self._recover()
                 run.interrupt(interruption)
         return run.result()

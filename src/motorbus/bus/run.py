@@ -133,10 +133,8 @@ class Run(Generic[T]):
 
     def _step(self, branch: Branch, value: Any = None, error: BaseException | None = None) -> None:
         try:
-            if error is not None:
-                wish = branch.generator.throw(error)
-            else:
-                wish = branch.generator.send(value)
+            generator = branch.generator
+            wish = generator.send(value) if error is None else generator.throw(error)
         except StopIteration as end:
             self._finish(branch, end.value, None)
         except BaseException as failure:

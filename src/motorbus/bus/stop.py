@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -50,6 +49,7 @@ class Stopper:
         self.outcome: StopOutcome | None = None
         self._pair: tuple[socket.socket, socket.socket] | None = None
         self._done = Event()
+        self._ready = Event()
         self._starting = Lock()
         self._thread: Thread | None = None
         self._closed = False
@@ -61,6 +61,7 @@ class Stopper:
                 self._pair = socket.socketpair()
                 self._thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
                 self._thread.start()
+                self._ready.wait(PATIENCE)
 
     def trigger(self) -> None:
         """Ask for the stop and return at once; safe in a signal handler. Does nothing before `start`."""
@@ -130,6 +131,7 @@ class Stopper:
             ready.register(wish, EVENT_READ)
             if listener is not None:
                 ready.register(listener, EVENT_READ)
+            self._ready.set()
             while not self._closed:
                 for key, _ in ready.select():
                     if key.fileobj is wish:
@@ -175,11 +177,8 @@ def _listening(path: Path | None) -> Iterator[socket.socket | None]:
         return
     with socket.socket(socket.AF_UNIX) as listener:
         path.unlink(missing_ok=True)
-        mask = os.umask(0o177)
-        try:
-            listener.bind(str(path))
-        finally:
-            os.umask(mask)
+        listener.bind(str(path))
+        path.chmod(0o600)  # before `listen`, until which nobody can connect
         listener.listen(4)
         try:
             yield listener

@@ -247,7 +247,7 @@ def sync_read(
     return Exit.OK
 
 
-def _facts(servo: driver.Servo, values: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _facts(servo: driver.Node, values: Mapping[str, Any]) -> list[dict[str, Any]]:
     assert servo.table is not None
     return registers.facts(servo, [servo.table[name] for name in values], values)
 

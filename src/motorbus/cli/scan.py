@@ -61,7 +61,7 @@ def scan(
         early: list[Found] = []
         found: list[Found] | None = None
         try:
-            operation = opening.family.scan(asked, rates(baud, opening.family))
+            operation = opening.family.scan(asked, rates(baud, opening.family) or (opening.rate,))
             found = opening.run(operation, report=lambda event: _listen(event, early, bar))
         finally:
             _show(bus, early if found is None else found, output)

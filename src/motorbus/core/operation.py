@@ -66,7 +66,7 @@ class Due(NamedTuple):
     length: int
 
 
-class Any_(Enum):
+class Any_(Enum):  # noqa: N801 - typing.Any is taken
     """The type of `ANY`: every reply that comes until the deadline is part of the answer."""
 
     ANY = "any"
@@ -301,23 +301,25 @@ def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) 
     An error or an interruption, at any line and even in the middle of the clean-up, is raised when the clean-up
     has been carried out. Cleaning up must be harmless to repeat.
     """
-    clean = False
+    tries: list[str] = []
     try:
         try:
             return (yield from runnable)
         finally:
-            yield from _insist(clean_up)
-            clean = True
+            yield from _insist(clean_up, tries)
     finally:
-        if not clean:  # an interruption fell between the lines above
-            yield from _insist(clean_up)
+        if not tries:  # an interruption fell between the lines above
+            yield from _insist(clean_up, tries)
 
 
-def _insist(clean_up: Callable[[], Runnable[object]]) -> Operation[None]:
+def _insist(clean_up: Callable[[], Runnable[object]], tries: list[str]) -> Operation[None]:
     try:
         yield from clean_up()
     except MotorbusError:
+        tries.append("failed")
         raise
     except BaseException:
         yield from clean_up()
+        tries.append("interrupted")
         raise
+    tries.append("done")

@@ -37,7 +37,9 @@ def _check(goal: Goal) -> None:
     if not isfinite(goal.value):
         raise _refusal(goal, f"{goal.value} is not a finite number", "give a number")
     if goal.low is None or goal.high is None:
-        raise _refusal(goal, "its limits are not known", "read the device's limits first, for example by identify()")
+        raise _refusal(
+            goal, "its limits are not known", "read the device's limits first, for example by identify()"
+        )
     slack = ROUNDING * max(abs(goal.low), abs(goal.high), 1.0)
     if not goal.low - slack <= goal.value <= goal.high + slack:
         raise _refusal(

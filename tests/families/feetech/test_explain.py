@@ -120,6 +120,13 @@ def test_an_echo_is_told_and_the_answer_after_it_still_named() -> None:
     assert meanings(reply)["present_position"].startswith("1304")
 
 
+def test_one_request_names_one_reply() -> None:
+    reply = "FF FF 01 04 00 18 05 DD"
+    _, first, second = told(f"FF FF 01 04 02 38 02 BE {reply} {reply}")
+    assert "present_position" in meanings(first)
+    assert "present_position" not in meanings(second)
+
+
 def test_a_reply_without_its_request_shows_a_word_in_both_orders() -> None:
     assert meanings(one("FF FF 01 04 00 18 05 DD"))["parameters"].startswith("1304 if little-endian")
     assert "6149 if big-endian" in meanings(one("FF FF 01 04 00 18 05 DD"))["parameters"]

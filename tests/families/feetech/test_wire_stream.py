@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core.family import Receiver
 from motorbus.core.operation import CanFrame, Noise, Reply
 from motorbus.families.feetech import wire
 from tests.families.feetech.vectors import REPLIES, Vector, name_of
@@ -180,6 +181,11 @@ def test_each_bad_packet_is_told_by_itself() -> None:
     ]
 
 
+def test_a_bad_packet_inside_a_bad_one_is_part_of_it() -> None:
+    bad = b"\xff\xff\x02\x0c\x00" + REPLY[:-1] + b"\x00" + b"\x11\x22\x33"
+    assert wire.StatusReceiver().feed(bad) == [Noise(bad, "checksum")]
+
+
 @pytest.mark.parametrize("direction", ["status", "instruction"])
 def test_only_an_instruction_may_be_for_everyone(direction: wire.Direction) -> None:
     action = wire.action()
@@ -200,6 +206,11 @@ def test_a_gap_in_a_train_costs_the_missing_one_only() -> None:
     receiver = wire.StatusReceiver()
     events = [*receiver.feed(train[0] + train[1][:-3] + train[2]), *receiver.flush()]
     assert [event.key for event in events if isinstance(event, Reply)] == [1, 3]
+
+
+def test_it_is_the_receiver_that_a_bus_expects() -> None:
+    receiver: Receiver = wire.StatusReceiver()
+    assert receiver.feed(REPLY) == [Reply(0, 1, REPLY)]
 
 
 def test_a_can_frame_on_a_serial_bus_is_foreign() -> None:

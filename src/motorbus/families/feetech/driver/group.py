@@ -12,9 +12,9 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value
 from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outcome
-from motorbus.errors import MotorbusError, NoReply, RequestError
+from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, unanswered
+from motorbus.families.feetech.driver.exchanges import PRESENT, Block, read_block, unanswered
 from motorbus.families.feetech.driver.identity import learn, unknown_map
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
@@ -74,7 +74,7 @@ def prepare_all(
     nodes = [node for node in distinct(ids) if node.table is None or node.settings is None]
     errors: dict[int, MotorbusError] = {}
     for part in trains(nodes, IMAGE, rate, air):
-        images = yield from collected(block_of_each(part, 0, IMAGE), part, errors)
+        images = yield from collected(part, 0, IMAGE, errors)
         for node in part:
             if node.node in images:
                 learn(node, images[node.node])
@@ -91,7 +91,7 @@ def _sync_read_span(
 ) -> Operation[None]:
     here = [node for node in group if node.node not in errors]
     for part in trains(here, span.size, rate, air):
-        found = yield from collected(block_of_each(part, span.address, span.size), part, errors)
+        found = yield from collected(part, span.address, span.size, errors)
         for id, data in found.items():
             raws[id].update(decode(span, data))
 
@@ -121,16 +121,21 @@ def sync_exchange(
 
 
 def collected(
-    exchange: Exchange[dict[int, bytes]], nodes: Sequence[Node], errors: dict[int, MotorbusError]
+    nodes: Sequence[Node], address: int, count: int, errors: dict[int, MotorbusError]
 ) -> Operation[dict[int, bytes]]:
-    """What came; who did not answer gets an error. A failed exchange is the error of everyone in it."""
-    found = yield from outcome(exchange)
-    if isinstance(found, MotorbusError):
-        errors.update({node.node: found for node in nodes})
-        return {}
+    """One block of each: by SYNC READ, and by READ of those whom it did not bring; the errors of the rest by id.
+
+    Some models know no SYNC READ, and what servos do whose predecessor in the list is silent is not documented.
+    """
+    heard = yield from outcome(block_of_each(nodes, address, count))
+    found = {} if isinstance(heard, MotorbusError) else heard
     for node in nodes:
         if node.node not in found:
-            errors[node.node] = _silent(node, exchange)
+            data = yield from outcome(read_block(node, address, count, bytes))
+            if isinstance(data, MotorbusError):
+                errors[node.node] = data
+            else:
+                found[node.node] = data
     return found
 
 
@@ -173,16 +178,6 @@ def _by_table(nodes: Iterable[Node]) -> Iterator[tuple[Table, list[Node]]]:
 def _values(node: Node, names: Sequence[str], raws: Mapping[str, int]) -> dict[str, Value]:
     assert node.table is not None
     return {row.name: node.value(row, raws[row.name]) for row in rows_of(node.table, names)}
-
-
-def _silent(node: Node, exchange: Exchange[object]) -> NoReply:
-    return NoReply(
-        f"node {node.node} did not answer a SYNC READ",
-        sent=exchange.request,
-        cause="no such id on this bus, no power, a loose cable, or a model without SYNC READ",
-        advice="`motorbus scan BUS` lists who answers",
-        node=node.node,
-    )
 
 
 # -- write ---------------------------------------------------------------------------------------------------

@@ -57,9 +57,7 @@ class Stream(Generic[P]):
 
     def flush(self) -> list[P | Noise]:
         """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
-        events = self._split(self._rest, more=False)
-        self._suspect = 0
-        return events
+        return self._split(self._rest, more=False)
 
     def _split(self, data: bytes, more: bool) -> list[P | Noise]:
         events: list[P | Noise] = []

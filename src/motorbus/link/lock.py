@@ -1,0 +1,249 @@
+"""One owner per port, and a way to learn who it is.
+
+Two programs on one half-duplex line destroy each other's frames, and neither can tell why. So whoever opens a port
+holds a lock file named after it; the file says which process that is. The operating system drops the lock of a
+process that died, so a lock is never stale. Beside the file lies the socket over which another process may ask for
+an emergency stop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import stat
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from motorbus.errors import LinkError, PortBusy
+
+SOCKET_LIMIT = 107  # bytes of a path in struct sockaddr_un on Linux, the terminating zero not counted
+TRIES = 50  # each a millisecond: how long somebody who only looks may be in the way
+ADVICE = {
+    "ModemManager": "it tries every new adapter for a modem: wait half a minute, or set ID_MM_DEVICE_IGNORE for it",
+    "brltty": "it takes CH340 adapters for Braille displays: remove the package brltty",
+}
+
+
+class Owner(NamedTuple):
+    """A process that holds a port: its id, its program's name, and the port where it is known."""
+
+    pid: int
+    program: str
+    port: str = ""
+
+
+def state_folder() -> Path:
+    """Where locks and sockets live: `motorbus` in the platform's state folder, made with mode 0700.
+
+    $XDG_STATE_HOME or ~/.local/state; on Windows the local application data. Raises LinkError when it cannot be.
+    """
+    try:
+        folder = _state_home() / "motorbus"
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if stat.S_IMODE(folder.stat().st_mode) & 0o077:
+            folder.chmod(0o700)
+    except (OSError, RuntimeError) as error:
+        raise LinkError(
+            f"no folder for the locks of ports: {error}",
+            advice="set XDG_STATE_HOME to a folder that you may write to",
+        ) from error
+    return folder
+
+
+def _state_home() -> Path:
+    if os.name == "nt":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    home = Path(os.environ.get("XDG_STATE_HOME", ""))
+    return home if home.is_absolute() else Path.home() / ".local" / "state"  # relative ones do not count
+
+
+def real_name(port: str) -> str:
+    """One name for one port, whatever the user called it: symbolic links resolved, letters of a host lowered."""
+    if "://" in port:
+        return port.lower().rstrip("/")
+    return port.upper() if os.name == "nt" else os.path.realpath(port)
+
+
+def _stem(port: str) -> str:
+    """Readable, and different for different ports."""
+    name = real_name(port)
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[-32:]
+    return f"{readable}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def socket_path(port: str) -> Path:
+    """Where the holder of this port listens for an emergency stop; short enough for a local socket everywhere."""
+    folder = state_folder()
+    path = folder / f"{_stem(port)}.sock"
+    if len(os.fsencode(path)) <= SOCKET_LIMIT:
+        return path
+    digest = hashlib.sha256(os.fsencode(path)).hexdigest()[:16]
+    return _short_folder() / f"{digest}.sock"
+
+
+def _short_folder() -> Path:
+    """A folder of this user's with a short name, for when the state folder's is too long."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"motorbus-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or (found.st_uid, stat.S_IMODE(found.st_mode)) != (user, 0o700):
+        raise LinkError(f"{folder}: somebody else has made it", advice="set XDG_STATE_HOME to a shorter path")
+    return folder
+
+
+class PortLock:
+    """The right to use one port, held by at most one process; `acquire` it, `release` it, or use it in a `with`."""
+
+    def __init__(self, port: str) -> None:
+        self.port = port
+        self.path = state_folder() / f"{_stem(port)}.lock"
+        self._descriptor: int | None = None
+
+    def acquire(self) -> Self:
+        """Take it. Raises PortBusy, whose `owner` is the process that holds it."""
+        for _ in range(TRIES):
+            self._descriptor = _try(self.path)
+            if self._descriptor is not None:
+                _sign(self._descriptor, Owner(os.getpid(), program_name(), self.port))
+                return self
+            owner = _signed(self.path)
+            if owner is not None and is_alive(owner.pid):
+                raise busy(self.port, owner)
+            time.sleep(0.001)  # its owner has not signed yet, or somebody only looks
+        raise busy(self.port, None)
+
+    def release(self) -> None:
+        """Give it back; does nothing when it is not held."""
+        if self._descriptor is None:
+            return
+        descriptor, self._descriptor = self._descriptor, None
+        if os.name == "nt":  # an open file cannot be removed there
+            os.close(descriptor)
+            self.path.unlink(missing_ok=True)
+        else:
+            self.path.unlink(missing_ok=True)
+            os.close(descriptor)
+
+    def owner(self) -> Owner | None:
+        """The process that holds the port now, or None."""
+        return _owner(self.path)
+
+    def __enter__(self) -> Self:
+        return self.acquire()
+
+    def __exit__(self, *exc: object) -> None:
+        self.release()
+
+
+def holders() -> list[Owner]:
+    """Every port that a live motorbus process of this user holds, and which process that is."""
+    owners = (_owner(path) for path in sorted(state_folder().glob("*.lock")))
+    return [owner for owner in owners if owner is not None]
+
+
+def _try(path: Path) -> int | None:
+    """The descriptor of this file, locked by us, or None."""
+    try:
+        import fcntl
+    except ImportError:
+        return _try_exclusive(path)
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.fstat(descriptor).st_ino == path.stat().st_ino:
+            return descriptor
+    except (BlockingIOError, FileNotFoundError):  # held, or released and removed between open and lock
+        pass
+    os.close(descriptor)
+    return None
+
+
+def _try_exclusive(path: Path) -> int | None:
+    """As above where there is no flock: the file is the lock. Windows refuses to remove one that is open."""
+    owner = _signed(path)
+    if os.name == "nt" or (owner is not None and not is_alive(owner.pid)):
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        return None
+
+
+def _sign(descriptor: int, owner: Owner) -> None:
+    os.ftruncate(descriptor, 0)
+    os.write(descriptor, json.dumps(owner._asdict()).encode())
+
+
+def _signed(path: Path) -> Owner | None:
+    """Who signed this lock, alive or not."""
+    try:
+        about = json.loads(path.read_bytes())
+        return Owner(int(about["pid"]), str(about["program"]), str(about["port"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _owner(path: Path) -> Owner | None:
+    owner = _signed(path)
+    return owner if owner is not None and is_alive(owner.pid) and _is_held(path) else None
+
+
+def _is_held(path: Path) -> bool:
+    """Somebody has this lock; the file alone may be left from a process that died."""
+    try:
+        import fcntl
+    except ImportError:
+        return path.exists()
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def is_alive(pid: int) -> bool:
+    """A process with this id exists. On Windows always true: asking would interrupt it."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
+
+
+def program_name() -> str:
+    """What this process calls itself, for the message that somebody else gets."""
+    path = Path(sys.argv[0] if sys.argv else "")
+    name = path.parent.name if path.name == "__main__.py" else path.name
+    return name if name not in ("", "-c", "-m") else Path(sys.executable or "python").name
+
+
+def busy(port: str, owner: Owner | None) -> PortBusy:
+    """The error for a port that somebody else holds."""
+    if owner is None:
+        who, pid = "another program", None
+    elif owner.pid == os.getpid():
+        who, pid = f"this very program (process {owner.pid})", owner.pid
+    else:
+        who, pid = f"process {owner.pid} ({owner.program})", owner.pid
+    advice = ADVICE.get(owner.program if owner else "", "close it there: a bus has one owner at a time")
+    error = PortBusy(f"{port} is held by {who}", advice=advice)
+    error.owner = pid
+    return error

@@ -1,0 +1,49 @@
+"""The page and the table say what the samples say, and say plainly what was not measured."""
+
+from __future__ import annotations
+
+import json
+
+from bench.figures import Spread
+from bench.report import Results, as_json, as_text, page, tables
+from bench.rounds import Sample
+from bench.startup import Cost
+from bench.workloads import WORKLOADS
+
+MACHINE = {"processor": "A processor", "cores": "2", "system": "Linux", "python": "CPython"}
+RESULTS = Results(
+    machine=MACHINE,
+    exchanges=100,
+    rounds=1,
+    wire=[
+        Sample(0, name, workload, seconds, 5e-5)
+        for name, seconds in (("motorbus", 1e-5), ("other", 4e-5))
+        for workload in WORKLOADS
+    ],
+    memory=[Sample(0, "motorbus", workload, 2.5e-6, 2.5e-6) for workload in WORKLOADS],
+    calls=None,
+    starts=[Cost("import motorbus", Spread(0.0123, 0.01, 0.02), 42, ())],
+    missing=[],
+)
+
+
+def test_the_table_has_cost_ratio_and_what_is_missing() -> None:
+    first = as_text(tables(RESULTS)[0])
+    other = next(line for line in first.splitlines() if line.strip().startswith("other"))
+    assert "40.0" in other
+    assert "0.25 (0.25 – 0.25)" in other
+    assert "not measured" in other
+
+
+def test_the_page_holds_every_table() -> None:
+    text = page(RESULTS)
+    assert all(f"### {name}:" in text for name in WORKLOADS)
+    assert "| import motorbus | 12.3 | 10.0 – 20.0 | 42 | none |" in text
+    assert "A processor with 2 cores" in text
+
+
+def test_the_json_has_every_sample() -> None:
+    document = json.loads(as_json(RESULTS))
+    assert len(document["wire"]) == 2 * len(WORKLOADS)
+    assert document["wire"][0] == RESULTS.wire[0]._asdict()
+    assert document["system_calls"] is None

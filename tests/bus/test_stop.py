@@ -1,0 +1,242 @@
+"""The emergency stop goes through: idle, in mid-exchange, with a hung event loop, from another process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import stat
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motorbus.bus.pump import Bus
+from motorbus.bus.stop import ROUNDS, request_estop
+from motorbus.core.operation import Effect, Operation, Pause
+from motorbus.errors import Interrupted, LinkError, PortNotFound
+from motorbus.families.feetech import FAMILY
+from motorbus.link.memory import MemoryLink
+from tests.bus.responder import Responder, async_bus, memory_bus, position, positions, write
+from tests.bus.script import admit_all
+
+TORQUE = 40
+
+
+def torque_offs(responder: Responder) -> list[int]:
+    """The ids to which torque-off was sent, in order."""
+    return [p.id for p in responder.heard if p.parameters[:2] == bytes([TORQUE, 0])]
+
+
+def known(bus: Bus, *nodes: int) -> None:
+    for node in nodes:
+        bus.run(position(node))
+
+
+def test_a_stop_is_broadcast_then_acknowledged_by_every_known_node() -> None:
+    bus, responder = memory_bus()
+    known(bus, 1, 2, 3)
+    outcome = bus.estop()
+    assert torque_offs(responder) == [254, 1, 2, 3]
+    assert outcome.acknowledged == (1, 2, 3)
+    assert outcome.silent == ()
+    assert outcome.rounds == 1
+    assert outcome.promise
+
+
+def test_a_node_that_does_not_acknowledge_is_asked_five_times_and_named() -> None:
+    bus, responder = memory_bus()
+    known(bus, 1, 2)
+    responder.dead = {2}
+    outcome = bus.estop()
+    assert outcome.acknowledged == (1,)
+    assert outcome.silent == (2,)
+    assert torque_offs(responder).count(2) == ROUNDS
+    assert torque_offs(responder).count(1) == 1
+
+
+def test_it_is_latched_until_reset_and_reading_goes_on() -> None:
+    bus, _ = memory_bus()
+    known(bus, 1)
+    bus.estop()
+    with pytest.raises(Interrupted, match="reset"):
+        bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+    assert bus.run(position(1)) == 1
+    bus.reset()
+    bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+
+
+def test_a_second_stop_is_as_good_as_the_first() -> None:
+    bus, responder = memory_bus()
+    known(bus, 1)
+    bus.estop()
+    assert bus.estop().acknowledged == (1,)
+    assert torque_offs(responder) == [254, 1, 254, 1]
+
+
+def test_a_stop_in_the_middle_of_an_operation_ends_it_and_lets_it_clean_up() -> None:
+    bus, responder = memory_bus(virtual=False)
+    known(bus, 1)
+    begun = threading.Event()
+
+    def endless() -> Operation[None]:
+        try:
+            while True:
+                yield from write(1, 42, 7, Effect.MOTION)
+                begun.set()
+                yield from Pause(0.001)
+        finally:
+            yield from write(1, 55, 1, Effect.PERSISTENT)
+
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            bus.run(endless())
+        except Interrupted as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    assert begun.wait(10)
+    outcome = bus.estop()
+    thread.join(10)
+    assert not thread.is_alive()
+    assert outcome.acknowledged == (1,)
+    assert len(errors) == 1
+    after = [p.parameters[0] for p in responder.heard]
+    assert 42 not in after[after.index(TORQUE) :], "no motion after the stop"
+    assert after[-1] == 55, "the clean-up follows the stop"
+    bus.close()
+
+
+def test_a_hung_event_loop_does_not_hold_the_stop() -> None:
+    stopped = threading.Event()
+
+    async def main() -> None:
+        bus, responder = async_bus(virtual=False)
+        async with bus:
+            await bus.run(position(1))
+            await bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+
+            def stop() -> None:
+                assert bus.estop().acknowledged == (1,)
+                stopped.set()
+
+            threading.Thread(target=stop).start()
+            limit = time.monotonic() + 20
+            while not stopped.is_set() and time.monotonic() < limit:
+                sum(range(1000))  # the loop does not come round
+            assert stopped.is_set()
+            assert torque_offs(responder) == [254, 1]
+
+    asyncio.run(main())
+
+
+def test_the_stop_thread_sleeps_from_the_first_torque_command_on_and_ends_with_the_bus() -> None:
+    bus, _ = memory_bus(virtual=False)
+
+    def threads() -> list[str]:
+        return [thread.name for thread in threading.enumerate() if thread.name == "motorbus stop"]
+
+    known(bus, 1)
+    assert threads() == []
+    bus.run(write(1, TORQUE, 0, Effect.TORQUE))
+    assert threads() == ["motorbus stop"]
+    bus.close()
+    assert threads() == []
+
+
+def served(path: Path) -> tuple[Bus, Responder]:
+    responder = Responder()
+    bus = Bus(MemoryLink(responder, virtual=False), FAMILY, admit=admit_all, stop_socket=path)
+    known(bus, 1)
+    bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+    return bus, responder
+
+
+def test_another_process_can_stop_the_bus(tmp_path: Path) -> None:
+    path = tmp_path / "stop"
+    bus, responder = served(path)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    script = "import sys; from pathlib import Path; from motorbus.bus.stop import request_estop; "
+    script += "print(request_estop(Path(sys.argv[1])).acknowledged)"
+    source = str(Path(sys.modules["motorbus"].__file__ or "").parent.parent)
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)],
+        env={"PYTHONPATH": source},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout.strip() == "(1,)", done.stderr
+    assert torque_offs(responder)[-2:] == [254, 1]
+    with pytest.raises(Interrupted):
+        bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+    bus.close()
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("garbage", [b"", b"\n", b"hello\n", b"\xff" * 4096])
+def test_what_is_not_a_request_stops_nothing(tmp_path: Path, garbage: bytes) -> None:
+    path = tmp_path / "stop"
+    bus, responder = served(path)
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(10)
+        client.connect(str(path))
+        client.sendall(garbage)
+        client.shutdown(socket.SHUT_WR)
+        with contextlib.suppress(ConnectionResetError):
+            assert client.recv(10) == b""
+    assert torque_offs(responder) == []
+    assert request_estop(path).acknowledged == (1,), "and the stop still works"
+    bus.close()
+
+
+def test_where_nobody_serves_the_request_says_so(tmp_path: Path) -> None:
+    with pytest.raises(PortNotFound, match="no motorbus process"):
+        request_estop(tmp_path / "nobody")
+
+
+def test_a_lost_link_does_not_hang_the_stop() -> None:
+    bus, _ = memory_bus(virtual=False)
+    known(bus, 1)
+    bus.run(write(1, TORQUE, 0, Effect.TORQUE))
+    link: Any = bus.link
+    link.unplug()
+    outcome = bus.estop()
+    assert outcome.silent == (1,)
+    with pytest.raises(LinkError):
+        bus.run(position(1))
+    bus.close()
+
+
+def test_garbage_on_the_line_does_not_hold_the_stop() -> None:
+    bus, responder = memory_bus()
+    known(bus, 1, 2)
+
+    def babble(to: float) -> list[tuple[float, Any]]:
+        return [(to, b"\xff\xaa" * 50), *Responder.advance(responder, to)]
+
+    responder.advance = babble  # type: ignore[method-assign]
+    responder.due = lambda: bus.link.now() + 0.001  # type: ignore[method-assign]
+    outcome = bus.estop()
+    assert torque_offs(responder)[0] == 254
+    assert set(outcome.acknowledged) | set(outcome.silent) == {1, 2}
+
+
+def test_a_stop_works_from_every_state() -> None:
+    bus, responder = memory_bus()
+    assert bus.estop().promise, "nobody known: broadcast only"
+    assert torque_offs(responder) == [254]
+    bus.reset()
+    bus.run(positions(1, 2))
+    responder.dead = {1}
+    with pytest.raises(Exception, match="did not answer"):
+        bus.run(position(1))
+    responder.dead = set()
+    assert set(bus.estop().acknowledged) == {1, 2}, "after a timeout"

@@ -1,0 +1,79 @@
+"""Which families are judged here, and where their vectors lie.
+
+Every family that discovery finds, and the template, which is out of tree and is loaded from its folder as its own
+pyproject says, without being installed. So whoever installs a family beside motorbus has it judged as well.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from motorbus import families
+from motorbus.core.family import Family
+from motorbus.core.operation import CanFrame, Data
+
+ROOT = Path(__file__).resolve().parents[2]
+TEMPLATE = ROOT / "examples" / "family_template"
+VECTORS = ROOT / "tests" / "vectors"
+
+
+class Vector(NamedTuple):
+    """A frame whose meaning is known from outside this project."""
+
+    id: str
+    data: Data
+    direction: str
+    valid: bool
+    source: str
+
+
+def template_entry_points() -> list[EntryPoint]:
+    """The families that the template's own pyproject declares."""
+    with (TEMPLATE / "pyproject.toml").open("rb") as file:
+        declared = tomllib.load(file)["project"]["entry-points"][families.GROUP]
+    return [EntryPoint(name, value, families.GROUP) for name, value in declared.items()]
+
+
+def _found() -> dict[str, tuple[Family, str]]:
+    if str(TEMPLATE) not in sys.path:
+        sys.path.insert(0, str(TEMPLATE))
+    outside = {point.name: point for point in (*template_entry_points(), *entry_points(group=families.GROUP))}
+    found = {name: (point.load(), point.module) for name, point in outside.items()}
+    for name in set(families.names()) - set(outside):
+        found[name] = families.load(name), f"motorbus.families.{name}"
+    return found
+
+
+_FOUND = _found()
+
+FAMILIES: dict[str, Family] = {name: family for name, (family, _) in sorted(_FOUND.items())}
+"""Every family that is judged, by name."""
+PACKAGES: dict[str, str] = {name: package for name, (_, package) in _FOUND.items()}
+"""The package that each comes from."""
+
+
+def vectors(name: str) -> list[Vector]:
+    """In tests/vectors/FAMILY, or in a folder `vectors` beside the package of a family from outside."""
+    package = import_module(PACKAGES[name])
+    beside = Path(str(package.__file__)).parents[1] / "vectors"
+    files = [file for folder in (VECTORS / name, beside) for file in sorted(folder.glob("*.json"))]
+    return [_vector(one) for file in files for one in json.loads(file.read_text(encoding="utf-8"))]
+
+
+def _vector(one: dict[str, Any]) -> Vector:
+    data: Data = bytes.fromhex(one["hex"])
+    if "can_id" in one:
+        identifier = int(one["can_id"], 16)
+        data = CanFrame(identifier, bytes(data), extended=identifier > 0x7FF)
+    return Vector(one["id"], data, one["direction"], one["verdict"] == "valid", one["source"])
+
+
+def payload(data: Data) -> bytes:
+    """What a receiver's event holds of it: the whole frame, or the data field of a CAN frame."""
+    return data.data if isinstance(data, CanFrame) else data

@@ -1,0 +1,219 @@
+"""A simulated bus with everything around it, and operations carried out one step at a time.
+
+All parts are the real ones: bus, gate, memory link, simulator. What a test does to them (an interruption, another
+frame than the one sent) it does at their joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Protocol, cast
+
+from motorbus.bus.aio import AsyncBus
+from motorbus.bus.pump import Bus
+from motorbus.core.entry import Entry, Table
+from motorbus.core.family import Family
+from motorbus.core.operation import Alone, CanFrame, Data, Effect, Exchange, Operation, Runnable, Step, Together
+from motorbus.link.base import Line
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+
+IDS = (1, 2, 3)
+
+
+class Memory(Protocol):
+    """The raw value of every row of a simulated device."""
+
+    def __getitem__(self, name: str, /) -> int: ...
+
+
+class World:
+    """A simulated bus of one family. `events` are what operations reported."""
+
+    def __init__(
+        self,
+        family: Family,
+        *,
+        ids: tuple[int, ...] = IDS,
+        line: Line | None = None,
+        link: type[MemoryLink] = MemoryLink,
+    ) -> None:
+        self.family = family
+        self.ids = ids
+        self.simulator = family.simulator(ids)
+        self.link = link(self.simulator, rate=family.link.rate, line=line)
+        self.events: list[object] = []
+        self.bus = Bus(self.link, family, admit=Gate(), report=self.events.append)
+
+    def async_bus(self) -> AsyncBus:
+        """A second face on the same link; use one of the two at a time."""
+        return AsyncBus(self.link, self.family, admit=Gate(), report=self.events.append)
+
+    def device(self, node: int) -> Any:
+        """The verbs of one device."""
+        return self.family.devices.blocking(self.bus, node)
+
+    def memory(self, node: int) -> Memory:
+        """What the simulated device holds."""
+        return cast("Memory", cast("Any", self.simulator.nodes[node]).memory)
+
+    def table(self, node: int) -> Table:
+        """The table the device says it has."""
+        return self.family.tables[self.bus.run(self.family.identify(node)).table]
+
+    def settings(self) -> dict[int, dict[str, int]]:
+        """Everything that a host could have changed, of all devices."""
+        tables = list(self.family.tables.values())
+        return {
+            node: {name: self.memory(node)[name] for table in tables for name in _writable(table)}
+            for node in self.simulator.nodes
+        }
+
+    def close(self) -> None:
+        """Give the port back."""
+        self.bus.close()
+
+
+def _writable(table: Table) -> list[str]:
+    return [row.name for row in table.values() if row.writable]
+
+
+@contextmanager
+def world(family: Family, **options: Any) -> Iterator[World]:
+    """A world, closed at the end."""
+    made = World(family, **options)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+@contextmanager
+def sent(bus: Bus) -> Iterator[list[Data]]:
+    """Fills with what leaves meanwhile."""
+    frames: list[Data] = []
+    subscription = bus.trace.subscribe(limit=1_000_000)
+    try:
+        yield frames
+    finally:
+        bus.trace.unsubscribe(subscription)
+        frames += [record.data for record in subscription if record.direction == "tx"]
+
+
+def said(device: Any, verb: str, *arguments: object, **named: object) -> Runnable[Any]:
+    """The operation behind a verb of a device, not yet begun."""
+    return cast("Runnable[Any]", getattr(type(device), verb).function(device, *arguments, **named))
+
+
+def has(family: Family, verb: str) -> bool:
+    """Whether the devices of this family have this verb."""
+    return hasattr(family.devices.blocking, verb)
+
+
+def locks(family: Family) -> list[Entry]:
+    """The rows named `lock`: what a guarded sequence opens and must close. Their choices say which is which."""
+    return [table["lock"] for table in family.tables.values() if "lock" in table]
+
+
+def closed(lock: Entry) -> int:
+    """The value that a lock has when it is closed."""
+    values = [value for value, meaning in lock.choices.items() if meaning.startswith("closed")]
+    assert len(values) == 1, "the choices of a lock say which value is closed"
+    return values[0]
+
+
+def kept(table: Table) -> list[Entry]:
+    """The rows that a plain write by name keeps in EEPROM, by a guarded sequence."""
+    rows = [row for row in table.values() if row.writable and not row.protected and row.name != "lock"]
+    return [row for row in rows if row.effect is Effect.PERSISTENT]
+
+
+def samples(row: Entry) -> list[int]:
+    """In-range raw values: both ends, what is next to them, what is next to 0, and some between."""
+    span = row.high - row.low
+    wanted = {row.low, row.low + 1, row.low + span // 3, row.low + span // 2, row.high - 1, row.high, -1, 0, 1}
+    if row.choices:
+        wanted &= set(row.choices) or wanted
+    return sorted(raw for raw in wanted if row.low <= raw <= row.high)
+
+
+class Cut(BaseException):
+    """An interruption that no code of ours has heard of."""
+
+
+class Steps:
+    """Carries out an operation step by step, each by the bus, and can cut it at any step.
+
+    `cut_at` counts steps from 0; `before` cuts in place of the step, else when it has been carried out and its
+    result is lost. `exchanges` are all that were carried out, `seen` is called after each step.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        *,
+        cut_at: int | None = None,
+        before: bool = True,
+        again: bool = False,
+        error: Callable[[], BaseException] = Cut,
+        seen: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.bus = bus
+        self.cut_at = cut_at
+        self.before = before
+        self.again = again
+        self.error = error
+        self.seen = seen
+        self.count = 0
+        self.cuts = 0
+        self.exchanges: list[Exchange[Any]] = []
+
+    def run(self, operation: Runnable[Any]) -> Any:
+        """The value of the operation; raises what it raises."""
+        generator: Operation[Any] = iter(operation) if isinstance(operation, Exchange) else operation
+        value: Any = None
+        failure: BaseException | None = None
+        while True:
+            try:
+                step = generator.send(value) if failure is None else generator.throw(failure)
+            except StopIteration as end:
+                return end.value
+            value, failure = None, None
+            try:
+                value = self._carried_out(step)
+            except BaseException as error:  # it is the operation's to deal with
+                failure = error
+
+    def _carried_out(self, step: Step) -> Any:
+        if isinstance(step, Alone):
+            return self.run(step.operation)
+        if isinstance(step, Together):
+            return [self.run(operation) for operation in step.operations]
+        number, self.count = self.count, self.count + 1
+        cuts = number == self.cut_at or (self.again and self.cuts == 1)
+        if cuts and self.before:
+            raise self._cut()
+        if isinstance(step, Exchange):
+            self.exchanges.append(step)
+        value = self.bus.run(iter(step))
+        self.seen()
+        if cuts:
+            raise self._cut()
+        return value
+
+    def _cut(self) -> BaseException:
+        self.cuts += 1
+        return self.error()
+
+
+def requests(world_: World, operation: Runnable[Any]) -> list[Data]:
+    """The frames that an operation sends."""
+    with sent(world_.bus) as frames:
+        world_.bus.run(operation)
+    return frames
+
+
+def is_same_frame(one: Data, other: Data) -> bool:
+    """Whether two frames are equal; a CAN frame never equals bytes."""
+    return isinstance(one, CanFrame) == isinstance(other, CanFrame) and one == other
