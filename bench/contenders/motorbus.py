@@ -56,15 +56,20 @@ class MemoryLink:
         """Nothing is open."""
 
 
+def _in_memory() -> Bus:
+    """A bus as `motorbus.open` would leave it, after the test of the echo."""
+    bus = Bus(MemoryLink(), feetech.FAMILY, admit=Gate())
+    test = feetech.FAMILY.echo_test()
+    bus.turns.expect_echo(test)
+    bus.run(test)
+    return bus
+
+
 class Motorbus:
     """Servos are prepared once, prepared exchanges kept, as a control loop would."""
 
     def __init__(self, port: str) -> None:
-        self.bus: Bus = (
-            Bus(MemoryLink(), feetech.FAMILY, admit=Gate())
-            if port == memory.PORT
-            else motorbus.open(f"feetech:{port},baud=1000000")
-        )
+        self.bus = _in_memory() if port == memory.PORT else motorbus.open(f"feetech:{port},baud=1000000")
         self.servos = [feetech.Servo(self.bus, node) for node in IDS]
         for servo in self.servos:
             servo.prepare()
@@ -77,14 +82,11 @@ class Motorbus:
         return self.bus.run(self.positions)
 
     def sync_write(self, prepared: list[float]) -> None:
-        self.bus.run(
-            feetech.sync_write(
-                {
-                    servo: {"goal_position": goal, "goal_time": 0.0, "goal_velocity": SPEED}
-                    for servo, goal in zip(self.servos, prepared, strict=True)
-                }
-            )
-        )
+        orders: dict[feetech.Node, dict[str, float]] = {
+            servo: {"goal_position": goal, "goal_time": 0.0, "goal_velocity": SPEED}
+            for servo, goal in zip(self.servos, prepared, strict=True)
+        }
+        self.bus.run(feetech.sync_write(orders))
 
     def cycle(self, prepared: list[float]) -> feetech.Positions:
         self.bus.run(feetech.sync_write_positions(self.servos, prepared))

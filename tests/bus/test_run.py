@@ -15,6 +15,7 @@ from motorbus.core.operation import (
     Pause,
     Progress,
     Report,
+    Runnable,
     Together,
     Tune,
     outcome,
@@ -101,9 +102,10 @@ def test_nothing_interleaves_with_an_operation_alone_not_even_a_sibling() -> Non
         yield from write(node, 22, 1)
 
     def siblings() -> Operation[None]:
-        yield from Together([Alone_(pair(1)), Alone_(pair(2)), position(3)])
+        operations: list[Runnable[object]] = [alone(pair(1)), alone(pair(2)), position(3)]
+        yield from Together(operations)
 
-    def Alone_(operation: Operation[None]) -> Operation[None]:  # noqa: N802
+    def alone(operation: Operation[None]) -> Operation[None]:
         yield from Alone(operation)
 
     bus.run(siblings())

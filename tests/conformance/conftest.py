@@ -1,30 +1,51 @@
-"""Runs each test once for every family, and each test of vectors once for every vector."""
+"""Runs each test once for every family it suits, and each test of vectors once for every vector.
+
+A test asks by name: `family`; `lockable`, a family whose EEPROM has a lock; `mover`, a family whose devices move;
+or a family together with one of its vectors, see `VECTORS`.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import pytest
 
 from tests.conformance.subjects import FAMILIES, Vector, vectors
-from tests.conformance.world import locks
+from tests.conformance.world import locks, moves
+
+
+def _is_reply(vector: Vector) -> bool:
+    return vector.valid and vector.direction == "status"
+
+
+def _is_request(vector: Vector) -> bool:
+    return vector.direction == "instruction"
+
+
+VECTORS: dict[str, Callable[[Vector], bool]] = {
+    "vector": lambda vector: True,
+    "reply": _is_reply,
+    "request_": _is_request,
+    "bad": lambda vector: not vector.valid,
+}
+"""Which vectors a test gets that asks by this name."""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    if "vector" in metafunc.fixturenames:
-        metafunc.parametrize(("family", "vector"), _vectors())
-    elif "lockable" in metafunc.fixturenames:
-        lockable = {name: family for name, family in FAMILIES.items() if locks(family)}
-        metafunc.parametrize("lockable", lockable.values(), ids=lockable)
-    elif "family" in metafunc.fixturenames:
-        metafunc.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+    for name, wanted in VECTORS.items():
+        if name in metafunc.fixturenames:
+            metafunc.parametrize(("family", name), _vectors(wanted))
+            return
+    for name, suits in {"lockable": locks, "mover": moves, "family": bool}.items():
+        if name in metafunc.fixturenames:
+            suitable = {key: family for key, family in FAMILIES.items() if suits(family)}
+            metafunc.parametrize(name, suitable.values(), ids=suitable)
 
 
-def _vectors() -> list[object]:
+def _vectors(wanted: Callable[[Vector], bool]) -> list[object]:
     return [
         pytest.param(family, vector, id=f"{name}-{vector.id}")
         for name, family in FAMILIES.items()
-        for vector in _distinct(vectors(name))
+        for vector in vectors(name)
+        if wanted(vector)
     ]
-
-
-def _distinct(found: list[Vector]) -> list[Vector]:
-    return list({(vector.id, vector.direction): vector for vector in found}.values())

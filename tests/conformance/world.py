@@ -6,7 +6,7 @@ frame than the one sent) it does at their joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol, cast
 
@@ -14,7 +14,7 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
-from motorbus.core.operation import Alone, CanFrame, Data, Effect, Exchange, Operation, Runnable, Step, Together
+from motorbus.core.operation import Alone, Data, Effect, Exchange, Operation, Runnable, Step, Together
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
@@ -111,6 +111,11 @@ def has(family: Family, verb: str) -> bool:
     return hasattr(family.devices.blocking, verb)
 
 
+def moves(family: Family) -> bool:
+    """Whether the devices of this family can be moved."""
+    return has(family, "move")
+
+
 def locks(family: Family) -> list[Entry]:
     """The rows named `lock`: what a guarded sequence opens and must close. Their choices say which is which."""
     return [table["lock"] for table in family.tables.values() if "lock" in table]
@@ -132,7 +137,17 @@ def kept(table: Table) -> list[Entry]:
 def samples(row: Entry) -> list[int]:
     """In-range raw values: both ends, what is next to them, what is next to 0, and some between."""
     span = row.high - row.low
-    wanted = {row.low, row.low + 1, row.low + span // 3, row.low + span // 2, row.high - 1, row.high, -1, 0, 1}
+    wanted = {
+        row.low,
+        row.low + 1,
+        row.low + span // 3,
+        row.low + span // 2,
+        row.high - 1,
+        row.high,
+        -1,
+        0,
+        1,
+    }
     if row.choices:
         wanted &= set(row.choices) or wanted
     return sorted(raw for raw in wanted if row.low <= raw <= row.high)
@@ -205,15 +220,3 @@ class Steps:
     def _cut(self) -> BaseException:
         self.cuts += 1
         return self.error()
-
-
-def requests(world_: World, operation: Runnable[Any]) -> list[Data]:
-    """The frames that an operation sends."""
-    with sent(world_.bus) as frames:
-        world_.bus.run(operation)
-    return frames
-
-
-def is_same_frame(one: Data, other: Data) -> bool:
-    """Whether two frames are equal; a CAN frame never equals bytes."""
-    return isinstance(one, CanFrame) == isinstance(other, CanFrame) and one == other

@@ -63,6 +63,12 @@ def test_a_raw_value_outside_its_range_is_refused(raw: int) -> None:
         PLAIN.encode(raw)
 
 
+def test_bits_above_the_sign_are_no_part_of_the_number() -> None:
+    load = changed(SIGNED, sign_bit=10, low=-1000, high=1000)
+    assert load.decode(b"\x64\xf4") == -100
+    assert load.decode(b"\x64\xf0") == 100
+
+
 def test_a_magnitude_never_spills_into_the_sign_bit() -> None:
     with pytest.raises(RequestError, match="out of range"):
         SIGNED.encode(32768)

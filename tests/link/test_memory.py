@@ -279,17 +279,21 @@ def test_a_fault_fires_and_changes_what_arrives(fault: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "expected"),
+    ("fault", "possible"),
     [
-        ("loss", []),
-        ("duplicate", [b"abcd", b"abcd"]),
-        ("lose_byte", [b"acd"]),
-        ("double_byte", [b"abbcd"]),
+        ("loss", [[]]),
+        ("duplicate", [[b"abcd", b"abcd"]]),
+        ("lose_byte", [[b"bcd"], [b"acd"], [b"abd"], [b"abc"]]),
+        ("double_byte", [[b"aabcd"], [b"abbcd"], [b"abccd"], [b"abcdd"]]),
     ],
 )
-def test_what_a_fault_does(fault: str, expected: list[Data]) -> None:
+def test_what_a_fault_does(fault: str, possible: list[list[Data]]) -> None:
     line = NoisyLine(3, **{fault: 1.0})  # type: ignore[arg-type]
-    assert [delivery.data for delivery in line.carry(Side.DEVICE, b"abcd", 0.0)] == expected
+    seen: list[list[Data]] = []
+    for _ in range(100):
+        seen.append([delivery.data for delivery in line.carry(Side.DEVICE, b"abcd", 0.0)])
+    assert all(arrived in possible for arrived in seen)
+    assert all(arrived in seen for arrived in possible)
 
 
 def test_corruption_changes_exactly_one_byte() -> None:
@@ -320,8 +324,17 @@ def test_a_frame_without_data_passes() -> None:
     assert line.fired == []
 
 
-def test_a_late_packet_is_overtaken() -> None:
+def test_a_late_packet_holds_up_what_follows() -> None:
     line = NoisyLine(1, late=1.0, late_by=(0.1, 0.2))
+    [late] = line.carry(Side.DEVICE, b"late", 0.0)
+    line.late = 0.0
+    [next_one] = line.carry(Side.DEVICE, b"next", 0.05)
+    assert 0.1 <= late.at <= 0.2
+    assert next_one.at == late.at
+
+
+def test_a_late_packet_can_be_overtaken() -> None:
+    line = NoisyLine(1, late=1.0, late_by=(0.1, 0.2), overtake=True)
     [late] = line.carry(Side.DEVICE, b"late", 0.0)
     line.late = 0.0
     [next_one] = line.carry(Side.DEVICE, b"next", 0.05)

@@ -98,8 +98,12 @@ def test_several_on_one_byte_in_the_order_of_the_script() -> None:
     assert carried(asked("exchange 1 byte 5: corrupt 01; exchange 1 byte 5: duplicate")) == [
         (0.0, "FF FF 01 02 00 FD FD")
     ]
-    assert carried(asked("exchange 1 byte 5: drop; exchange 1 byte 5: insert 11")) == [(0.0, "FF FF 01 02 00 11")]
-    assert carried(asked("exchange 1 byte 5: drop; exchange 1 byte 5: corrupt 11")) == [(0.0, "FF FF 01 02 00")]
+    assert carried(asked("exchange 1 byte 5: drop; exchange 1 byte 5: insert 11")) == [
+        (0.0, "FF FF 01 02 00 11")
+    ]
+    assert carried(asked("exchange 1 byte 5: drop; exchange 1 byte 5: corrupt 11")) == [
+        (0.0, "FF FF 01 02 00")
+    ]
 
 
 def test_the_same_fault_twice_happens_twice() -> None:
@@ -169,7 +173,9 @@ def test_a_printed_script_is_the_script(script: list[Fault]) -> None:
 
 
 @given(st.lists(faults, max_size=20), st.lists(st.binary(min_size=1, max_size=20), max_size=10))
-def test_what_is_not_due_is_carried_and_what_fired_is_not_pending(script: list[Fault], traffic: list[bytes]) -> None:
+def test_what_is_not_due_is_carried_and_what_fired_is_not_pending(
+    script: list[Fault], traffic: list[bytes]
+) -> None:
     line = ScriptedLine(script)
     for data in traffic:
         line.carry(Side.HOST, data, 0.0)

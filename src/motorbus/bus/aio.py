@@ -52,8 +52,8 @@ class AsyncBus(BusFace):
                 while not run.advance():
                     await self._turn(news)
                 break
-            except GeneratorExit as end:  # nobody will await us again: clean up here and now
-                run.interrupt(end)
+            except GeneratorExit:  # nobody will await us again: clean up here and now
+                run.interrupt(asyncio.CancelledError())
                 while not run.advance():
                     crank(self.link, self.turns, inf)
                 raise

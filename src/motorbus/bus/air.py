@@ -67,7 +67,8 @@ class Air:
 
     def _launch(self, flight: Flight, now: float) -> Data:
         exchange = flight.exchange
-        echo_checked = flight.spoiled == "echo" or flight.echo_checked
+        suspected = flight.spoiled == "echo" or flight.echo_checked
+        echo_checked = suspected and self.echo.present is False
         flight.reset()
         flight.echo_checked = echo_checked
         self.trust.ask(exchange, now)
@@ -243,10 +244,9 @@ class Air:
         self._landed()
 
     def _echo_settled(self, flight: Flight) -> None:
-        """A test of the echo has ended, and none came before its answer or its silence."""
-        if self.echo.present is None and (
-            flight.parent is not None or flight.exchange is self._echo_exchange
-        ):
+        """A test of the echo has ended: nothing but its answer came, or nothing at all."""
+        test = flight.parent is not None or flight.exchange is self._echo_exchange
+        if test and self.echo.present is None and not flight.noise:
             self.echo.excluded()
 
     def _believe(self, flight: Flight, answer: Answer, now: float) -> None:

@@ -116,4 +116,4 @@ class Trust:
         trust = self.of(node)
         trust.silent += 1
         trust.quiet_until = now
-        trust.probe_at = now + min(quiet * 2.0**trust.silent, LONGEST_BACK_OFF)
+        trust.probe_at = now + min(quiet * 2.0 ** min(trust.silent, 10), LONGEST_BACK_OFF)

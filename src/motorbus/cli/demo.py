@@ -17,7 +17,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import faces, scan
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
-from motorbus.cli.simulate import Simulated
+from motorbus.cli.simulated import Simulated
 from motorbus.cli.target import face, nobody, opened
 from motorbus.core import units
 from motorbus.errors import MotorbusError, RequestError
@@ -89,7 +89,7 @@ def demo(
     family = next((name for name in faces.names() if faces.offer(name, "Train")), "")
     output.simulated = True
     with _served(family, ids, output) as bus, opened(bus, {}, output) as opening:
-        found = _found(opening, nodes, output)
+        found = _found(bus, opening, nodes, output)
         _introduce(opening, found, output)
         course = _moved(opening, nodes, duration, output)
     picture = _drawn(output_, course, found, output)
@@ -106,15 +106,13 @@ def _served(family: str, ids: str, output: Output) -> Iterator[str]:
             yield simulated.bus
 
 
-def _found(opening: Bus, nodes: Sequence[int], output: Output) -> list[Found]:
+def _found(bus: str, opening: Bus, nodes: Sequence[int], output: Output) -> list[Found]:
     """Ask the ids that are there, and some that are not, as a real scan would."""
     asked = tuple(range(max(nodes) + 10))
     with output.progress("scanning") as bar:
-        found = opening.run(
-            opening.family.scan(asked), report=lambda event: scan.listen(event, [], bar)
-        )
+        found = opening.run(opening.family.scan(asked), report=lambda event: scan.listen(event, [], bar))
     if not found:
-        raise nobody(opening)
+        raise nobody(bus)
     return found
 
 
@@ -122,8 +120,14 @@ def _introduce(opening: Bus, found: Sequence[Found], output: Output) -> None:
     rows = []
     for one in found:
         state = face(opening, one.node).telemetry()
-        measured = (("position", state.position), ("voltage", state.voltage), ("temperature", state.temperature))
-        rows.append((*scan.row(one), *("" if value is None else units.show(value, name) for name, value in measured)))
+        measured = (
+            ("position", state.position),
+            ("voltage", state.voltage),
+            ("temperature", state.temperature),
+        )
+        rows.append(
+            (*scan.row(one), *("" if value is None else units.show(value, name) for name, value in measured))
+        )
     output.table("Found", [*scan.COLUMNS, ">position", ">voltage", ">temperature"], rows)
 
 
@@ -147,7 +151,9 @@ def _loop(opening: Bus, train: Any, duration: float, bar: Bar) -> Course:
     course = Course([], [[] for _ in nodes], [[] for _ in nodes], train.air_time(list(first.values())))
     began = opening.link.now()
     while (now := opening.link.now() - began) < duration:
-        goals = [start + _wave(now, duration, index / len(nodes)) for index, start in enumerate(first.values())]
+        goals = [
+            start + _wave(now, duration, index / len(nodes)) for index, start in enumerate(first.values())
+        ]
         opening.run(train.goals(goals))
         presents = opening.run(train.positions).values
         _note(course, opening.link.now() - began, goals, [presents.get(node) for node in nodes])
@@ -158,7 +164,9 @@ def _loop(opening: Bus, train: Any, duration: float, bar: Bar) -> Course:
 
 def _wave(now: float, duration: float, phase: float) -> float:
     """A sine that grows from rest and dies to rest; every device a part of a turn later than the one before."""
-    return AMPLITUDE * _grown(now) * _grown(duration - now) * math.sin(math.tau * (FREQUENCY * now - phase / 2))
+    return (
+        AMPLITUDE * _grown(now) * _grown(duration - now) * math.sin(math.tau * (FREQUENCY * now - phase / 2))
+    )
 
 
 def _grown(since: float) -> float:

@@ -16,6 +16,7 @@ from motorbus.motion.safety import Gate
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
+    from motorbus.core.family import Explanation
     from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
@@ -86,10 +87,16 @@ class DryBus:
 
 def show(dry: DryBus, output: Output) -> None:
     """Print what was withheld, each frame explained."""
-    explained = [one for frame in dry.frames for one in dry.family.explain(frame)]
-    facts = [{"data": one.data.hex(" ").upper(), "title": one.title} for one in explained]
+    explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.family.explain(frame)]
+    facts = [{"data": one.data.hex(" ").upper(), "meaning": meaning} for one, meaning in explained]
     output.document("motorbus.dry-run/1", {"withheld": facts})
-    for one in explained:
-        output.text(f"would send {one.data.hex(' ').upper()}")
-        meaning = "; ".join(f"{part.name} {part.meaning}" for part in one.parts[3:-1])
-        output.text(f"           {one.title}: {meaning}" if meaning else f"           {one.title}")
+    for one, meaning in explained:
+        output.text(f"would send {one.data.hex(' ').upper()}\n           {meaning}")
+
+
+def _meaning(one: Explanation) -> str:
+    """What a frame of ours says; who it could come from besides, and how it is framed, is left to `decode`."""
+    names = [part.name for part in one.parts]
+    start = names.index("instruction") + 1 if "instruction" in names else 0
+    parts = [f"{part.name} {part.meaning}" for part in one.parts[start:] if part.name != "checksum"]
+    return "; ".join([one.title.partition(" (or ")[0], *parts])

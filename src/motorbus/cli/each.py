@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from enum import Enum
+from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.target import able, everyone, face, gathered, opened
@@ -17,29 +18,27 @@ if TYPE_CHECKING:
 
 def each(what: str, verb: str, devices: tuple[str, ...], options: Mapping[str, str], output: Output) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked."""
-    results: dict[tuple[str, int], MotorbusError | None] = {}
+    results: list[dict[str, Any]] = []
+    errors: list[MotorbusError] = []
     for name, nodes in gathered(devices).items():
         with opened(name, options, output) as bus:
-            for node in everyone(bus, nodes):
-                results[name, node] = _tried(bus, node, verb)
-    rows = [
-        {"bus": bus, "id": node, "done": error is None, **({"error": error.summary} if error else {})}
-        for (bus, node), error in results.items()
-    ]
-    output.document(f"motorbus.{verb}/1", {"devices": rows})
-    shown = [(f"{row['bus']}#{row['id']}", what if row["done"] else row["error"]) for row in rows]
+            for node in everyone(name, bus, nodes):
+                results.append({"bus": name, "id": node, **_tried(bus, node, verb, errors)})
+    output.document(f"motorbus.{verb}/1", {"devices": results})
+    shown = [(f"{one['bus']}#{one['id']}", one.get("error") or one.get("promise") or what) for one in results]
     output.table("", ["device", "result"], shown)
-    return _verdict([error for error in results.values() if error], len(results))
+    return _verdict(errors, len(results))
 
 
-def _tried(bus: Bus, node: int, verb: str) -> MotorbusError | None:
+def _tried(bus: Bus, node: int, verb: str, errors: list[MotorbusError]) -> dict[str, Any]:
     try:
-        able(face(bus, node), verb)()
+        promise = able(face(bus, node), verb)()
     except LinkError:
         raise
     except MotorbusError as error:
-        return error
-    return None
+        errors.append(error)
+        return {"done": False, "error": error.summary}
+    return {"done": True, **({"promise": promise.value} if isinstance(promise, Enum) else {})}
 
 
 def _verdict(errors: list[MotorbusError], visited: int) -> Exit:

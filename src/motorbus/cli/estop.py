@@ -55,7 +55,9 @@ def estop(
     output.document("motorbus.estop/1", {"buses": stops})
     for one in stops:
         output.text(f"{one['bus']}: {one['error'] or one['promise']}")
-        output.text(f"  by {one['by']}; acknowledged: {_list(one['acknowledged'])}; silent: {_list(one['silent'])}")
+        output.text(
+            f"  by {one['by']}; acknowledged: {_list(one['acknowledged'])}; silent: {_list(one['silent'])}"
+        )
     return _verdict(stops)
 
 
@@ -110,7 +112,9 @@ def _stop_all() -> list[dict[str, Any]]:
         try:
             stops.append(_facts(owner.port, by, _ask(owner.port)))
         except MotorbusError as error:
-            stops.append({"bus": owner.port, "by": by, "acknowledged": [], "silent": [], "error": error.summary})
+            stops.append(
+                {"bus": owner.port, "by": by, "acknowledged": [], "silent": [], "error": error.summary}
+            )
     return stops
 
 
@@ -133,7 +137,9 @@ def _verdict(stops: list[dict[str, Any]]) -> Exit:
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
     if failed and len(failed) == len(stops):
         raise MotorbusError("; ".join(failed))
-    silent = [f"{one['bus']}: no acknowledgement from {_list(one['silent'])}" for one in stops if one["silent"]]
+    silent = [
+        f"{one['bus']}: no acknowledgement from {_list(one['silent'])}" for one in stops if one["silent"]
+    ]
     if failed or silent:
         raise Partial("; ".join([*failed, *silent]), advice="cut the power by hand")
     return Exit.OK

@@ -101,10 +101,12 @@ def _move_together(
 def ping_everyone(bus: Bus) -> list[int]:
     """Who answers one broadcast PING. A hint only: the replies of several servos may collide."""
 
+    request = wire.encode_instruction(wire.BROADCAST, wire.Instruction.PING, broadcast=True)
+
     def read(answer: Answer) -> list[int]:
         return sorted({reply.data[2] for reply in answer.replies})
 
-    return bus.run(Exchange(wire.ping(wire.BROADCAST), ANY, read, rank=Rank.POLL))
+    return bus.run(Exchange(request, ANY, read, rank=Rank.POLL))
 
 
 # -- commands ------------------------------------------------------------------------------------------------

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import quantity
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.read import UNITS, state_facts
+from motorbus.cli.read import state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened
 from motorbus.core.operation import Pause
 from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
@@ -75,7 +74,7 @@ def _watched(
     found = {}
     for name, nodes in wanted.items():
         bus = stack.enter_context(opened(name, options, output))
-        for node in everyone(bus, nodes):
+        for node in everyone(name, bus, nodes):
             one = face(bus, node)
             able(one, "telemetry")
             found[name, node] = one
@@ -155,7 +154,18 @@ def _lines(sample: Sample, output: Output) -> None:
         output.draw(_grid(sample, output))
 
 
-COLUMNS = (">id", *(f">{name}" for name in UNITS), "moving", "alarm")
+COLUMNS = (
+    ">id",
+    ">position (rad)",
+    ">velocity (rad/s)",
+    ">load (%)",
+    ">current (A)",
+    ">voltage (V)",
+    ">temperature (°C)",
+    "moving",
+    "alarm",
+)
+_DIGITS = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltage": 1, "temperature": 0}
 
 
 def _grid(sample: Sample, output: Output) -> Any:
@@ -164,6 +174,10 @@ def _grid(sample: Sample, output: Output) -> Any:
 
 def _row(node: int, state: State | MotorbusError) -> tuple[object, ...]:
     if isinstance(state, MotorbusError):
-        return (node, *("" for _ in UNITS), "", state.summary)
-    values = (quantity.shown(getattr(state, name), unit) for name, unit in UNITS.items())
+        return (node, *("" for _ in _DIGITS), "", state.summary)
+    values = (_value(getattr(state, name), name) for name in _DIGITS)
     return (node, *values, "yes" if state.moving else "", ", ".join(state.alarm))
+
+
+def _value(value: float | None, name: str) -> str:
+    return "" if value is None else f"{100 * value if name == 'load' else value:.{_DIGITS[name]}f}"

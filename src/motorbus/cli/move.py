@@ -129,7 +129,7 @@ def _consent(bus: Bus, goals: Goals, output: Output, *, yes: bool) -> None:
     ways = {node: abs(goal - able(face(bus, node), "position")()) for node, goal in goals.items()}
     far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways.items() if way > FAR]
     if far:
-        output.consent(f"move {', '.join(far)}?", yes=yes)
+        output.consent(f"move {', '.join(far)}", yes=yes)
 
 
 def _move(bus: Bus | DryBus, goals: Goals, how: Mapping[str, Any]) -> None:

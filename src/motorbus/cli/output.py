@@ -79,6 +79,7 @@ class Output:
             box=box.SIMPLE_HEAD if terminal else None,
             pad_edge=False,
             header_style="bold" if terminal else "",
+            show_header=any(columns),
         )
         for name in columns:
             grid.add_column(name.removeprefix(">"), justify="right" if name.startswith(">") else "left")
@@ -100,12 +101,12 @@ class Output:
         with Progress(console=console(sys.stderr), transient=True) as shown:
             yield Bar(shown, shown.add_task(what, total=None))
 
-    def consent(self, question: str, *, yes: bool) -> None:
-        """Go on only if a person or `--yes` agrees. Raises NeedsConsent."""
-        if yes or (_can_ask() and _asked(question)):
+    def consent(self, what: str, *, yes: bool) -> None:
+        """Go on only if a person or `--yes` agrees to `what`, as "move #1 by 200 degrees". Raises NeedsConsent."""
+        if yes or (_can_ask() and _asked(f"{what}?")):
             return
         raise NeedsConsent(
-            f"refused: {question}", advice="say --yes if that is what you want; nothing was sent"
+            f"nobody agreed to this: {what}", advice="say --yes if that is what you want; nothing was sent"
         )
 
     def error(self, error: BaseException) -> None:

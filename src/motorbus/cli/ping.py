@@ -77,7 +77,7 @@ def _shout(opening: Bus, bus: str) -> list[dict[str, object]]:
         raise RequestError(f"{opening.family.name} buses have no broadcast ping", advice="nothing was sent")
     found = ping_everyone(opening)
     if not found:
-        raise nobody(opening)
+        raise nobody(bus)
     return [{"bus": bus, "id": node, "answers": True, "milliseconds": None} for node in found]
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
 from motorbus.cli.output import Output
+
+if TYPE_CHECKING:
+    from motorbus.link.adapters import PortInfo
 
 app = App(
     name="ports",
@@ -26,7 +29,7 @@ def ports(*, output: Annotated[Output, Parameter(parse=False)]) -> None:
     from motorbus.link import serial
 
     found = serial.ports()
-    output.document("motorbus.ports/1", {"ports": [port._asdict() for port in found]})
+    output.document("motorbus.ports/1", {"ports": [_facts(port) for port in found]})
     if not found:
         output.note("no serial port found; `motorbus demo` needs none")
         return
@@ -34,6 +37,10 @@ def ports(*, output: Annotated[Output, Parameter(parse=False)]) -> None:
         (port.device, _usb(port.vid, port.pid), port.description, port.guess, port.stable) for port in found
     ]
     output.table("Serial ports", ["device", "usb", "description", "looks like", "stable name"], rows)
+
+
+def _facts(port: PortInfo) -> dict[str, object]:
+    return {**port._asdict(), "description": port.description}
 
 
 def _usb(vid: int | None, pid: int | None) -> str:

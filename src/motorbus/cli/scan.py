@@ -27,7 +27,7 @@ Examples:
     motorbus scan feetech:/dev/ttyACM0
     motorbus scan feetech:/dev/ttyACM0 --ids 1-20 --baud 1000000,500000
     motorbus scan feetech:/dev/ttyACM0 --baud all
-    motorbus scan feetech:sim,ids=1-6 --json""",
+    motorbus scan feetech:sim,ids=1-6 --ids 1-9 --json""",
 )
 
 
@@ -62,11 +62,11 @@ def scan(
         found: list[Found] | None = None
         try:
             operation = opening.family.scan(asked, rates(baud, opening.family) or (opening.rate,))
-            found = opening.run(operation, report=lambda event: _listen(event, early, bar))
+            found = opening.run(operation, report=lambda event: listen(event, early, bar))
         finally:
             _show(bus, early if found is None else found, output)
         if not found:
-            raise nobody(opening)
+            raise nobody(bus)
     return Exit.OK
 
 
@@ -80,7 +80,7 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
     return tuple(int(word) for word in words)
 
 
-def _listen(event: object, found: list[Found], bar: Bar) -> None:
+def listen(event: object, found: list[Found], bar: Bar) -> None:
     if isinstance(event, Found):
         found.append(event)
         bar.say(f"#{event.node} answers at {event.rate} bit/s")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,18 +16,141 @@ from motorbus.cli.output import Output
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
+
+    from motorbus.core.family import Family
+    from motorbus.simulation.mount import Endpoint
 
 app = App(
     name="simulate",
     help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and removes
-its link and its control socket. Without --link and --tcp it names the
+its link and its control socket. Without --link and --tcp it says which
 pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
-login. `motorbus simulate FAMILY --help-switches` lists the switches.
+login. The control socket takes one order a line: status, power-cycle [ID],
+unplug ID, plug ID, help.
 
 Examples:
 
     motorbus simulate feetech --ids 1-6 --model sts3215 --link /tmp/arm
     motorbus simulate feetech --ids 1-6 --tcp 4000 --pace
-    motorbus simulate feetech --link /tmp/arm --control /tmp/arm.control""",
+    motorbus simulate feetech --link /tmp/arm --control /tmp/arm.control
+    motorbus simulate feetech --link /tmp/arm --switch broadcast_ping=in_turn
+    motorbus simulate feetech --switches""",
 )
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+
+@app.default
+def simulate(
+    family: str,
+    /,
+    *,
+    ids: str = "1",
+    model: str = "",
+    link: Path | None = None,
+    tcp: str = "",
+    pace: Flag = False,
+    baud: int = 0,
+    control: Path | None = None,
+    switch: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    switches: Flag = False,
+    output: Annotated[Output, Parameter(parse=False)],
+) -> Exit:
+    """Serve simulated devices on a pseudo-terminal or a socket.
+
+    Parameters
+    ----------
+    family
+        Whose devices, as feetech
+    ids
+        Their ids, as 1-6 or 1,4,7.
+    model
+        Their model; the usual one of the family when left out.
+    link
+        A symbolic link to make, which leads to the pseudo-terminal.
+    tcp
+        HOST:PORT or PORT, to serve a socket instead.
+    pace
+        Bytes take their time, as on a wire.
+    baud
+        The rate of the wire until a client sets one.
+    control
+        A local socket to make, which takes orders while it runs.
+    switch
+        NAME=VALUE, how the devices behave where real ones differ; may be repeated.
+    switches
+        List the switches of the family and end.
+    """
+    from motorbus import session
+    from motorbus.simulation.control import ControlSocket
+    from motorbus.simulation.mount import Mount
+
+    output.simulated = True
+    found = families.load(family)
+    if switches:
+        return _list(found, output)
+    simulator = found.simulator(session.parse_ids(ids), model, **_switched(switch))
+    rate = baud or found.link.rate
+    simulator.tune(rate)
+    with ExitStack() as stack:
+        stop = stack.enter_context(_until_signalled())
+        endpoint, port = _endpoint(stack, link, tcp)
+        controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
+        kind, paced = found.link.kind, rate if pace else None
+        mount = Mount(simulator, endpoint, pace=paced, rate=rate, kind=kind, attendants=controls)
+        nodes = sorted(simulator.nodes)
+        bus = f"{family}:{port}"
+        output.document(
+            "motorbus.simulate/1", {"bus": bus, "family": family, "ids": nodes, "pid": os.getpid()}
+        )
+        output.text(f"ready: {bus}  (simulated: {len(nodes)} {family} devices, ids {ids})")
+        mount.serve(stop)
+    return Exit.OK
+
+
+def _endpoint(stack: ExitStack, link: Path | None, tcp: str) -> tuple[Endpoint, str]:
+    """The open port, and what a host calls it."""
+    from motorbus.link.pty import PtyMaster
+    from motorbus.simulation.listener import TcpListener, parse_endpoint
+
+    if tcp and link:
+        raise RequestError("a bus is served on --link or on --tcp, not on both")
+    if tcp:
+        listener = stack.enter_context(closing(TcpListener(*parse_endpoint(tcp))))
+        return listener, listener.url
+    terminal = stack.enter_context(closing(PtyMaster()))
+    if link is None:
+        return terminal, terminal.slave_name
+    terminal.symlink(link)
+    return terminal, str(link)
+
+
+def _switched(texts: Sequence[str]) -> dict[str, str]:
+    pairs = [text.partition("=")[::2] for text in texts]
+    if not all(name and value for name, value in pairs):
+        raise RequestError(f"--switch {' '.join(texts)}: not NAME=VALUE", advice="--switches lists them")
+    return dict(pairs)
+
+
+def _list(family: Family, output: Output) -> Exit:
+    options = [(option.name, str(option.default), option.help) for option in family.link.options]
+    facts = [dict(zip(("name", "default", "help"), option, strict=True)) for option in options]
+    output.document("motorbus.switches/1", {"switches": facts})
+    output.table(f"Switches of {family.name}", ["switch", "default", "what it does"], options)
+    return Exit.OK
+
+
+@contextmanager
+def _until_signalled() -> Iterator[int]:
+    """A descriptor that turns readable at SIGINT or SIGTERM, which end nothing by themselves meanwhile."""
+    readable, writable = os.pipe()
+    names = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(name, lambda number, frame: os.write(writable, b"!") and None) for name in names]
+    try:
+        yield readable
+    finally:
+        for name, handler in zip(names, before, strict=True):
+            signal.signal(name, handler)
+        os.close(readable)
+        os.close(writable)

@@ -22,9 +22,22 @@ class Simulated:
     """
 
     def __init__(
-        self, family: str, *, ids: str = "1", link: Path | None = None, tcp: str = "", pace: bool = False, **more: str
+        self,
+        family: str,
+        *,
+        ids: str = "1",
+        link: Path | None = None,
+        tcp: str = "",
+        pace: bool = False,
+        **more: str,
     ) -> None:
-        words = [family, "--ids", ids, *(["--link", str(link)] if link else []), *(["--tcp", tcp] if tcp else [])]
+        words = [
+            family,
+            "--ids",
+            ids,
+            *(["--link", str(link)] if link else []),
+            *(["--tcp", tcp] if tcp else []),
+        ]
         words += ["--pace"] if pace else []
         words += [word for name, value in more.items() for word in (f"--{name}", value)]
         self._command = [sys.executable, "-m", "motorbus.cli", "simulate", *words, "--json"]

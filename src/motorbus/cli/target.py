@@ -110,18 +110,18 @@ def check_names(family: Family, names: Iterable[str]) -> None:
             tables[0][name]
 
 
-def everyone(bus: Bus, nodes: tuple[int, ...]) -> tuple[int, ...]:
+def everyone(name: str, bus: Bus, nodes: tuple[int, ...]) -> tuple[int, ...]:
     """The nodes that were named, or every node that answers at the present rate. Raises NoReply for none."""
     found = nodes or tuple(one.node for one in bus.run(bus.family.scan()))
     if not found:
-        raise nobody(bus)
+        raise nobody(name)
     return found
 
 
-def nobody(bus: Bus) -> NoReply:
+def nobody(bus: str) -> NoReply:
     """The error for a bus on which nobody answered."""
     return NoReply(
-        f"{bus.link.name}: no device answers at {bus.rate} bit/s",
+        f"{bus}: no device answers",
         cause="no power, a loose cable, or devices set to another rate",
-        advice=f"`motorbus scan {bus.family.name}:{bus.link.name} --baud all` looks at every rate",
+        advice=f"`motorbus scan {bus} --baud all` looks for every id at every rate",
     )

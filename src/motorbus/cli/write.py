@@ -129,7 +129,7 @@ def _permit(orders: Sequence[Order], output: Output, *, expert: bool, yes: bool)
         )
     kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
     if kept:
-        output.consent(f"write {', '.join(kept)} to EEPROM, where it survives power-off?", yes=yes)
+        output.consent(f"write {', '.join(kept)} to EEPROM, where it survives power-off", yes=yes)
 
 
 def _show(one: Any, orders: Sequence[Order], output: Output) -> None:

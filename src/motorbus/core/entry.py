@@ -103,7 +103,7 @@ class Entry:
         """Bytes -> raw value; a negative zero is 0. Any bytes of the right size have a raw value."""
         code = int.from_bytes(data, "little" if self.order == "little" else "big")
         if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
-            magnitude = code & ~(1 << self.sign_bit)
+            magnitude = code & (1 << self.sign_bit) - 1
             return -magnitude if code >> self.sign_bit & 1 else magnitude
         if self.coding is Coding.TWOS_COMPLEMENT and code >> (8 * self.size - 1):
             return code - (1 << 8 * self.size)

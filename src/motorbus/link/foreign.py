@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from motorbus.link.lock import Owner
+from motorbus.link.refusal import Owner
 
 MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
 TERMINALS = "/dev/pts/"
@@ -80,7 +80,12 @@ def _index(about: Path) -> str:
 
 
 def _program(process: Path) -> str:
+    """The name of its program; of its script when an interpreter runs one."""
     try:
-        return (process / "comm").read_text().strip()
+        words = (process / "cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
-        return "?"
+        words = []
+    name = Path(words[0]).name if words else ""
+    if name.startswith("python") and len(words) > 1 and not words[1].startswith("-"):
+        return Path(words[1]).name
+    return name or "?"

@@ -18,24 +18,13 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Self
 
-from motorbus.errors import LinkError, PortBusy
+from motorbus.errors import LinkError
+from motorbus.link.refusal import Owner, busy
 
 SOCKET_LIMIT = 107  # bytes of a path in struct sockaddr_un on Linux, the terminating zero not counted
 TRIES = 50  # each a millisecond: how long somebody who only looks may be in the way
-ADVICE = {
-    "ModemManager": "it tries every new adapter for a modem: wait half a minute, or set ID_MM_DEVICE_IGNORE for it",
-    "brltty": "it takes CH340 adapters for Braille displays: remove the package brltty",
-}
-
-
-class Owner(NamedTuple):
-    """A process that holds a port: its id, its program's name, and the port where it is known."""
-
-    pid: int
-    program: str
-    port: str = ""
 
 
 def state_folder() -> Path:
@@ -233,17 +222,3 @@ def program_name() -> str:
     path = Path(sys.argv[0] if sys.argv else "")
     name = path.parent.name if path.name == "__main__.py" else path.name
     return name if name not in ("", "-c", "-m") else Path(sys.executable or "python").name
-
-
-def busy(port: str, owner: Owner | None) -> PortBusy:
-    """The error for a port that somebody else holds."""
-    if owner is None:
-        who, pid = "another program", None
-    elif owner.pid == os.getpid():
-        who, pid = f"this very program (process {owner.pid})", owner.pid
-    else:
-        who, pid = f"process {owner.pid} ({owner.program})", owner.pid
-    advice = ADVICE.get(owner.program if owner else "", "close it there: a bus has one owner at a time")
-    error = PortBusy(f"{port} is held by {who}", advice=advice)
-    error.owner = pid
-    return error

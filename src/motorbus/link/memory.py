@@ -214,7 +214,8 @@ class NoisyLine:
     `loss` `duplicate`    the whole packet is lost, or comes twice
     `corrupt`             one byte is another one
     `lose_byte` `insert_byte` `double_byte`   one byte is missing, too many, or there twice (not in CAN frames)
-    `late`                it comes late by something within `late_by` (s), overtaken by what follows
+    `late`                it comes late by something within `late_by` (s), and so does all that follows it, because
+                          devices and adapters are first-in first-out; with `overtake` the rest passes it by
 
     `delay`   every packet comes up to this many seconds later, order kept
     `echo`    the host hears itself; its echo suffers the same faults; may be switched at any time
@@ -237,6 +238,7 @@ class NoisyLine:
         double_byte: float = 0.0,
         late: float = 0.0,
         late_by: tuple[float, float] = (0.02, 0.5),
+        overtake: bool = False,
         echo: bool = False,
         split: bool = False,
         gap: float = 0.0002,
@@ -247,6 +249,7 @@ class NoisyLine:
         self.duplicate = duplicate
         self.late = late
         self.late_by = late_by
+        self.overtake = overtake
         self.echo = echo
         self.split = split
         self.gap = gap
@@ -284,14 +287,14 @@ class NoisyLine:
     def _pieces(self, to: Side, data: Data, at: float) -> Iterator[Delivery]:
         is_late = self._strikes("late", self.late, to, data, at)
         if is_late:
-            moment = at + self._random.uniform(*self.late_by)
+            moment = max(at + self._random.uniform(*self.late_by), self._last[to])
         else:
             moment = max(at + self._random.uniform(0.0, self.delay), self._last[to])
             if moment > at:
                 self.fired.append(Fired(at, "delay", to, data))
         for piece in self._cut(to, self._damaged(to, data, at), at):
             yield Delivery(moment, to, piece)
-            if not is_late:
+            if not (is_late and self.overtake):
                 self._last[to] = moment
             moment += self._random.uniform(0.0, self.gap) if self.split else 0.0
 

@@ -68,7 +68,11 @@ class Fault:
             raise RequestError(f"fault {self}: impossible delay", expected=_TAKES["delay"])
 
     def __str__(self) -> str:
-        argument = {"corrupt": f" {self.value:02X}", "insert": f" {self.value:02X}", "delay": f" {self.seconds:g}"}
+        argument = {
+            "corrupt": f" {self.value:02X}",
+            "insert": f" {self.value:02X}",
+            "delay": f" {self.seconds:g}",
+        }
         where = f"exchange {self.exchange} byte {self.byte}{' to device' if self.to is Side.DEVICE else ''}"
         return f"{where}: {self.action}{argument.get(self.action, '')}"
 
@@ -83,7 +87,8 @@ def _fault(line: str) -> Fault:
     match = _FAULT.fullmatch(line)
     if match is None:
         raise RequestError(
-            f"{line!r} is not a fault", expected="for example `exchange 17 byte 3: drop` or `… to device: corrupt 80`"
+            f"{line!r} is not a fault",
+            expected="for example `exchange 17 byte 3: drop` or `… to device: corrupt 80`",
         )
     action, argument = match["action"], match["argument"]
     takes = _TAKES.get(action, "")

@@ -32,7 +32,7 @@ PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 ALL = 254
 
-Back: TypeAlias = bytes | Sequence[bytes] | None | BaseException
+Back: TypeAlias = bytes | Sequence[bytes] | BaseException | None
 
 
 class Line(NamedTuple):
@@ -170,7 +170,9 @@ class Played:
         replies = []
         for due in dues:
             replies += [Reply(0, due.key, f) for f in frames if f[2] == due.node and len(f) == due.length][:1]
-        assert sorted(frames) == sorted(reply.data for reply in replies), "a reply that is not due, or of wrong length"
+        assert sorted(frames) == sorted(reply.data for reply in replies), (
+            "a reply that is not due, or of wrong length"
+        )
         missing = tuple(due.node for due in dues if due.node not in {reply.data[2] for reply in replies})
         if len(dues) == 1 and missing:
             raise silence(exchange)

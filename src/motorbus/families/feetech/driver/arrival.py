@@ -19,8 +19,8 @@ POLL: Final = 0.02
 """s between two looks; leaves a bus at 1 Mbaud to others for nine tenths of the time and more."""
 PATIENCE: Final = 0.5
 """s without progress after which a servo counts as stalled."""
-PROGRESS: Final = 0.0031
-"""rad; two counts. Less than this is noise."""
+PROGRESS: Final = 0.003
+"""rad; a little less than two counts. Less than this is noise."""
 UNHURRIED: Final = 2.0
 """rad/s that every servo surely reaches; the time allowed for a move is reckoned with it."""
 

@@ -22,7 +22,7 @@ from motorbus.families.feetech.driver.node import POSITION, PWM, STEP, VELOCITY,
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
 
 TOLERANCE: Final = 0.05
-"""rad; 33 counts. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user reports)."""
+"""rad; 32 counts. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user reports)."""
 NO_LOAD: Final = 3400
 """Counts/s of an STS3215 without load. Source: STS3215 memory table V3.6."""
 
@@ -119,7 +119,7 @@ def _within(node: Node, table: Table, raw: int, jump: float) -> int:
     assert node.limits is not None
     low, high = node.limits
     there = min(max(here, low), high)
-    if abs(here - there) > jump:
+    if abs(here - there) > jump + row.scale / 2:
         raise LimitExceeded(
             f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad: "
             f"with torque on it would jump to {there:.4g} rad",

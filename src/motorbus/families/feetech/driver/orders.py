@@ -85,8 +85,7 @@ def _fault(row: Entry, value: Value) -> RequestError | None:
             f"{row.name}: {value!r} is not a finite number", advice="give a number; nothing was sent"
         )
     try:
-        if row.name not in SCALED:
-            _check(Order(row, row.to_raw(value)))
+        _check(Order(row, 0 if row.name in SCALED else row.to_raw(value)))
     except RequestError as error:
         return error
     return None

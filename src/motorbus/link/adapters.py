@@ -1,0 +1,108 @@
+"""What a USB adapter is and how long it holds a byte back, told from its ids and from what the kernel says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+USB_TIME = 0.003  # s; a USB full-speed frame each way, and the host's own turn
+DEVICE_LATENCY = 0.004  # s; adapters without a timer hand bytes over within 2 to 4 ms
+WINDOWS_LATENCY = 0.019  # s; FTDI's 16 ms cannot be asked for there, so it is assumed
+TERMINAL_LATENCY = 0.002  # s; a pseudo-terminal has no adapter, only two processes to be scheduled
+FAST_TIMER = 1  # ms; the least an FTDI latency timer can be set to
+
+KERNEL_CH341 = "Linux drivers/usb/serial/ch341.c"
+KERNEL_FTDI = "Linux drivers/usb/serial/ftdi_sio_ids.h"
+KERNEL_CP210X = "Linux drivers/usb/serial/cp210x.c"
+KERNEL_PL2303 = "Linux drivers/usb/serial/pl2303.h"
+WCH_DRIVER = "WCH ch343ser_linux driver"
+
+
+class Adapter(NamedTuple):
+    """A kind of adapter: its chip, where it is usually met, and who says so."""
+
+    chip: str
+    usual: str
+    source: str
+
+    @property
+    def guess(self) -> str:
+        return f"{self.chip}: {self.usual}" if self.usual else self.chip
+
+
+ADAPTERS: Final[Mapping[tuple[int, int], Adapter]] = MappingProxyType(
+    {
+        (0x1A86, 0x55D3): Adapter("CH343", "usual on FEETECH and Waveshare servo boards", WCH_DRIVER),
+        (0x1A86, 0x55D2): Adapter("CH342", "two ports in one", WCH_DRIVER),
+        (0x1A86, 0x55D4): Adapter("CH9102", "usual on ESP32 boards with a serial bus", WCH_DRIVER),
+        (0x1A86, 0x7523): Adapter("CH340", "usual on FEETECH URT boards and RS-485 sticks", KERNEL_CH341),
+        (0x1A86, 0x7522): Adapter("CH340K", "", KERNEL_CH341),
+        (0x1A86, 0x5523): Adapter("CH341", "", KERNEL_CH341),
+        (0x0403, 0x6001): Adapter(
+            "FT232R", "usual in USB-RS485 cables; check its latency timer", KERNEL_FTDI
+        ),
+        (0x0403, 0x6010): Adapter("FT2232", "two ports in one; check its latency timer", KERNEL_FTDI),
+        (0x0403, 0x6011): Adapter("FT4232H", "four ports in one; check its latency timer", KERNEL_FTDI),
+        (0x0403, 0x6014): Adapter("FT232H", "usual in ROBOTIS U2D2; check its latency timer", KERNEL_FTDI),
+        (0x0403, 0x6015): Adapter("FT230X", "check its latency timer", KERNEL_FTDI),
+        (0x10C4, 0xEA60): Adapter("CP210x", "usual on ESP32 boards", KERNEL_CP210X),
+        (0x067B, 0x2303): Adapter("PL2303", "", KERNEL_PL2303),
+        (0x0483, 0x5740): Adapter(
+            "STM32", "usual on controller boards with their own USB", "craigm26/OpenCastor#527"
+        ),
+        (0x2E8A, 0x000A): Adapter("RP2040", "a board that passes bytes on", "Raspberry Pi Pico SDK, usb_pid"),
+        (0x303A, 0x1001): Adapter("ESP32", "its own USB port", "Espressif USB Serial/JTAG, ESP-IDF"),
+    }
+)
+
+
+class PortInfo(NamedTuple):
+    """A serial port of this machine.
+
+    `stable` is the name under /dev/serial/by-id, which stays when other adapters come and go; "" where there is
+    none. `guess` is what the adapter probably is, "" when it is not in the table.
+    """
+
+    device: str
+    stable: str
+    vid: int | None
+    pid: int | None
+    serial_number: str
+    manufacturer: str
+    product: str
+    guess: str
+
+    @property
+    def description(self) -> str:
+        """What the adapter says it is."""
+        return " ".join(part for part in (self.manufacturer, self.product) if part)
+
+
+def guess(vid: int | None, pid: int | None) -> str:
+    """What an adapter with these ids probably is; "" when unknown."""
+    if vid is None or pid is None:
+        return ""
+    adapter = ADAPTERS.get((vid, pid))
+    return adapter.guess if adapter else ""
+
+
+def latency_timer(device: str, sysfs: Path = Path("/sys")) -> int | None:
+    """Milliseconds that an FTDI adapter collects bytes before it hands them over; None for any other adapter."""
+    try:
+        text = (sysfs / "class" / "tty" / Path(device).name / "device" / "latency_timer").read_text()
+        return int(text)
+    except (OSError, ValueError):
+        return None
+
+
+def latency_warning(device: str, timer: int) -> str:
+    """What the user ought to know about this latency timer, and how to make it fast."""
+    name = Path(device).name
+    return (
+        f"its latency timer is {timer} ms, which allows about {1000 // (timer + 1)} reads a second; set it to"
+        f" {FAST_TIMER} ms: as root, echo {FAST_TIMER} > /sys/bus/usb-serial/devices/{name}/latency_timer; for good,"
+        ' in /etc/udev/rules.d/99-motorbus.rules: ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio",'
+        f' ATTR{{latency_timer}}="{FAST_TIMER}"'
+    )

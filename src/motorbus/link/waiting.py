@@ -1,0 +1,26 @@
+"""Wait for bytes without burning the processor, as exactly as the system allows.
+
+`select` counts microseconds where `poll` counts milliseconds, and a control loop feels the difference; but it knows
+only the first thousand descriptors of a process.
+"""
+
+from __future__ import annotations
+
+from select import select
+
+LIMIT = 1024  # FD_SETSIZE
+LONGEST = 86_400.0  # s; more than some systems accept is cut, and nothing has come by then
+
+
+def wait_readable(descriptor: int, seconds: float) -> bool:
+    """Wait until something can be read, or the other end is gone, or the time is over: then False.
+
+    Raises OSError or ValueError for a descriptor that is closed.
+    """
+    if descriptor < LIMIT:
+        return bool(select((descriptor,), (), (), min(seconds, LONGEST))[0])
+    from select import POLLIN, poll
+
+    ready = poll()
+    ready.register(descriptor, POLLIN)
+    return bool(ready.poll(min(seconds, LONGEST) * 1000))

@@ -1,0 +1,115 @@
+"""The simulator's end of a TCP port: the same bytes as on a serial line, one client after the other.
+
+A client that comes while another is served waits in the queue of the operating system until that one leaves; a bus
+has one host. There is no baud rate on a socket, so none is told.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import socket
+
+from motorbus.errors import LinkError, PortBusy, RequestError
+
+_CHUNK = 4096
+_WAITING = 8
+LOCAL = "127.0.0.1"
+
+
+def parse_endpoint(text: str) -> tuple[str, int]:
+    """`HOST:PORT`, `[ADDRESS]:PORT`, `:PORT` or `PORT` -> host and port; without a host only this machine.
+
+    Raises RequestError for anything else. Port 0 takes a free one.
+    """
+    host, _, port = text.rpartition(":")
+    if not port.isascii() or not port.isdigit() or int(port) > 65535:
+        raise RequestError(f"{text!r} is not a TCP endpoint", expected="HOST:PORT, such as 127.0.0.1:4000")
+    return host.removeprefix("[").removesuffix("]") or LOCAL, int(port)
+
+
+class TcpListener:
+    """An open TCP port with at most one client. Raises PortBusy when it is taken, LinkError when it cannot be had."""
+
+    def __init__(self, host: str = LOCAL, port: int = 0) -> None:
+        self._client: socket.socket | None = None
+        try:
+            self._listener = _listen(host, port)
+        except OSError as error:
+            kind = PortBusy if error.errno == errno.EADDRINUSE else LinkError
+            raise kind(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+        self._listener.setblocking(False)
+        self.host, self.port = self._listener.getsockname()[:2]
+
+    @property
+    def url(self) -> str:
+        """What a host opens."""
+        return f"socket://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
+
+    def fileno(self) -> int:
+        """Turns readable when the client has sent something or left; without a client, when one has come."""
+        return (self._client or self._listener).fileno()
+
+    def read(self) -> bytes:
+        """What the client has sent; b"" when nothing. Takes in the next client when there is none."""
+        if self._client is None:
+            self._accept()
+            return b""
+        try:
+            data = self._client.recv(_CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Send to the client; returns how many bytes still had room. Without a client they are lost, as on a wire."""
+        if self._client is None:
+            return 0
+        try:
+            return self._client.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self._drop()
+            return 0
+
+    def rate(self) -> int | None:
+        """A socket has no rate."""
+        return None
+
+    def close(self) -> None:
+        """Hang up and give the port back; calling it again does nothing."""
+        self._drop()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            self._client, _ = self._listener.accept()
+            self._client.setblocking(False)
+            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def _drop(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family, kind, protocol, _, address = socket.getaddrinfo(
+        host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+    )[0]
+    listener = socket.socket(family, kind, protocol)
+    try:
+        if os.name == "posix":  # elsewhere this option lets two programs take one port
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(_WAITING)
+    except BaseException:
+        listener.close()
+        raise
+    return listener

@@ -1,0 +1,171 @@
+"""Simulated buses of this process, by name, so that an address can lead to one: `feetech:sim:NAME`.
+
+A name is worth something in this process only, and only while the simulation is open. One host at a time has the
+bus, as with a real port; when it closes its link another may open one, and the motors stand where they stood.
+"""
+
+from __future__ import annotations
+
+import time
+from itertools import count
+from threading import Lock
+from types import TracebackType
+from typing import Any, Self
+
+from motorbus.core.family import Family, Simulator
+from motorbus.errors import PortBusy, PortNotFound, RequestError
+from motorbus.link.base import Line, PerfectLine
+from motorbus.link.memory import MemoryLink
+
+_live: dict[tuple[str, str], Simulation] = {}
+_numbers = count(1)
+_lock = Lock()
+
+
+class Simulation:
+    """A simulated bus, used in a `with`: open it by its `url`, poke its nodes by `simulation[3]`.
+
+    `simulator`  the simulated bus itself
+    `url`        its address, valid in this process until `close`
+    `clock`      "virtual": time passes only while a host waits; "real": it runs
+    `pace`       set it before a link is opened and bytes take their time on the wire
+
+    Raises RequestError for an unknown model or option, an impossible clock, or a name that is taken.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        ids: tuple[int, ...],
+        *,
+        model: str = "",
+        clock: str = "virtual",
+        name: str | None = None,
+        **options: object,
+    ) -> None:
+        if clock not in ("virtual", "real"):
+            raise RequestError(f"clock {clock!r} is not possible", expected="virtual or real")
+        self.family = family
+        self.clock = clock
+        self.pace = False
+        self.simulator: Simulator = family.simulator(ids, model, **options)
+        self._line: Line = PerfectLine()
+        self._link: MemoryLink | None = None
+        self._left_at = 0.0
+        self._gate = Lock()
+        self.name = _register(self, name)
+
+    @property
+    def url(self) -> str:
+        """The address that `motorbus.open` takes."""
+        return f"{self.family.name}:sim:{self.name}"
+
+    @property
+    def line(self) -> Line:
+        """What lies between host and devices; set it to do harm, at any time."""
+        return self._line
+
+    @line.setter
+    def line(self, line: Line) -> None:
+        with self._gate:
+            self._line = line
+            if self._link is not None:
+                self._link.line = line
+
+    def __getitem__(self, node: int) -> Any:
+        """The simulated device with this id: at least a `core.family.SimulatedNode`, and what its family adds.
+
+        Raises RequestError when there is none.
+        """
+        try:
+            return self.simulator.nodes[node]
+        except KeyError:
+            ids = ", ".join(map(str, sorted(self.simulator.nodes)))
+            raise RequestError(f"{self.url} has no node {node}", expected=f"one of {ids}") from None
+
+    def link(self, rate: int | None = None) -> MemoryLink:
+        """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
+        with self._gate, _lock:
+            if _live.get((self.family.name, self.name)) is not self:
+                raise _not_found(self.name, self.family.name)
+            if self._link is not None:
+                raise PortBusy(f"{self.url} is open already", advice="close the other bus first")
+            self._link = _OneAtATime(self, rate or self.family.link.rate, self._left_at)
+            return self._link
+
+    def close(self) -> None:
+        """Forget its name; a link that is open goes dead. Calling it again does nothing."""
+        with _lock:
+            if _live.get((self.family.name, self.name)) is self:
+                del _live[self.family.name, self.name]
+        link = self._link
+        if link is not None:
+            link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _release(self, link: MemoryLink) -> None:
+        with self._gate:
+            if self._link is link:
+                self._link, self._left_at = None, link.now()
+
+
+def find(name: str, family: str) -> Simulation:
+    """The live simulation of this name. Raises PortNotFound, which tells the names there are."""
+    with _lock:
+        try:
+            return _live[family, name]
+        except KeyError:
+            raise _not_found(name, family) from None
+
+
+def _register(simulation: Simulation, name: str | None) -> str:
+    family = simulation.family.name
+    with _lock:
+        if name is None:
+            name = next(text for text in map(str, _numbers) if (family, text) not in _live)
+        elif not name or set(name) & set(",:#") or name != name.strip():
+            raise RequestError(
+                f"{name!r} cannot be the name of a bus", expected="no comma, colon, hash or margin"
+            )
+        elif (family, name) in _live:
+            raise RequestError(
+                f"{family}:sim:{name} exists already", advice="choose another name, or close it"
+            )
+        _live[family, name] = simulation
+        return name
+
+
+def _not_found(name: str, family: str) -> PortNotFound:
+    names = ", ".join(sorted(f"{family}:sim:{other}" for kind, other in _live if kind == family))
+    return PortNotFound(
+        f"there is no simulated bus {family}:sim:{name} in this process",
+        expected=f"one of {names}" if names else "",
+        advice=f"make one by motorbus.simulate({family!r}, name={name!r}), or write {family}:sim,ids=1-6",
+    )
+
+
+class _OneAtATime(MemoryLink):
+    """The memory link of a simulation; closing it lets the next host in, at the time at which this one left."""
+
+    def __init__(self, simulation: Simulation, rate: int, start: float) -> None:
+        self._simulation = simulation
+        super().__init__(
+            simulation.simulator,
+            rate=rate,
+            line=simulation.line,
+            virtual=simulation.clock == "virtual",
+            pace=simulation.pace,
+            name=simulation.url,
+            start=start if simulation.clock == "virtual" else time.monotonic(),
+        )
+
+    def close(self) -> None:
+        super().close()
+        self._simulation._release(self)

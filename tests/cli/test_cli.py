@@ -1,0 +1,180 @@
+"""The program as a whole: what it loads, what it says when it is called wrongly, and that its examples are true."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from motorbus import __version__
+from motorbus.cli import build, main
+from tests.cli.conftest import Run
+
+APP = build()
+COMMANDS = [name for name in APP if not name.startswith("-")]
+FAMILY_COMMANDS = [("feetech", name) for name in APP["feetech"] if not name.startswith("-")]
+ALL = [*((name,) for name in COMMANDS), *FAMILY_COMMANDS]
+
+
+def examples(words: tuple[str, ...]) -> list[str]:
+    """The lines of the help that show a call."""
+    app = APP
+    for word in words:
+        app = app[word]
+    text = (app.help_epilogue or "").partition("Examples:")[2]
+    return [line.strip() for line in text.splitlines() if line.strip().startswith("motorbus ")]
+
+
+EXAMPLES = sorted({line for words in ALL for line in examples(words)})
+SIMULATED = [line for line in EXAMPLES if "feetech:sim" in line]
+
+
+def arguments(line: str) -> list[str]:
+    """The words of an example, without the program's name and without what the shell takes."""
+    return shlex.split(line.partition(" < ")[0])[1:]
+
+
+@pytest.mark.parametrize("words", [words for words in ALL if words != ("feetech",)], ids="-".join)
+def test_every_command_shows_examples(words: tuple[str, ...]) -> None:
+    found = examples(words)
+    assert found
+    assert all(line.startswith(f"motorbus {' '.join(words)}") for line in found)
+    assert all(len(line) <= 76 for line in found), "an example must fit a terminal"
+
+
+@pytest.mark.parametrize("line", EXAMPLES)
+def test_an_example_can_be_said(line: str) -> None:
+    words = [word for word in arguments(line) if word not in {"--json", "-v"}]
+    command, _, _ = APP.parse_args(words, exit_on_error=False, print_error=False)
+    assert command.__module__.startswith("motorbus.cli.")
+
+
+@pytest.mark.parametrize("line", SIMULATED)
+def test_an_example_with_simulated_devices_works(line: str, run: Run) -> None:
+    ran = run(*arguments(line))
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out
+
+
+@pytest.mark.parametrize("words", ALL, ids="-".join)
+def test_every_command_has_help(words: tuple[str, ...], run: Run) -> None:
+    ran = run(*words, "--help")
+    assert ran.code == 0
+    assert f"Usage: motorbus {' '.join(words)}" in ran.out
+    assert "--json" in ran.out
+    assert "--verbose" in ran.out
+
+
+def test_help_names_every_command(run: Run) -> None:
+    ran = run("--help")
+    assert ran.code == 0
+    for name in COMMANDS:
+        assert f" {name} " in ran.out
+
+
+def test_version(run: Run) -> None:
+    assert run("--version") == (0, f"motorbus {__version__}\n", "")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"]])
+def test_what_needs_no_bus_loads_no_family_and_no_heavy_library(words: list[str]) -> None:
+    code = (
+        "import sys; from motorbus.cli import main; main(sys.argv[1:]);"
+        "print(*(name for name in sys.modules if name.startswith(('motorbus.families.', 'motorbus.session',"
+        " 'serialx', 'can.', 'matplotlib', 'numpy', 'asyncio.'))), file=sys.stderr)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert ended.stderr.strip() == ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["mvoe"], ["scan"], ["scan", "--ids"], ["torque", "sideways", "feetech:sim"], ["ports", "--sideways"]],
+    ids=" ".join,
+)
+def test_a_call_that_cannot_be_understood_ends_with_2(words: list[str], run: Run) -> None:
+    ran = run(*words)
+    assert ran.code == 2
+    assert ran.out == ""
+    assert ran.err.startswith("error: ")
+    assert "--help" in ran.err
+
+
+def test_a_mistyped_command_gets_a_suggestion(run: Run) -> None:
+    assert 'Did you mean "monitor"' in run("monitr").err
+
+
+def test_a_wrong_call_is_told_in_json_too(run: Run) -> None:
+    ran = run("scan", "--json")
+    assert (ran.code, ran.out) == (2, "")
+    assert json.loads(ran.err)["exit"] == 2
+
+
+@pytest.mark.parametrize("words", [["--json", "ports"], ["ports", "--json"]])
+def test_common_flags_may_stand_anywhere(words: list[str], run: Run) -> None:
+    assert run(*words).document["schema"] == "motorbus.ports/1"
+
+
+def test_no_words_at_all_show_the_help(run: Run) -> None:
+    ran = run()
+    assert ran.code == 0
+    assert "Usage: motorbus" in ran.out
+
+
+def test_a_defect_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> list[object]:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("motorbus.link.serial.ports", broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["ports"])
+
+
+def test_verbose_says_what_happens_on_stderr_and_only_then(run: Run) -> None:
+    quiet = run("ping", "feetech:sim,ids=1#1")
+    chatty = run("ping", "feetech:sim,ids=1#1", "-vv")
+    assert quiet.err == ""
+    assert "motorbus" in chatty.err
+    assert logging.getLogger("motorbus").level == logging.NOTSET
+
+
+def test_a_reader_that_goes_away_ends_it_quietly() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "motorbus.cli", "monitor", "feetech:sim,ids=1", "--rate", "1000", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    assert process.stdout.readline()
+    process.stdout.close()
+    with process:
+        assert process.stderr.read() == ""
+        assert process.wait(timeout=30) == 10
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_can_be_made_for(shell: str) -> None:
+    script = build().generate_completion(shell=shell)  # type: ignore[arg-type]
+    assert "motorbus" in script
+    assert "monitor" in script
+
+
+def test_no_color_is_obeyed_by_the_help() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "motorbus.cli", "--help"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+        env={**os.environ, "NO_COLOR": "1"},
+    )
+    assert "\x1b[" not in ended.stdout

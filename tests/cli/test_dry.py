@@ -1,0 +1,85 @@
+"""A dry run reads, withholds what would change something, and goes to the end of guarded sequences."""
+
+from __future__ import annotations
+
+import pytest
+
+import motorbus
+from motorbus.cli import dry
+from motorbus.cli.dry import DryBus, Unforeseeable
+from motorbus.cli.output import Output
+from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together
+from motorbus.errors import LimitExceeded
+from motorbus.families.feetech import Servo
+from motorbus.simulation.named import Simulation
+
+
+def test_reads_are_carried_out_and_writes_are_not(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        servo = Servo(rehearsal, 1)
+        assert servo.read("torque_limit") == {"torque_limit": 1.0}
+        servo.write(torque_limit=0.5)
+        assert [frame[4] for frame in rehearsal.frames] == [3]
+        assert Servo(bus, 1).read("torque_limit") == {"torque_limit": 1.0}
+
+
+def test_a_guarded_sequence_is_shown_with_its_lock(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        Servo(rehearsal, 1).write(max_temperature=60, max_torque=0.5)
+        assert [frame[5] for frame in rehearsal.frames] == [40, 55, 13, 16, 55]
+
+
+def test_the_gate_stands_in_a_dry_run_too(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        with pytest.raises(LimitExceeded):
+            Servo(rehearsal, 1).move(9.0)
+        assert rehearsal.frames == []
+
+
+def test_what_cannot_be_foreseen_says_so(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus, pytest.raises(Unforeseeable):
+        Servo(DryBus(bus), 1).move(3.0)  # waits for an arrival that will not be
+
+
+def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
+    def inner(name: str) -> Operation[str]:
+        yield from Pause(1.0)
+        yield from Report(name)
+        return name
+
+    def outer() -> Operation[list[str]]:
+        return [(yield from Alone(inner("a"))), *(yield from Together([inner("b"), inner("c")]))]
+
+    with motorbus.open(arm.url) as bus:
+        assert DryBus(bus).run(outer()) == ["a", "b", "c"]
+
+
+def test_an_error_reaches_the_operation(arm: Simulation) -> None:
+    absent = motorbus.feetech.FAMILY.probe(9, 0)
+
+    def careful(exchange: Exchange[bool]) -> Operation[str]:
+        try:
+            yield from exchange
+        except motorbus.NoReply:
+            return "nobody"
+        return "somebody"
+
+    with motorbus.open(arm.url) as bus:
+        assert DryBus(bus).run(careful(absent)) == "nobody"
+
+
+def test_frames_are_explained_without_their_framing(
+    arm: Simulation, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        Servo(rehearsal, 1).write(torque_limit=0.5)
+        dry.show(rehearsal, Output())
+    shown = capsys.readouterr().out
+    assert shown.startswith("would send FF FF 01 05 03 30 F4 01 D1\n")
+    assert "WRITE to servo 1; address register 48, torque_limit; torque_limit 500" in shown
+    assert "checksum" not in shown
+    assert "status packet" not in shown

@@ -1,0 +1,34 @@
+"""One verb for all: everyone is visited, everyone is told of, and the exit code tells how it went."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.cli.each import each
+from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.output import Output
+from motorbus.errors import NoReply, RequestError
+from motorbus.simulation.named import Simulation
+
+
+def test_all_do_as_asked(arm: Simulation, capsys: pytest.CaptureFixture[str]) -> None:
+    assert each("say hello", "ping", (f"{arm.url}#1+2",), {}, Output()) is Exit.OK
+    assert capsys.readouterr().out.count("say hello") == 2
+
+
+def test_some_do(arm: Simulation, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(Partial, match="node 9"):
+        each("look", "position", (f"{arm.url}#9+1",), {}, Output())
+    shown = capsys.readouterr().out
+    assert "node 9" in shown
+    assert "look" in shown
+
+
+def test_none_does(arm: Simulation) -> None:
+    with pytest.raises(NoReply):
+        each("look", "position", (f"{arm.url}#8+9",), {}, Output())
+
+
+def test_a_verb_they_lack(arm: Simulation) -> None:
+    with pytest.raises(RequestError, match="no tail wagging"):
+        each("wag", "tail_wagging", (f"{arm.url}#1",), {}, Output())

@@ -1,0 +1,15 @@
+"""The faces of families are found by name, and offer what common commands can use."""
+
+from __future__ import annotations
+
+from motorbus.cli import faces
+
+
+def test_a_face_is_a_module_of_the_familys_name() -> None:
+    assert faces.names() == ["feetech"]
+
+
+def test_what_a_face_offers() -> None:
+    assert callable(faces.offer("feetech", "move_together"))
+    assert faces.offer("feetech", "make_coffee") is None
+    assert faces.offer("nobody", "move_together") is None

@@ -1,0 +1,50 @@
+"""What a device is, what bounds it, and everything it can be asked."""
+
+from __future__ import annotations
+
+from motorbus.families.feetech.table import STS
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+
+def test_identity_and_limits(run: Run, arm: Simulation) -> None:
+    document = run("info", f"{arm.url}#2", "--json").document
+    assert (document["id"], document["model"], document["firmware"], document["table"]) == (
+        2,
+        "STS3215",
+        "3.10",
+        "sts",
+    )
+    limits = {row["name"]: row for row in document["limits"]}
+    assert limits["max_temperature"]["value"] == 70
+    assert limits["max_position_limit"]["raw"] == 4095
+    assert all(row["storage"] == "EEPROM" for row in limits.values())
+
+
+def test_every_register(run: Run, arm: Simulation) -> None:
+    rows = run("info", f"{arm.url}#2", "--registers", "--json").document["registers"]
+    assert [row["name"] for row in rows] == [row.name for row in STS.values() if row.readable]
+    (position,) = (row for row in rows if row["name"] == "present_position")
+    assert (position["address"], position["raw"], position["unit"], position["access"]) == (
+        56,
+        2048,
+        "rad",
+        "r",
+    )
+
+
+def test_a_table_for_eyes(run: Run, arm: Simulation) -> None:
+    ran = run("info", f"{arm.url}#2", "--registers")
+    assert (ran.code, ran.err) == (0, "")
+    lines = {line.split()[0]: line for line in ran.out.splitlines() if line}
+    assert "STS3215 (simulated)" in ran.out
+    assert lines["present_position"].split()[1:5] == ["56", "3.1416", "rad", "(180.0°)"]
+    assert "position" in lines["operating_mode"]
+
+
+def test_one_device_at_a_time(run: Run, arm: Simulation) -> None:
+    assert run("info", arm.url).code == 2
+
+
+def test_nobody_there(run: Run, arm: Simulation) -> None:
+    assert run("info", f"{arm.url}#9").code == 5

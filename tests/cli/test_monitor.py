@@ -1,0 +1,52 @@
+"""Watching: so often, so long, as a table or as JSON Lines, and what a silent device does to it."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.cli import monitor
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+
+def test_json_lines_one_per_device_and_sample(run: Run, arm: Simulation) -> None:
+    ran = run("monitor", f"{arm.url}#1+2", "--count", "3", "--rate", "10", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    assert [one["id"] for one in ran.records] == [1, 2, 1, 2, 1, 2]
+    assert {one["schema"] for one in ran.records} == {"motorbus.monitor/1"}
+    assert {one["simulated"] for one in ran.records} == {True}
+    first, _, second, *_ = ran.records
+    assert second["at"] - first["at"] == pytest.approx(0.1, abs=0.01), "in virtual time"
+
+
+def test_a_duration_ends_it(run: Run, arm: Simulation) -> None:
+    assert len(run("monitor", f"{arm.url}#1", "--duration", "1", "--rate", "4", "--json").records) == 4
+
+
+def test_a_bus_means_everyone_on_it(run: Run, arm: Simulation) -> None:
+    ran = run("monitor", arm.url, "--count", "1")
+    assert ran.code == 0
+    assert ran.out.count("3.1416") == 3
+
+
+def test_a_silent_device_keeps_its_row(run: Run, arm: Simulation) -> None:
+    ran = run("monitor", f"{arm.url}#1+9", "--count", "2", "--json")
+    assert ran.code == 6
+    assert ["error" in one for one in ran.records] == [False, True, False, True]
+    assert run("monitor", f"{arm.url}#9", "--count", "1").code == 5
+
+
+def test_interrupting_it_is_the_usual_end(run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(monitor, "_pause", interrupt)
+    assert run("monitor", f"{arm.url}#1", "--json").code == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [[], ["feetech:sim", "--rate", "0"], ["feetech:sim", "--count", "-1"], ["feetech:sim", "--rate", "nan"]],
+)
+def test_what_is_no_order_ends_with_2(words: list[str], run: Run) -> None:
+    assert run("monitor", *words).code == 2

@@ -1,0 +1,95 @@
+"""Moving: there and back, several together, and what asks first or is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+
+def stands(run: Run, arm: Simulation, node: int) -> float:
+    position: float = run("read", f"{arm.url}#{node}", "--json").document["position"]
+    return position
+
+
+def test_it_returns_when_it_is_there(run: Run, arm: Simulation) -> None:
+    ran = run("move", f"{arm.url}#1=90deg", "--velocity", "90deg/s", "--acceleration", "20")
+    assert (ran.code, ran.err) == (0, "")
+    assert stands(run, arm, 1) == pytest.approx(math.pi / 2, abs=0.05)
+
+
+def test_several_are_moved_together_and_all_arrive(run: Run, arm: Simulation) -> None:
+    ran = run("move", f"{arm.url}#1+2=2.5", f"{arm.url}#3=200deg", "--velocity", "2", "--json")
+    assert ran.code == 0
+    assert [(one["id"], one["goal"]) for one in ran.document["devices"]] == [
+        (1, 2.5),
+        (2, 2.5),
+        (3, pytest.approx(math.radians(200))),
+    ]
+    for one in ran.document["devices"]:
+        assert one["present"] == pytest.approx(one["goal"], abs=0.05)
+
+
+def test_it_need_not_wait(run: Run, arm: Simulation) -> None:
+    (one,) = run("move", f"{arm.url}#1=1", "--no-wait", "--json").document["devices"]
+    assert one["present"] == pytest.approx(math.pi, abs=0.05)
+
+
+def test_a_long_way_needs_agreement(run: Run, arm: Simulation) -> None:
+    assert run("move", f"{arm.url}#1=0.1").code == 0
+    ran = run("move", f"{arm.url}#1=200deg")
+    assert ran.code == 8
+    assert "--yes" in ran.err
+    assert stands(run, arm, 1) == pytest.approx(0.1, abs=0.05)
+    assert run("move", f"{arm.url}#1=200deg", "--yes").code == 0
+
+
+@pytest.mark.parametrize(
+    ("goal", "code"),
+    [
+        ("#1=nan", 2),
+        ("#1=far", 2),
+        ("#1=1A", 2),
+        ("#1", 2),
+        ("=1", 2),
+        ("#254=1", 2),
+        ("#1=-0.1", 8),
+        ("#9=1", 5),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_nothing_moves(
+    goal: str, code: int, run: Run, arm: Simulation
+) -> None:
+    ran = run("move", f"{arm.url}{goal}", "--yes")
+    assert (ran.code, ran.out) == (code, "")
+    assert stands(run, arm, 1) == pytest.approx(math.pi)
+
+
+def test_one_of_several_outside_its_limits_holds_back_all(run: Run, arm: Simulation) -> None:
+    assert run("move", f"{arm.url}#1=2", f"{arm.url}#2=-1", "--yes").code == 8
+    assert stands(run, arm, 1) == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(
+    "words", [["--velocity", "fast"], ["--velocity", "-1"], ["--acceleration", "nan"]], ids=" ".join
+)
+def test_impossible_bounds_end_with_2(words: list[str], run: Run, arm: Simulation) -> None:
+    assert run("move", f"{arm.url}#1=2", *words).code == 2
+
+
+def test_a_device_is_named_once(run: Run, arm: Simulation) -> None:
+    assert run("move", f"{arm.url}#1=2", f"{arm.url}#1+2=3").code == 2
+    assert run("move").code == 2
+
+
+@pytest.mark.parametrize("more", [[], ["#2"]], ids=["one", "two"])
+def test_a_dry_run_shows_one_frame_and_moves_nothing(more: list[str], run: Run, arm: Simulation) -> None:
+    goals = [f"{arm.url}#1=2", *(f"{arm.url}{node}=2.5" for node in more)]
+    ran = run("move", *goals, "--dry-run", "--json")
+    assert ran.code == 0
+    (frame,) = ran.document["withheld"]
+    assert "goal_position" in frame["meaning"]
+    assert stands(run, arm, 1) == pytest.approx(math.pi)

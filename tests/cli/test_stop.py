@@ -1,0 +1,30 @@
+"""Decelerate and hold, and say what was promised."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+
+def test_it_ends_a_motion_and_holds(run: Run, arm: Simulation) -> None:
+    assert run("move", f"{arm.url}#1=1", "--velocity", "1", "--no-wait").code == 0
+    ran = run("stop", f"{arm.url}#1", "--json")
+    assert ran.code == 0
+    assert "holds" in ran.document["devices"][0]["promise"]
+    registers = run("read", f"{arm.url}#1", "torque_enable", "goal_position", "--json").document["registers"]
+    assert registers[0]["raw"] == 1
+    assert registers[1]["value"] == pytest.approx(math.pi, abs=0.2), "not the goal of the move"
+
+
+def test_nobody_named_means_everyone(run: Run, arm: Simulation) -> None:
+    assert run("stop", arm.url).out.count("holds") == 3
+
+
+def test_somebody_silent_is_told(run: Run, arm: Simulation) -> None:
+    ran = run("stop", f"{arm.url}#1+9")
+    assert ran.code == 6
+    assert run("stop").code == 2

@@ -1,0 +1,57 @@
+"""From words to buses and devices; what can be refused is refused before a port is opened."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.cli import target
+from motorbus.errors import RequestError
+from motorbus.families.feetech import FAMILY
+
+
+def test_a_bus_and_its_nodes() -> None:
+    found = target.target("feetech:/dev/ttyACM0,baud=500000#1-3+7")
+    assert found.bus == "feetech:/dev/ttyACM0,baud=500000"
+    assert found.family.name == "feetech"
+    assert found.nodes == (1, 2, 3, 7)
+
+
+@pytest.mark.parametrize("text", ["feetech:COM7", "feetech:COM7#1+2"])
+def test_exactly_one_device_means_one(text: str) -> None:
+    with pytest.raises(RequestError, match="exactly one device"):
+        target.device(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["feetech", "nobody:COM7", "feetech:COM7#254", "feetech:COM7#0-254", "feetech:COM7#"]
+)
+def test_what_is_no_target_is_refused_without_a_port(text: str) -> None:
+    with pytest.raises(RequestError):
+        target.target(text)
+
+
+def test_targets_are_gathered_by_bus_each_node_once() -> None:
+    found = target.gathered(["feetech:COM7#1+2", "feetech:COM8", "feetech:COM7#2+3"])
+    assert found == {"feetech:COM7": (1, 2, 3), "feetech:COM8": ()}
+
+
+def test_no_target_at_all_is_refused() -> None:
+    with pytest.raises(RequestError, match="which bus"):
+        target.gathered([])
+
+
+def test_a_register_that_no_map_has_is_refused_with_a_suggestion() -> None:
+    target.check_names(FAMILY, ["present_position"])
+    with pytest.raises(RequestError, match="perhaps present_position"):
+        target.check_names(FAMILY, ["present_positon"])
+
+
+def test_a_verb_that_a_device_lacks_is_named() -> None:
+    class Box:
+        node = 1
+
+        class bus:  # noqa: N801
+            family = FAMILY
+
+    with pytest.raises(RequestError, match="feetech devices have no wag tail"):
+        target.able(Box(), "wag_tail")

@@ -1,0 +1,259 @@
+"""What `FAMILY` itself promises: names, figures of the wire, probes, a stop, and which way its rooms import."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from functools import cache
+from typing import Any
+
+import grimp
+import pytest
+
+from motorbus.core.family import Family
+from motorbus.core.operation import (
+    ANY,
+    CanFrame,
+    Data,
+    Due,
+    Effect,
+    Exchange,
+    Operation,
+    Rank,
+    Timeout,
+    Together,
+)
+from motorbus.errors import MotorbusError
+from tests.conformance.subjects import FAMILIES, PACKAGES
+from tests.conformance.world import IDS, World, world
+
+MOST_MEMBERS = 18
+ROOMS = ("wire", "table", "driver", "simulator")
+# A family has no clock, no threads and no I/O; and nothing foreign, for it is loaded below floor 3.
+FORBIDDEN = {
+    "_thread",
+    "asyncio",
+    "concurrent",
+    "datetime",
+    "multiprocessing",
+    "os",
+    "pathlib",
+    "random",
+    "sched",
+}
+FORBIDDEN |= {"select", "selectors", "signal", "socket", "ssl", "subprocess", "tempfile", "threading", "time"}
+
+
+def public(thing: object) -> set[str]:
+    return {name for name in dir(thing) if not name.startswith("_")}
+
+
+def test_the_contract_has_at_most_eighteen_members() -> None:
+    assert len(public(Family)) <= MOST_MEMBERS
+
+
+def test_a_family_has_the_members_of_the_contract_and_no_others(family: Family) -> None:
+    assert public(family) == public(Family)
+
+
+def test_a_family_is_called_what_it_is_found_by(family: Family) -> None:
+    assert FAMILIES[family.name] is family
+
+
+def test_a_family_keeps_no_state(family: Family) -> None:
+    for name in public(family):
+        getattr(family, name)  # what is worked out when first asked for is no state
+    before = repr(vars(family))
+    with world(family) as there:
+        there.device(IDS[0]).identify()
+        there.bus.run(family.scan(IDS))
+        there.bus.estop()
+    assert repr(vars(family)) == before
+
+
+def test_what_a_link_needs_is_said(family: Family) -> None:
+    needs = family.link
+    assert needs.kind in {"bytes", "frames"}
+    assert needs.rate in needs.rates
+    assert len(set(needs.rates)) == len(needs.rates)
+    assert {option.name for option in needs.options if not option.help} == set()
+    assert {option.name for option in needs.options if not isinstance(option.default, option.kind)} == set()
+
+
+# --- figures of the wire ------------------------------------------------------------------------------------
+
+
+def request_of(family: Family, length: int) -> Data:
+    return CanFrame(1, bytes(length)) if family.link.kind == "frames" else bytes(length)
+
+
+def test_air_time_grows_with_length_and_falls_with_rate(family: Family) -> None:
+    rate = family.link.rate
+
+    def takes(request: int, *replies: int) -> float:
+        dues = tuple(Due(1, 1, length) for length in replies)
+        return family.air_time(Exchange(request_of(family, request), dues), rate)
+
+    assert 0 < takes(1) < takes(4) < takes(8) < takes(8, 1) < takes(8, 4) < takes(8, 8) < takes(8, 8, 1)
+    some = Exchange(request_of(family, 8), (Due(1, 1, 8),))
+    assert family.air_time(some, rate) > family.air_time(some, 2 * rate)
+    assert family.air_time(Exchange(request_of(family, 8), ANY), rate) > 0
+
+
+def test_thinking_takes_some_time_and_storing_no_less(family: Family) -> None:
+    times = {
+        kind: family.turnaround(Exchange(request_of(family, 8), (Due(1, 1, 8),), timeout=kind))
+        for kind in Timeout
+    }
+    assert 0 < times[Timeout.REPLY] <= times[Timeout.STORE]
+    assert times[Timeout.SCAN] > 0
+
+
+def test_the_quiet_time_is_no_shorter_than_a_reply(family: Family) -> None:
+    probe = family.probe(IDS[0], 0)
+    for rate in family.link.rates:
+        assert family.quiet_time(rate) > family.air_time(probe, rate) / 2
+
+
+def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(family: Family) -> None:
+    assert family.window >= 1
+    with world(family) as there:
+        for node in IDS:
+            assert there.device(node).ping() is True
+        watched = there.bus.trace.subscribe()
+        there.bus.run(probes(family))
+        flying = most = 0
+        for record in watched:
+            flying += 1 if record.direction == "tx" else -1
+            most = max(most, flying)
+    assert most == min(family.window, len({family.lane(node) for node in IDS}))
+
+
+def probes(family: Family) -> Operation[list[bool]]:
+    return (yield from Together([family.probe(node, 0) for node in IDS]))
+
+
+# --- probes, echo, stop -------------------------------------------------------------------------------------
+
+
+def test_an_echo_test_is_answered_by_another_length_than_its_own(family: Family) -> None:
+    test = family.echo_test()
+    if test is None:
+        assert family.link.kind == "frames"  # only a CAN controller never hears itself
+        return
+    assert test.effect is Effect.NONE
+    assert test.replies is ANY or {due.length for due in test.replies} & {len(test.request)} == set()
+
+
+def test_probes_differ_from_each_other_and_from_their_echo(family: Family) -> None:
+    seen = set()
+    for attempt in range(64):
+        probe = family.probe(IDS[0], attempt)
+        assert probe.replies is not ANY
+        (due,) = probe.replies
+        assert (due.node, probe.lane) == (IDS[0], family.lane(IDS[0]))
+        assert (probe.effect, probe.repeatable) == (Effect.NONE, True)
+        if isinstance(probe.request, bytes):
+            assert due.length != len(probe.request)
+        seen.add((due.key, due.length))
+    assert len(seen) >= 16
+
+
+def test_probes_are_answered_truthfully(family: Family) -> None:
+    with world(family) as there:
+        for node in IDS:
+            answers = {there.bus.run(family.probe(node, attempt)) for attempt in range(64)}
+            assert answers == {True}
+
+
+def test_a_probe_knows_a_wrong_answer(family: Family) -> None:
+    with world(family) as there:
+        probe = family.probe(IDS[0], 0)
+        assert probe.read is not None
+        answer = there.bus.run(Exchange(probe.request, probe.replies, lane=probe.lane))
+        assert probe.read(answer) is True
+        wrong = [answer.replies[0]._replace(data=damaged) for damaged in one_bit_off(answer.replies[0].data)]
+        verdicts = [verdict(probe, answer._replace(replies=(reply,))) for reply in wrong]
+        assert False in verdicts
+
+
+def one_bit_off(data: bytes) -> list[bytes]:
+    return [bytes(b ^ (1 << bit if i == place else 0) for i, b in enumerate(data))
+            for place in range(len(data)) for bit in range(8)]  # fmt: skip
+
+
+def verdict(probe: Exchange[bool], answer: Any) -> bool:
+    assert probe.read is not None
+    try:
+        return probe.read(answer)
+    except MotorbusError:
+        return False
+
+
+@pytest.mark.parametrize("nodes", [(), (1,), IDS])
+def test_a_stop_says_what_it_promises(family: Family, nodes: tuple[int, ...]) -> None:
+    stop = family.stop(dict.fromkeys(nodes))
+    assert stop.promise.strip()
+    assert {exchange.rank for exchange in stop.exchanges} <= {Rank.STOP}
+    dues = [due.node for one in stop.exchanges if one.replies is not ANY for due in one.replies]
+    assert sorted(dues) == sorted(nodes)
+    for exchange in stop.exchanges:
+        if exchange.replies is not ANY and exchange.replies:
+            assert exchange.lane == family.lane(exchange.replies[0].node)
+
+
+def test_capabilities_are_functions_that_a_device_also_has_as_verbs(family: Family) -> None:
+    with world(family) as there:
+        model = there.bus.run(family.identify(IDS[0])).model
+    capabilities = family.axis(model)
+    assert {name for name, function in capabilities.items() if not callable(function)} == set()
+    assert family.axis("no such model") == {} or set(family.axis("no such model")) <= set(capabilities)
+
+
+def test_both_faces_have_the_same_verbs(family: Family) -> None:
+    blocking, awaiting = family.devices
+    assert public(blocking) == public(awaiting)
+    assert {"ping", "identify", "read", "write", "node", "alarm"} <= public(blocking(World(family).bus, 1))
+    undocumented = [name for name in public(blocking) if not inspect.getdoc(getattr(blocking, name))]
+    assert undocumented == []
+
+
+# --- which way the rooms import -----------------------------------------------------------------------------
+
+
+@cache
+def graph(package: str) -> grimp.ImportGraph:
+    return grimp.build_graph(package.split(".")[0], include_external_packages=True, cache_dir=None)
+
+
+def rooms(package: str) -> set[str]:
+    return {f"{package}.{room}" for room in ROOMS}
+
+
+def test_a_family_has_its_four_rooms(family: Family) -> None:
+    package = PACKAGES[family.name]
+    assert rooms(package) <= graph(package).modules
+
+
+def test_driver_and_simulator_never_reach_each_other(family: Family) -> None:
+    package = PACKAGES[family.name]
+    driver, simulator = f"{package}.driver", f"{package}.simulator"
+    for start, end in ((driver, simulator), (simulator, driver)):
+        assert graph(package).find_shortest_chains(start, end, as_packages=True) == set()
+
+
+def test_a_family_imports_core_and_errors_only(family: Family) -> None:
+    package = PACKAGES[family.name]
+    inside = graph(package)
+    members = inside.find_descendants(package) | {package}
+    imported = {
+        name for member in members for name in inside.find_modules_directly_imported_by(member)
+    } - members
+    ours = {name for name in imported if name.split(".")[0] == "motorbus" and not is_core(name)}
+    foreign = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"motorbus"}
+    assert (ours, foreign, {name.split(".")[0] for name in imported} & FORBIDDEN) == (set(), set(), set())
+
+
+def is_core(name: str) -> bool:
+    # of a package outside its own, grimp tells the top name only
+    return name in {"motorbus", "motorbus.errors"} or name.startswith("motorbus.core")

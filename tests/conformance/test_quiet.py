@@ -1,0 +1,155 @@
+"""Looking changes nothing: opening, scanning, identifying and reading write no motion, no torque and no EEPROM."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from motorbus.core.family import Family, Found
+from motorbus.core.operation import Data, Effect, Exchange, Operation, Progress, Runnable, Together
+from motorbus.errors import NoReply
+from tests.conformance.world import IDS, Steps, World, has, said, sent, world
+
+NODE = IDS[0]
+LOOKS = ("ping", "identify", "read", "telemetry", "position")
+
+
+def looks(there: World) -> dict[str, Runnable[Any]]:
+    """Everything that only looks, not yet begun."""
+    device = there.device(NODE)
+    found: dict[str, Runnable[Any]] = {verb: said(device, verb) for verb in LOOKS if has(there.family, verb)}
+    found |= {"scan": there.family.scan(IDS), "scan of all": there.family.scan()}
+    found |= {"identify by family": there.family.identify(NODE), "probe": there.family.probe(NODE, 0)}
+    test = there.family.echo_test()
+    return found | ({"echo test": test} if test is not None else {})
+
+
+def test_looking_has_no_effect(family: Family) -> None:
+    with world(family) as there:
+        before = there.settings()
+        for name, operation in looks(there).items():
+            steps = Steps(there.bus)
+            steps.run(operation)
+            assert {exchange.effect for exchange in steps.exchanges} == {Effect.NONE}, name
+            assert [exchange.goals for exchange in steps.exchanges if exchange.goals] == []
+        assert there.settings() == before
+
+
+def test_what_looks_is_marked_repeatable(family: Family) -> None:
+    with world(family) as there:
+        for name, operation in looks(there).items():
+            steps = Steps(there.bus)
+            steps.run(operation)
+            assert [one for one in steps.exchanges if not one.repeatable and not is_group(one)] == [], name
+
+
+def is_group(exchange: Exchange[Any]) -> bool:
+    return not isinstance(exchange.replies, tuple) or len(exchange.replies) != 1
+
+
+def test_identify_says_what_is_there(family: Family) -> None:
+    with world(family) as there:
+        for node in IDS:
+            identity = there.bus.run(family.identify(node))
+            assert identity.node == node
+            assert identity.model
+            assert identity.firmware
+            assert identity.table in family.tables
+            assert there.device(node).identify() == identity
+        with pytest.raises(NoReply) as raised:
+            there.bus.run(family.identify(9))
+        assert raised.value.node == 9
+
+
+def test_ping_says_who_is_there(family: Family) -> None:
+    with world(family) as there:
+        there.simulator.nodes[IDS[1]].unplug()
+        assert [there.device(node).ping() for node in (*IDS, 9)] == [True, False, True, False]
+        there.simulator.nodes[IDS[1]].plug()
+        assert there.device(IDS[1]).ping() is True
+
+
+@pytest.mark.parametrize("ids", [IDS, (2, 5, 9), (7,)], ids=str)
+@pytest.mark.parametrize("asked", [(), tuple(range(1, 12))], ids=["all", "some"])
+def test_a_scan_finds_exactly_who_is_there(
+    family: Family, ids: tuple[int, ...], asked: tuple[int, ...]
+) -> None:
+    with world(family, ids=ids) as there:
+        found = there.bus.run(family.scan(asked))
+        assert sorted(one.node for one in found) == list(ids)
+        assert {one.rate for one in found} == {family.link.rate}
+        for one in found:
+            assert one.identity == there.bus.run(family.identify(one.node))
+
+
+def test_a_scan_finds_nobody_where_nobody_is(family: Family) -> None:
+    with world(family, ids=(20,)) as there:
+        assert there.bus.run(family.scan(IDS)) == []
+        assert there.bus.run(family.scan((20,)))
+
+
+def test_a_scan_tells_early(family: Family) -> None:
+    """The first that is found is reported while others have still to be asked; what is found last, before the end."""
+    with world(family) as there, sent(there.bus) as frames:
+        when: list[tuple[Found, int]] = []
+        watch = there.bus.trace.subscribe(limit=1_000_000)
+        left = 0
+
+        def report(event: object) -> None:
+            nonlocal left
+            left += sum(record.direction == "tx" for record in watch)
+            there.events.append(event)
+            if isinstance(event, Found):
+                when.append((event, left))
+
+        found = there.bus.run(family.scan(tuple(range(1, 20))), report)
+    assert {(one.node, one.rate) for one, _ in when} == {(one.node, one.rate) for one in found}
+    assert when[0][1] < when[-1][1] < len(frames)
+    progress = [event for event in there.events if isinstance(event, Progress)]
+    assert progress
+    assert all(0 <= event.done <= event.total for event in progress)
+
+
+def test_a_scan_finds_at_each_rate_who_is_there(family: Family) -> None:
+    with world(family) as there:
+        rates = family.link.rates
+        found = there.bus.run(family.scan(IDS, rates))
+        assert {(one.node, one.rate) for one in found} == {(node, family.link.rate) for node in IDS}
+        there.bus.run(family.scan(IDS, (family.link.rate,)))
+        assert there.device(NODE).ping() is True
+
+
+def test_the_same_said_is_the_same_heard(family: Family) -> None:
+    def heard() -> list[tuple[float, str, Data]]:
+        with world(family) as there:
+            watch = there.bus.trace.subscribe(limit=100_000)
+            for operation in looks(there).values():
+                there.bus.run(operation)
+            return [tuple(record) for record in watch]
+
+    once = heard()
+    assert once
+    assert heard() == once
+
+
+def test_what_a_simulated_node_says_of_itself_is_plain_data(family: Family) -> None:
+    with world(family) as there:
+        for node in IDS:
+            status = there.simulator.nodes[node].status()
+            assert json.loads(json.dumps(status)) == status
+
+
+def test_nodes_that_go_and_come_are_noticed(family: Family) -> None:
+    def everyone() -> Operation[list[bool]]:
+        return (yield from Together([said(there.device(node), "ping") for node in IDS]))
+
+    with world(family) as there:
+        assert there.bus.run(everyone()) == [True] * len(IDS)
+        for node in IDS:
+            there.simulator.nodes[node].unplug()
+        assert there.bus.run(everyone()) == [False] * len(IDS)
+        for node in IDS:
+            there.simulator.nodes[node].plug()
+        assert there.bus.run(everyone()) == [True] * len(IDS)

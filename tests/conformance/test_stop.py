@@ -1,0 +1,181 @@
+"""An emergency stop works from every state: whatever was going on, everything comes to rest and is acknowledged."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from typing import Any
+
+import pytest
+
+from motorbus.bus.pump import Bus
+from motorbus.bus.stop import StopOutcome
+from motorbus.core.family import Family
+from motorbus.core.operation import Effect, Exchange
+from motorbus.errors import Interrupted, MotionError, NoReply
+from tests.conformance.test_guarded import Interrupting, guarded
+from tests.conformance.world import IDS, World, closed, locks, said, sent, world
+
+NODE = IDS[0]
+WAY = 1.0  # rad
+MOST = 2000
+
+
+def met(there: World) -> None:
+    """Everyone has answered once, so the bus knows them."""
+    for node in IDS:
+        assert there.device(node).ping() is True
+
+
+def positions(there: World) -> list[float]:
+    return [there.device(node).telemetry().position for node in IDS]
+
+
+def under_way(there: World) -> None:
+    """All of them move."""
+    for node in IDS:
+        device = there.device(node)
+        device.enable_torque()
+        device.move(device.position() + WAY, wait=False)
+    there.link.advance(0.05)
+    assert [there.device(node).telemetry().moving for node in IDS] == [True] * len(IDS)
+
+
+def assert_at_rest(there: World, outcome: StopOutcome, silent: tuple[int, ...] = ()) -> None:
+    """Everyone acknowledged, nobody moves and nobody will."""
+    assert sorted(outcome.acknowledged) == [node for node in IDS if node not in silent]
+    assert sorted(outcome.silent) == sorted(silent)
+    assert outcome.promise
+    there.link.advance(1.0)
+    before = positions(there)
+    there.link.advance(2.0)
+    assert positions(there) == pytest.approx(before, abs=1e-3)
+
+
+def test_when_nobody_is_known_yet(family: Family) -> None:
+    with world(family) as there, sent(there.bus) as frames:
+        assert there.bus.estop().promise
+    assert len(frames) >= len(family.stop({}).exchanges)
+
+
+def test_when_idle(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        assert_at_rest(there, there.bus.estop())
+
+
+def test_without_a_gate(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        under_way(there)
+        bus = Bus(there.link, mover)
+        for node in IDS:
+            assert mover.devices.blocking(bus, node).ping() is True
+        assert_at_rest(there, bus.estop())
+
+
+def test_when_everything_moves(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        begin = positions(there)
+        under_way(there)
+        assert_at_rest(there, there.bus.estop())
+        ways = [abs(end - start) for start, end in zip(begin, positions(there), strict=True)]
+        assert all(0 < way < WAY for way in ways)
+
+
+def test_when_the_torque_is_off(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        for node in IDS:
+            there.device(node).enable_torque()
+            there.device(node).disable_torque()
+        assert_at_rest(there, there.bus.estop())
+
+
+def test_when_an_exchange_is_under_way(mover: Family) -> None:
+    for number in range(1, 8):
+        with world(mover, link=Interrupting) as there:
+            met(there)
+            under_way(there)
+            link: Any = there.link
+            link.countdown = number
+            while not link.pressed:
+                with suppress(KeyboardInterrupt):
+                    there.device(NODE).telemetry()
+            assert_at_rest(there, there.bus.estop())
+
+
+def test_after_a_timeout_and_while_one_is_silent(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        under_way(there)
+        there.simulator.nodes[NODE].unplug()
+        with pytest.raises(NoReply):
+            there.device(NODE).telemetry()
+        outcome = there.bus.estop()
+        there.simulator.nodes[NODE].plug()
+        assert_at_rest(there, outcome, silent=(NODE,))
+        assert_at_rest(there, there.bus.estop())
+
+
+def test_twice_and_then_released(mover: Family) -> None:
+    with world(mover) as there:
+        met(there)
+        under_way(there)
+        assert_at_rest(there, there.bus.estop())
+        assert_at_rest(there, there.bus.estop())
+        device = there.device(NODE)
+        here = device.position()
+        for refused in (device.enable_torque, lambda: device.move(here + 0.1)):
+            with pytest.raises(Interrupted):
+                refused()
+        assert device.position() == pytest.approx(here, abs=1e-3)
+        there.bus.reset()
+        device.enable_torque()
+        device.move(here + 0.1)
+        assert device.position() == pytest.approx(here + 0.1, abs=0.06)
+
+
+def test_at_any_moment_of_a_move(mover: Family) -> None:
+    """The move of one node and a guarded write of another are under way; the lock is closed in the end."""
+
+    async def stopped_at(number: int) -> bool:
+        with world(mover) as there:
+            met(there)
+            there.device(NODE).enable_torque()
+            to = there.device(NODE).position() + WAY
+            operations = [said(there.device(NODE), "move", to), guarded(there)]
+            bus = there.async_bus()
+            for node in IDS:
+                await mover.devices.awaiting(bus, node).ping()
+            tasks = [asyncio.ensure_future(bus.run(operation)) for operation in operations]
+            for _ in range(number):
+                await asyncio.sleep(0)
+            over = all(task.done() for task in tasks)
+            outcome = bus.estop()
+            ends = await asyncio.gather(*tasks, return_exceptions=True)
+            assert [end for end in ends if end and not isinstance(end, MotionError)] == []
+            assert_at_rest(there, outcome)
+            for lock in locks(mover):
+                assert there.memory(NODE)["lock"] == closed(lock), number
+            await bus.close()
+        return over
+
+    number = 0
+    while not asyncio.run(stopped_at(number)):
+        number += 1 if number < 40 else 20
+        assert number < MOST
+    assert number > 10
+
+
+def test_what_stops_does_not_switch_on_or_keep(family: Family) -> None:
+    effects = {exchange.effect for exchange in family.stop(dict.fromkeys(IDS)).exchanges}
+    assert effects <= {Effect.NONE, Effect.TORQUE, Effect.MOTION}
+
+
+def test_stop_frames_are_small_enough_to_hurry(family: Family) -> None:
+    def air(exchange: Exchange[Any]) -> float:
+        return family.air_time(exchange, family.link.rate)
+
+    assert all(air(exchange) < 0.02 for exchange in family.stop(dict.fromkeys(IDS)).exchanges)

@@ -1,0 +1,149 @@
+"""The guarded write: torque off, unlock, write, read back, lock; and the lock is closed whatever happens."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.core.operation import Effect, Rank, Timeout
+from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
+from motorbus.families.feetech.driver import write
+from tests.families.feetech.driver_script import (
+    Line,
+    Played,
+    play,
+    prepared,
+    prepares,
+    reads,
+    unheard,
+    watch,
+    writes,
+)
+
+OFF, UNLOCK, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
+WRITES = (writes(3, 20, 5, 33), reads(3, 20, 5, 33))
+WHOLE = (OFF, UNLOCK, *WRITES, LOCK, LOCKED)
+
+
+def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
+    played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
+    assert played.alone == 1
+    assert [exchange.timeout for exchange in played.exchanges[1:]] == [Timeout.STORE] * 5
+    assert [exchange.effect for exchange in played.exchanges] == [
+        Effect.TORQUE,
+        Effect.PERSISTENT,
+        Effect.PERSISTENT,
+        Effect.NONE,
+        Effect.PERSISTENT,
+        Effect.NONE,
+    ]
+    assert played.exchanges[0].rank is Rank.STOP
+
+
+def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
+    play(
+        write(prepared(), position_p=33, max_temperature=65, torque_limit=0.5),
+        *(OFF, UNLOCK, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
+        *(LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
+    )
+
+
+def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
+    played = watch(
+        write(prepared(), operating_mode=1),
+        *(OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), LOCK, LOCKED),
+    )
+    assert max(exchange.effect for exchange in played.exchanges) is Effect.TORQUE
+
+
+def test_settings_are_read_again_afterwards() -> None:
+    node = prepared()
+    play(write(node, operating_mode=1), OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), LOCK, LOCKED)
+    assert node.settings is None
+    play(write(node, torque_enable=0), prepares(at_33=1), OFF)
+    assert node.mode == 1
+
+
+def test_reading_back_different_is_an_error_and_the_lock_is_closed() -> None:
+    played = Played([OFF, UNLOCK, WRITES[0], reads(3, 20, 5, 32), LOCK])
+    with pytest.raises(VerificationFailed, match="register 20 to 21"):
+        played.run(write(prepared(), position_p=33, led_mask=5))
+    assert played.script == []
+
+
+def test_a_lock_that_stays_open_is_an_error_and_is_tried_again() -> None:
+    played = Played([OFF, UNLOCK, *WRITES, LOCK, reads(3, 55, 0), LOCK])
+    with pytest.raises(VerificationFailed, match="register 55"):
+        played.run(write(prepared(), position_p=33, led_mask=5))
+    assert played.script == []
+
+
+@pytest.mark.parametrize("step", range(len(WHOLE)))
+def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
+    played = Played([*WHOLE[:step], LOCK], interrupt_at=step)
+    with pytest.raises(KeyboardInterrupt):
+        played.run(write(prepared(), position_p=33, led_mask=5))
+    assert played.script == []
+    assert played.sent[-1] == LOCK.sent
+
+
+@pytest.mark.parametrize("step", range(len(WHOLE)))
+@pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
+def test_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
+    played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in after(step)), LOCK])
+    with pytest.raises(type(failure)):
+        played.run(write(prepared(), position_p=33, led_mask=5))
+    assert played.script == []
+    assert played.sent[-1] == LOCK.sent
+
+
+def after(step: int) -> list[Line]:
+    """What is asked when everything fails from this step on, until the lock is closed at last."""
+    line = WHOLE[step]
+    if line is OFF:
+        return [OFF, OFF, OFF, reads(3, 40, 0)]
+    read_back = {UNLOCK: reads(3, 55, 0), WRITES[0]: WRITES[1], LOCK: LOCKED}
+    return [line, read_back[line]] if line in read_back else [line]
+
+
+@pytest.mark.parametrize("step", range(len(WHOLE)))
+def test_a_second_interruption_does_not_leave_the_lock_open(step: int) -> None:
+    first = Line(WHOLE[step].sent, KeyboardInterrupt("first"))
+    played = Played([*WHOLE[:step], first, Line(LOCK.sent, KeyboardInterrupt("second")), LOCK])
+    with pytest.raises(KeyboardInterrupt, match="first"):
+        played.run(write(prepared(), position_p=33, led_mask=5))
+    assert played.script == []
+
+
+def test_a_lock_that_cannot_be_closed_is_told_with_the_error() -> None:
+    with pytest.raises(VerificationFailed) as caught:
+        play(
+            write(prepared(), position_p=33, led_mask=5),
+            *(OFF, UNLOCK, WRITES[0], reads(3, 20, 0, 0), unheard(LOCK), unheard(LOCK)),
+        )
+    assert "EEPROM lock of node 3 may still be open" in caught.value.__notes__[0]
+
+
+def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
+    play(
+        write(prepared(at_8=0), led_mask=5),
+        *(unheard(OFF), reads(3, 40, 0), unheard(UNLOCK), reads(3, 55, 0)),
+        *(unheard(writes(3, 20, 5)), reads(3, 20, 5), reads(3, 20, 5)),
+        *(unheard(LOCK), LOCKED, LOCKED),
+    )
+
+
+def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
+    play(
+        write(prepared(), status_return_level=0),
+        *(OFF, UNLOCK, unheard(writes(3, 8, 0)), reads(3, 8, 0), reads(3, 8, 0)),
+        *(unheard(LOCK), LOCKED, LOCKED),
+    )
+
+
+def test_an_operation_that_is_thrown_away_does_not_complain() -> None:
+    operation = write(prepared(), led_mask=5)
+    step = next(operation)
+    operation.close()
+    inner = step.operation  # type: ignore[union-attr]
+    next(iter(inner))
+    iter(inner).close()

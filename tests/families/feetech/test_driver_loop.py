@@ -1,0 +1,100 @@
+"""Prepared group operations: made once, run each cycle, and refused when the servos are not known."""
+
+from __future__ import annotations
+
+from math import inf, nan, tau
+
+import pytest
+
+from motorbus.core.operation import Effect, Goal, Rank
+from motorbus.errors import LimitExceeded, RequestError
+from motorbus.families.feetech.driver import Node, sync_read_positions, sync_write_positions
+from tests.families.feetech.driver_script import (
+    ALL,
+    SYNC_WRITE,
+    Line,
+    low_high,
+    packet,
+    play,
+    prepared,
+    sync_reads,
+    watch,
+)
+
+COUNT = tau / 4096
+
+
+def test_positions_of_all_in_one_exchange_that_may_be_kept() -> None:
+    one, other = prepared(1), prepared(2)
+    exchange = sync_read_positions([one, other])
+    assert exchange.tells_position
+    for raw in (0, 1304):
+        found = play(exchange, sync_reads(56, {1: low_high(raw), 2: low_high(-5)}, 2))
+        assert found.values == {1: pytest.approx(raw * COUNT), 2: pytest.approx(-5 * COUNT)}
+        assert (found.missing, found.at) == ((), one.at)
+
+
+def test_a_missing_position_is_missing_and_never_replaced() -> None:
+    one, other = prepared(1), prepared(2)
+    frames = [packet(2, 0x01, 0, 8)]
+    found = play(sync_read_positions([one, other]), Line(sync_reads(56, {1: None, 2: None}, 2).sent, frames))
+    assert found.values == {2: pytest.approx(2048 * COUNT)}
+    assert found.missing == (1,)
+    assert other.alarm == ("voltage",)
+
+
+def test_a_train_too_long_for_a_stop_is_refused_unless_asked_for() -> None:
+    nodes = [prepared(id) for id in range(51)]
+    with pytest.raises(RequestError, match="more than 4 ms of air"):
+        sync_read_positions(nodes)
+    assert len(sync_read_positions(nodes, air=0.005).replies) == 51  # type: ignore[arg-type]
+    with pytest.raises(RequestError, match="at 115200 bit/s"):
+        sync_read_positions(nodes[:6], rate=115_200)
+
+
+def test_goals_of_all_in_one_packet() -> None:
+    one, other = prepared(1), prepared(2, at_30=2)
+    exchange = sync_write_positions([one, other], [1304 * COUNT, 2 * 2048 * COUNT])
+    assert exchange.goals == (
+        Goal(1, "position", 1304 * COUNT, 0.0, 4095 * COUNT),
+        Goal(2, "position", 2048 * COUNT * 2, 0.0, 4095 * COUNT * 2),
+    )
+    assert (exchange.effect, exchange.rank, exchange.replies) == (Effect.MOTION, Rank.CONTROL, ())
+    watch(exchange, Line(packet(ALL, SYNC_WRITE, 42, 2, 1, 0x18, 5, 2, 0, 8), None))
+
+
+@pytest.mark.parametrize("to", [nan, inf, -inf])
+def test_goals_that_are_no_numbers_are_refused(to: float) -> None:
+    with pytest.raises(LimitExceeded, match="is no position"):
+        sync_write_positions([prepared(1)], [to])
+
+
+def test_servos_that_are_not_prepared_are_refused_with_advice() -> None:
+    for make in (lambda: sync_read_positions([Node(1)]), lambda: sync_write_positions([Node(1)], [0.0])):
+        with pytest.raises(RequestError, match="not prepared") as caught:
+            make()
+        assert "prepare()" in caught.value.advice
+
+
+def test_servos_in_other_modes_are_refused() -> None:
+    with pytest.raises(RequestError, match="operating mode 1"):
+        sync_write_positions([prepared(1, at_33=1)], [0.0])
+
+
+def test_more_than_a_packet_carries_are_refused() -> None:
+    nodes = [prepared(id) for id in range(84)]
+    assert sync_write_positions(nodes[:83], [0.0] * 83).replies == ()
+    with pytest.raises(RequestError, match="one packet cannot carry"):
+        sync_write_positions(nodes, [0.0] * 84)
+
+
+@pytest.mark.parametrize(("count", "message"), [(1, "1 positions for 2 servos"), (3, "3 positions for 2")])
+def test_each_servo_needs_its_position(count: int, message: str) -> None:
+    with pytest.raises(RequestError, match=message):
+        sync_write_positions([prepared(1), prepared(2)], [0.0] * count)
+
+
+def test_a_servo_named_twice_is_refused() -> None:
+    one = prepared(1)
+    with pytest.raises(RequestError, match="named twice"):
+        sync_read_positions([one, one])

@@ -1,0 +1,222 @@
+"""Holding without a jump, moving in one packet, standing still; and everything that is refused beforehand."""
+
+from __future__ import annotations
+
+from math import inf, nan, tau
+
+import pytest
+
+from motorbus.core.operation import Effect, Goal, Rank
+from motorbus.errors import DeviceError, LimitExceeded, OutcomeUnknown, RequestError
+from motorbus.families.feetech.driver import Node, Promise, enable_torque, move, stop
+from motorbus.families.feetech.driver.motion import move_block
+from motorbus.families.feetech.table import STS
+from tests.families.feetech.driver_script import (
+    Line,
+    low_high,
+    play,
+    prepared,
+    prepares,
+    reads,
+    unheard,
+    watch,
+    writes,
+)
+
+COUNT = tau / 4096
+ON = writes(3, 40, 1)
+
+
+def stands(raw: int) -> Line:
+    return reads(3, 56, *low_high(raw))
+
+
+def goes(raw: int, *, acceleration: int = 0, velocity: int = 0) -> Line:
+    return writes(3, 41, acceleration, *low_high(raw), 0, 0, *low_high(velocity))
+
+
+# -- torque on -----------------------------------------------------------------------------------------------
+
+
+def test_the_goal_becomes_the_present_position_before_torque_goes_on() -> None:
+    played = watch(enable_torque(Node(3)), prepares(), stands(1304), writes(3, 42, *low_high(1304)), ON)
+    goal, switch = played.exchanges[2:]
+    assert goal.effect is Effect.MOTION
+    assert goal.goals == (Goal(3, "position", 1304 * COUNT, 1304 * COUNT, 1304 * COUNT),)
+    assert (switch.effect, switch.goals) == (Effect.TORQUE, ())
+
+
+def test_limits_and_mode_are_read_anew_each_time() -> None:
+    play(enable_torque(prepared(at_33=1)), prepares(), stands(5), writes(3, 42, 5, 0), ON)
+
+
+@pytest.mark.parametrize(
+    ("mode", "lines"),
+    [
+        (1, [writes(3, 46, 0, 0), ON]),
+        (2, [writes(3, 44, 0, 0), ON]),
+        (3, [ON]),
+    ],
+)
+def test_other_modes_start_at_rest(mode: int, lines: list[Line]) -> None:
+    play(enable_torque(Node(3)), prepares(at_33=mode), *lines)
+
+
+def test_an_undocumented_mode_is_refused() -> None:
+    with pytest.raises(RequestError, match="operating mode 4"):
+        play(enable_torque(Node(3)), prepares(at_33=4))
+
+
+@pytest.mark.parametrize(("raw", "limit"), [(90, 100), (3005, 3000)])
+def test_beyond_its_limits_a_servo_would_jump_so_torque_stays_off(raw: int, limit: int) -> None:
+    narrow = prepares(at_9=100, at_11=0xB8, at_12=0x0B)
+    with pytest.raises(LimitExceeded, match="it would jump to") as caught:
+        play(enable_torque(Node(3)), narrow, stands(raw))
+    assert f"{limit * COUNT:.4g}" in caught.value.summary
+    play(enable_torque(Node(3), jump=10 * COUNT), narrow, stands(raw), writes(3, 42, *low_high(limit)), ON)
+
+
+def test_many_turns_have_room_for_every_position() -> None:
+    turns = prepares(at_11=0, at_12=0)
+    play(enable_torque(Node(3)), turns, stands(-6015), writes(3, 42, *low_high(-6015)), ON)
+
+
+def test_when_the_goal_is_in_doubt_torque_is_not_switched_on() -> None:
+    with pytest.raises(OutcomeUnknown):
+        play(
+            enable_torque(Node(3)),
+            *(prepares(), stands(1304), unheard(writes(3, 42, *low_high(1304))), unheard(reads(3, 42, 0, 0))),
+        )
+
+
+def test_a_stranger_is_not_switched_on() -> None:
+    with pytest.raises(DeviceError):
+        play(enable_torque(Node(3)), prepares(at_0=9))
+
+
+# -- stop ----------------------------------------------------------------------------------------------------
+
+
+def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
+    wish = stop(prepared())
+    played = watch(wish, stands(777), writes(3, 42, *low_high(777)))
+    assert played.exchanges[1].rank is Rank.CONTROL
+    assert play(stop(prepared()), stands(777), writes(3, 42, *low_high(777))) is Promise.HOLD_ACCEPTED
+    assert "not verified" in Promise.HOLD_ACCEPTED.value
+
+
+def test_stop_is_never_refused_for_standing_outside_the_limits() -> None:
+    played = watch(stop(prepared(at_12=0)), stands(900), writes(3, 42, *low_high(900)))
+    (goal,) = played.exchanges[1].goals
+    assert goal.low == goal.value == goal.high
+
+
+@pytest.mark.parametrize(
+    ("mode", "line", "promise"),
+    [
+        (1, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
+        (2, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+    ],
+)
+def test_stop_in_other_modes_says_what_it_promises(mode: int, line: Line, promise: Promise) -> None:
+    assert play(stop(prepared(at_33=mode)), line) is promise
+
+
+@pytest.mark.parametrize(("mode", "message"), [(3, "step mode"), (9, "operating mode 9")])
+def test_stop_where_nothing_is_known_to_stop_it_names_the_way_out(mode: int, message: str) -> None:
+    with pytest.raises(RequestError, match=message) as caught:
+        play(stop(prepared(at_33=mode)))
+    assert "disable_torque()" in caught.value.advice
+
+
+def test_stop_of_a_new_servo_asks_it_first() -> None:
+    play(stop(Node(3)), prepares(), stands(0), writes(3, 42, 0, 0))
+
+
+# -- move ----------------------------------------------------------------------------------------------------
+
+
+def test_a_move_is_one_packet() -> None:
+    wish = move(prepared(), 2048 * COUNT, velocity=1000 * COUNT, acceleration=5000 * COUNT, wait=False)
+    (exchange,) = watch(wish, goes(2048, acceleration=50, velocity=1000)).exchanges
+    assert (exchange.effect, exchange.repeatable, exchange.rank) == (Effect.MOTION, True, Rank.CONTROL)
+    assert exchange.goals == (Goal(3, "position", 2048 * COUNT, 0.0, 4095 * COUNT),)
+
+
+def test_a_new_servo_is_asked_for_its_limits_first() -> None:
+    wish = move(Node(3), 1.0, wait=False)
+    played = watch(wish, prepares(at_12=0x08), goes(652))
+    assert played.exchanges[1].goals == (Goal(3, "position", 652 * COUNT, 0.0, 2303 * COUNT),)
+
+
+def test_goals_are_sign_magnitude() -> None:
+    play(
+        move(prepared(at_11=0, at_12=0), -1000 * COUNT, wait=False), writes(3, 41, 0, 0xE8, 0x83, 0, 0, 0, 0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("phase", "velocity", "raw"),
+    [(12, None, 0), (12, 50, 50), (8, 50, 1), (8, 5000, 100), (4, None, 3400), (0, None, 68), (4, 7, 7)],
+)
+def test_velocity_by_the_unit_of_the_servo_and_no_velocity_is_the_maximum(
+    phase: int, velocity: int | None, raw: int
+) -> None:
+    wish = move(prepared(at_18=phase), 0.0, velocity=velocity and velocity * COUNT, wait=False)
+    play(wish, goes(0, velocity=raw))
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [{"velocity": 0.0}, {"velocity": 0.0005}, {"acceleration": 0.0}, {"acceleration": 0.05}],
+)
+def test_a_bound_too_small_to_be_said_is_not_turned_into_no_bound(bounds: dict[str, float]) -> None:
+    with pytest.raises(RequestError, match="not above 0, or is less than"):
+        play(move(prepared(), 1.0, **bounds))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("bounds", [{"velocity": 1000.0}, {"acceleration": 1000.0}])
+def test_a_bound_beyond_the_register_is_refused(bounds: dict[str, float]) -> None:
+    with pytest.raises(RequestError, match="out of range"):
+        play(move(prepared(), 1.0, **bounds))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("to", [nan, inf, -inf])
+def test_a_goal_that_is_no_number_costs_no_packet(to: float) -> None:
+    with pytest.raises(LimitExceeded, match="is no position"):
+        play(move(Node(3), to))
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration", "tolerance", "timeout"])
+@pytest.mark.parametrize("value", [nan, inf, -1.0])
+def test_bounds_that_are_no_numbers_cost_no_packet(name: str, value: float) -> None:
+    with pytest.raises(RequestError, match="not a finite number above 0"):
+        play(move(Node(3), 1.0, **{name: value}))  # type: ignore[arg-type]
+
+
+def test_a_move_needs_position_mode() -> None:
+    with pytest.raises(RequestError, match="operating mode 1") as caught:
+        play(move(prepared(at_33=1), 1.0))
+    assert "write(operating_mode=0)" in caught.value.advice
+
+
+def test_a_stranger_is_not_moved() -> None:
+    with pytest.raises(DeviceError):
+        play(move(Node(3), 1.0), prepares(at_0=9))
+
+
+def test_a_servo_that_acknowledges_nothing_is_read_back() -> None:
+    play(
+        move(prepared(at_8=0), 2048 * COUNT, wait=False),
+        *(unheard(goes(2048)), reads(3, 41, 0, 0, 8, 0, 0, 0, 0)),
+    )
+
+
+def test_waiting_ends_when_it_is_there() -> None:
+    there = reads(3, 56, *low_high(2040), *[0] * 13)
+    moving = reads(3, 56, *low_high(1000), *[0] * 8, 1, 0, 0, 0, 0)
+    play(move(prepared(), 2048 * COUNT), goes(2048), moving, moving, there)
+
+
+def test_goals_are_rounded_to_what_the_servo_can_be_told() -> None:
+    assert move_block(prepared(), STS, -1e-9).goals[0].value == 0

@@ -1,0 +1,111 @@
+"""What the settings of a servo mean for ids, units, limits and alarms; nothing is guessed."""
+
+from __future__ import annotations
+
+from math import inf, nan, tau
+
+import pytest
+
+from motorbus.core.entry import Value
+from motorbus.errors import RequestError
+from motorbus.families.feetech.driver import Node
+from motorbus.families.feetech.driver.node import as_nodes
+from motorbus.families.feetech.table import STS
+from tests.families.feetech.driver_script import prepared
+
+COUNT = tau / 4096
+
+
+@pytest.mark.parametrize("id", [0, 1, 253])
+def test_ids_of_one_servo_are_0_to_253(id: int) -> None:
+    assert Node(id).node == id
+
+
+@pytest.mark.parametrize("id", [-1, 254, 255, 1000, 1.0, "3", True, None])
+def test_nothing_else_is_the_id_of_one_servo(id: object) -> None:
+    with pytest.raises(RequestError, match="not the id of a servo"):
+        Node(id)  # type: ignore[arg-type]
+
+
+def test_254_is_named_as_everyone() -> None:
+    with pytest.raises(RequestError, match="everyone at once"):
+        Node(254)
+
+
+def test_a_new_node_knows_nothing() -> None:
+    node = Node(3)
+    assert (node.identity, node.table, node.settings, node.limits, node.mode) == (None,) * 5
+    assert (node.alarm, node.at, node.writable) == ((), -inf, False)
+
+
+def test_limits_are_those_of_the_servo() -> None:
+    low, high = prepared(at_9=0x64, at_11=0xB8, at_12=0x0B).limits or (nan, nan)
+    assert (low, high) == (100 * COUNT, 3000 * COUNT)
+
+
+def test_both_limits_0_are_many_turns() -> None:
+    assert prepared(at_11=0, at_12=0).limits == (-30719 * COUNT, 30719 * COUNT)
+
+
+@pytest.mark.parametrize(
+    ("phase", "factor", "zero_is_maximum", "tells_current"),
+    [
+        (0b00_1100, 1, True, True),
+        (0b00_1000, 50, True, True),
+        (0b00_0100, 1, False, True),
+        (0b10_1100, 1, True, False),
+        (0, 50, False, True),
+    ],
+)
+def test_the_phase_register_says_what_velocities_and_currents_mean(
+    phase: int, factor: int, zero_is_maximum: bool, tells_current: bool
+) -> None:
+    node = prepared(at_18=phase)
+    assert node.settings is not None
+    assert node.settings.zero_is_maximum is zero_is_maximum
+    assert node.settings.tells_current is tells_current
+    for name in ("present_velocity", "goal_velocity"):
+        assert node.value(STS[name], 10) == pytest.approx(10 * factor * COUNT)
+        assert node.raw(STS[name], 10 * factor * COUNT) == 10
+
+
+def test_angular_resolution_widens_every_position_and_the_limits() -> None:
+    node = prepared(at_30=2)
+    assert node.value(STS["present_position"], 1000) == pytest.approx(2000 * COUNT)
+    assert node.raw(STS["goal_position"], 2000 * COUNT) == 1000
+    assert node.limits == (0, 2 * 4095 * COUNT)
+
+
+def test_status_return_level_and_mode_are_known() -> None:
+    node = prepared(at_8=0, at_33=1)
+    assert node.settings is not None
+    assert node.settings.answers_writes is False
+    assert node.mode == 1
+
+
+def test_settings_are_forgotten_and_identity_is_not() -> None:
+    node = prepared()
+    node.forget_settings()
+    assert (node.limits, node.mode) == (None, None)
+    assert node.writable
+
+
+@pytest.mark.parametrize("value", [True, "1", None, [1]])
+def test_only_numbers_are_values(value: object) -> None:
+    wrong: Value = value  # type: ignore[assignment]
+    with pytest.raises(RequestError, match="not a number"):
+        prepared().raw(STS["position_p"], wrong)
+
+
+def test_every_alarm_bit_is_told_and_none_stays() -> None:
+    node = Node(3)
+    node.heard(0b1110_0001, 7.0)
+    assert node.alarm == ("voltage", "overload", "undefined bit 6", "undefined bit 7")
+    node.heard(0, 8.0)
+    assert not node.alarm
+    assert node.at == 8.0
+
+
+def test_ids_and_servos_mix_and_each_is_visited_once() -> None:
+    known = prepared(4)
+    assert [(n.node, n is known) for n in as_nodes([2, known, 4, 2])] == [(2, False), (4, True)]

@@ -1,0 +1,85 @@
+"""Scanning: two passes, early news, identities at the end, and the rate of the bus as it was before."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.core.family import Found
+from motorbus.core.operation import Progress, Rank, Timeout
+from motorbus.errors import ChecksumError, LinkLost, RequestError
+from motorbus.families.feetech.driver import scan
+from tests.families.feetech.driver_script import PING, Line, Played, packet, play, reads, unheard, watch
+
+
+def asks(id: int) -> Line:
+    return Line(packet(id, PING), None)
+
+
+def answers(id: int) -> Line:
+    return Line(packet(id, PING), packet(id, 0))
+
+
+def tells(id: int) -> Line:
+    return reads(id, 0, 3, 10, 0, 9, 3)
+
+
+def test_the_silent_are_asked_once_more_and_the_found_are_identified() -> None:
+    found = play(scan([1, 2, 3]), answers(1), asks(2), asks(3), asks(2), answers(3), tells(1), tells(3))
+    assert [(one.node, one.rate, one.identity and one.identity.model) for one in found] == [
+        (1, 1_000_000, "STS3215"),
+        (3, 1_000_000, "STS3215"),
+    ]
+
+
+def test_news_come_early_and_progress_counts_up_to_the_end() -> None:
+    played = watch(scan([1, 2], rate=500_000), asks(1), answers(2), asks(1), tells(2))
+    assert [event for event in played.events if isinstance(event, Found)] == [Found(2, 500_000, None)]
+    progress = [event for event in played.events if isinstance(event, Progress)]
+    assert [(event.done, event.total) for event in progress] == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert played.events.index(Found(2, 500_000, None)) == 1
+
+
+def test_every_id_is_asked_when_none_is_named() -> None:
+    played = watch(scan(), *[asks(id) for id in (*range(254), *range(254))])
+    assert len(played.sent) == 508
+    assert (played.alone, played.rates) == (0, [])
+
+
+def test_a_scan_writes_nothing_and_yields_to_everything() -> None:
+    played = watch(scan([1]), answers(1), tells(1))
+    assert {exchange.effect.name for exchange in played.exchanges} == {"NONE"}
+    assert (played.exchanges[0].timeout, played.exchanges[0].rank) == (Timeout.SCAN, Rank.CONFIGURATION)
+
+
+def test_noise_is_no_answer() -> None:
+    damaged = Line(packet(1, PING), ChecksumError("c"))
+    assert play(scan([1]), damaged, damaged) == []
+
+
+def test_who_answers_and_does_not_tell_what_it_is_is_found_all_the_same() -> None:
+    assert play(scan([1]), answers(1), unheard(tells(1))) == [Found(1, 1_000_000, None)]
+
+
+def test_several_rates_are_tried_alone_and_the_rate_is_set_back() -> None:
+    played = Played([asks(1), asks(1), answers(1), tells(1)])
+    found = played.run(scan([1], [500_000, 115_200], rate=250_000))
+    assert [(one.node, one.rate) for one in found] == [(1, 115_200)]
+    assert (played.rates, played.alone) == ([500_000, 115_200, 250_000], 1)
+
+
+@pytest.mark.parametrize("step", range(4))
+def test_an_interruption_sets_the_rate_back(step: int) -> None:
+    played = Played([asks(1), asks(1), answers(1), tells(1)], interrupt_at=step)
+    with pytest.raises(KeyboardInterrupt):
+        played.run(scan([1], [500_000, 115_200], rate=250_000))
+    assert played.rates[-1] == 250_000
+
+
+def test_a_lost_link_ends_the_scan() -> None:
+    with pytest.raises(LinkLost):
+        play(scan([1, 2]), Line(packet(1, PING), LinkLost("gone")))
+
+
+def test_everyone_is_no_id_to_scan() -> None:
+    with pytest.raises(RequestError):
+        play(scan([254]))

@@ -1,0 +1,101 @@
+"""Torque off works on strangers, in spite of alarms, and visits everyone whatever happens."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.core.operation import Effect, Rank
+from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
+from tests.families.feetech.driver_script import (
+    ALL,
+    SYNC_WRITE,
+    Line,
+    Played,
+    packet,
+    play,
+    prepared,
+    reads,
+    unheard,
+    watch,
+    writes,
+)
+
+
+def off(id: int, error: int = 0) -> Line:
+    return writes(id, 40, 0, error=error)
+
+
+def all_off(*ids: int) -> Line:
+    return Line(packet(ALL, SYNC_WRITE, 40, 1, *(byte for id in ids for byte in (id, 0))), None)
+
+
+def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
+    (exchange,) = watch(disable_torque(Node(3)), off(3)).exchanges
+    assert (exchange.rank, exchange.effect) == (Rank.STOP, Effect.TORQUE)
+
+
+def test_alarms_do_not_matter() -> None:
+    node = Node(3)
+    play(disable_torque(node), off(3, error=0x3F))
+    assert "overload" in node.alarm
+
+
+def test_it_is_said_three_times_and_then_read_back() -> None:
+    play(disable_torque(Node(3)), unheard(off(3)), off(3))
+    play(disable_torque(Node(3)), *[unheard(off(3))] * 3, reads(3, 40, 0))
+
+
+def test_torque_that_stays_on_is_told() -> None:
+    with pytest.raises(VerificationFailed, match="register 40"):
+        play(disable_torque(Node(3)), *[unheard(off(3))] * 3, reads(3, 40, 1))
+
+
+def test_nobody_there_is_in_doubt() -> None:
+    with pytest.raises(OutcomeUnknown):
+        play(disable_torque(Node(3)), *[unheard(off(3))] * 3, unheard(reads(3, 40, 0)))
+
+
+def test_a_servo_that_acknowledges_nothing_is_read_back() -> None:
+    play(disable_torque(prepared(at_8=0)), unheard(off(3)), reads(3, 40, 0))
+
+
+def test_everyone_is_let_go_at_once_and_then_one_by_one() -> None:
+    assert play(disable_torque_all([1, 2, 3]), all_off(1, 2, 3), off(1), off(2), off(3)) == {}
+
+
+def test_nobody_is_no_packet() -> None:
+    assert play(disable_torque_all([])) == {}
+
+
+def test_more_than_a_packet_carries_are_split() -> None:
+    played = Played([all_off(*range(125)), all_off(125, 126), *map(off, range(127))])
+    assert played.run(disable_torque_all(range(127))) == {}
+
+
+def test_a_dead_servo_does_not_hold_up_the_others() -> None:
+    errors = play(
+        disable_torque_all([1, 2, 3]),
+        *(all_off(1, 2, 3), off(1), *[unheard(off(2))] * 3, unheard(reads(2, 40, 0)), off(3, error=0x20)),
+    )
+    assert {id: type(error) for id, error in errors.items()} == {2: OutcomeUnknown}
+
+
+@pytest.mark.parametrize("failure", [RequestError("no gate"), ChecksumError("c")])
+def test_every_error_is_collected(failure: MotorbusError) -> None:
+    lines = [Line(all_off(1, 2).sent, failure), Line(off(1).sent, failure)]
+    if isinstance(failure, ChecksumError):
+        lines += [Line(off(1).sent, failure)] * 2 + [Line(reads(1, 40, 0).sent, failure)]
+    errors = play(disable_torque_all([1, 2]), *lines, off(2))
+    assert errors == {1: failure}
+
+
+@pytest.mark.parametrize("step", range(4))
+def test_an_interruption_does_not_keep_anyone_from_being_let_go(step: int) -> None:
+    whole = [all_off(1, 2, 3), off(1), off(2), off(3)]
+    cut = Line(whole[step].sent, KeyboardInterrupt())
+    again = [whole[step]] if step else []
+    played = Played([*whole[:step], cut, *again, *whole[step + 1 :]])
+    with pytest.raises(KeyboardInterrupt):
+        played.run(disable_torque_all([1, 2, 3]))
+    assert played.script == []

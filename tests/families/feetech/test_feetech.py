@@ -1,0 +1,98 @@
+"""The family as the rest of motorbus sees it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import motorbus
+from motorbus import families
+from motorbus.core.family import Family
+from motorbus.core.operation import Due, Reply, Timeout
+from motorbus.families import feetech
+from motorbus.families.feetech import FAMILY, AsyncServo, Servo
+from tests.families.feetech.driver_script import PING, Line, packet, play, reads
+
+
+def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
+    family: Family = FAMILY
+    assert families.load("feetech") is family
+    assert motorbus.feetech is feetech
+    assert (family.name, family.window, family.lane(0), family.lane(253)) == ("feetech", 1, 0, 0)
+    assert family.devices == (Servo, AsyncServo)
+    assert list(family.tables) == ["sts"]
+
+
+def test_it_asks_for_bytes_at_a_megabaud_and_knows_twelve_rates() -> None:
+    link = FAMILY.link
+    assert (link.kind, link.rate, len(link.rates)) == ("bytes", 1_000_000, 12)
+    assert {76_800, 128_000, 4_800} < set(link.rates)
+    assert ["baud", "ids", "model", "position"] == [option.name for option in link.options][:4]
+    assert all(option.help for option in link.options)
+
+
+def test_times_come_from_the_line() -> None:
+    probe = FAMILY.probe(3, 0)
+    assert FAMILY.air_time(probe, 1_000_000) == pytest.approx((8 + 9) * 1e-5)
+    assert FAMILY.turnaround(probe) == pytest.approx(0.001508)
+    assert FAMILY.quiet_time(1_000_000) == pytest.approx(0.040, abs=0.0002)
+
+
+def test_the_echo_test_asks_for_one_byte_of_node_1() -> None:
+    test = FAMILY.echo_test()
+    assert test.request == packet(1, 2, 5, 1)
+    assert test.timeout is Timeout.SCAN
+
+
+def test_each_receiver_is_a_new_one() -> None:
+    one, other = FAMILY.receiver(), FAMILY.receiver()
+    assert one.feed(packet(3, 0)[:4]) == []
+    assert other.feed(packet(4, 0)) == [Reply(0, 4, packet(4, 0))]
+    assert one.feed(packet(3, 0)[4:]) == [Reply(0, 3, packet(3, 0))]
+
+
+def test_stop_lets_go_of_every_node_it_is_given() -> None:
+    stop = FAMILY.stop({3: None, 1: None})
+    assert [frame.replies for frame in stop.exchanges] == [(), (Due(1, 1, 6),), (Due(3, 3, 6),)]
+    assert "limp" in stop.promise
+
+
+def test_identify_and_scan_need_no_servo_object() -> None:
+    head = reads(3, 0, 3, 10, 0, 9, 3)
+    assert play(FAMILY.identify(3), head).model == "STS3215"
+    found = play(FAMILY.scan((3,), rate=500_000), Line(packet(3, PING), packet(3, 0)), head)
+    assert [(one.node, one.rate) for one in found] == [(3, 500_000)]
+
+
+def test_what_explains_a_frame_is_the_family_s() -> None:
+    (explanation,) = FAMILY.explain(packet(3, 2, 56, 2))
+    assert explanation.fault == ""
+
+
+@pytest.mark.parametrize("model", ["STS3215", "sts3215", "STS3032", "HTS3235", "STS3025BL"])
+def test_described_models_are_axes(model: str) -> None:
+    axis = FAMILY.axis(model)
+    assert {"position", "move", "stop", "state", "enable_torque", "disable_torque"} <= set(axis)
+    assert all(map(callable, axis.values()))
+
+
+@pytest.mark.parametrize("model", ["SCS0009", "HLS3950", "unknown model 9.99", "STS9999", ""])
+def test_models_of_maps_not_described_are_none(model: str) -> None:
+    assert FAMILY.axis(model) == {}
+
+
+def test_the_simulator_is_a_bus_of_the_usual_model() -> None:
+    assert list(FAMILY.simulator((4, 7)).nodes) == [4, 7]
+    with pytest.raises(motorbus.RequestError, match="sts9999"):
+        FAMILY.simulator((1,), "sts9999")
+
+
+def test_importing_the_family_does_not_import_its_simulator() -> None:
+    program = (
+        "import sys, motorbus.families.feetech; "
+        "print([m for m in sys.modules if 'feetech.simulator' in m or 'feetech.explain' in m])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

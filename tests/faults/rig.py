@@ -1,0 +1,101 @@
+"""Six simulated servos on a line that can be made to lie, and an oracle that knows what is true at this moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import Answer, Due, Exchange
+from motorbus.families.feetech import FAMILY, wire
+from motorbus.families.feetech.simulator import FeetechBus
+from motorbus.link.base import Line, PerfectLine
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+
+IDS = (1, 2, 3, 4, 5, 6)
+FEEDBACK = 15  # bytes from 56 on
+
+
+@dataclass
+class Rig:
+    """A bus, the servos at its end and a counter that makes every read have another right answer."""
+
+    line: Line = field(default_factory=PerfectLine)
+    options: dict[str, Any] = field(default_factory=dict)
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        self.simulator = FAMILY.simulator(IDS)
+        assert isinstance(self.simulator, FeetechBus)
+        self.servos = self.simulator.nodes
+        self.link = MemoryLink(self.simulator, line=self.line, **self.options)
+        self.bus = Bus(self.link, FAMILY, admit=Gate())
+        self.bus.turns.echo.excluded()
+
+    def put(self, line: Line) -> None:
+        """Another line between host and servos."""
+        self.line = self.link.line = line
+
+    def stir(self) -> int:
+        """Give every servo a position it has not had lately; returns it."""
+        self.count += 1
+        raw = 17 + self.count * 7919 % 4000
+        for servo in self.servos.values():
+            servo.raw_position = raw
+        return raw
+
+
+def words(answer: Answer) -> list[int]:
+    """The first word of each reply."""
+    return [int.from_bytes(reply.data[5:7], "little") for reply in answer.replies]
+
+
+def ping(rig: Rig) -> None:
+    answer = rig.bus.run(Exchange(wire.ping(1), (Due(1, 1, 6),), repeatable=True))
+    assert answer.replies[0].data == wire.encode_status(1, 0)
+
+
+def read_word(rig: Rig) -> None:
+    raw = rig.stir()
+    exchange = Exchange(wire.read(1, 56, 2), (Due(1, 1, 8),), repeatable=True)
+    assert words(rig.bus.run(exchange)) == [raw]
+
+
+def read_feedback(rig: Rig) -> None:
+    raw = rig.stir()
+    exchange = Exchange(wire.read(1, 56, FEEDBACK), (Due(1, 1, 6 + FEEDBACK),), repeatable=True)
+    assert words(rig.bus.run(exchange)) == [raw]
+
+
+def write_byte(rig: Rig) -> None:
+    """Register 41, the acceleration: success must mean that it was written."""
+    rig.count += 1
+    value = rig.count % 250
+    exchange = Exchange(wire.write(1, 41, bytes([value])), (Due(1, 1, 6),), repeatable=True)
+    rig.bus.run(exchange)
+    assert rig.servos[1].memory["acceleration"] == value
+
+
+def sync_read(rig: Rig) -> None:
+    """A node may be missing; one that is there is right."""
+    raw = rig.stir()
+    nodes = (1, 2, 3)
+    exchange = Exchange(
+        wire.sync_read(56, 2, nodes), tuple(Due(node, node, 8) for node in nodes), repeatable=True
+    )
+    answer = rig.bus.run(exchange)
+    assert words(answer) == [raw] * (len(nodes) - len(answer.missing))
+    if isinstance(rig.line, PerfectLine):
+        assert answer.missing == ()
+
+
+KINDS: dict[str, tuple[Callable[[Rig], None], int]] = {
+    "ping": (ping, 6),
+    "read 2 bytes": (read_word, 8),
+    "read 15 bytes": (read_feedback, 21),
+    "write": (write_byte, 6),
+    "sync read 3 x 2 bytes": (sync_read, 24),
+}
+"""Each exchange with the bytes its replies have together; each asserts that what it got is true."""

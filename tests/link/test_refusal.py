@@ -1,0 +1,68 @@
+"""What people are told when a port fails them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from motorbus.link.adapters import PortInfo
+from motorbus.link.refusal import Owner, busy, forbidden, full, lost, not_found, wrong_rate
+
+ACM = PortInfo(
+    "/dev/ttyACM0", "", 0x1A86, 0x55D3, "", "", "USB Single Serial", "CH343: usual on servo boards"
+)
+PLAIN = PortInfo("/dev/ttyS0", "", None, None, "", "", "", "")
+
+
+def test_a_port_that_is_not_there_comes_with_those_that_are() -> None:
+    told = str(not_found("/dev/ttyACM9", [ACM, PLAIN]))
+    assert "/dev/ttyACM9: there is no such port" in told
+    assert "one of /dev/ttyACM0 (CH343: usual on servo boards), /dev/ttyS0" in told
+
+
+def test_a_machine_without_ports_says_so() -> None:
+    assert "none at present" in str(not_found("/dev/ttyACM9", []))
+
+
+def test_a_symbolic_link_that_leads_nowhere_is_recognised(tmp_path: Path) -> None:
+    (tmp_path / "arm").symlink_to("/dev/pts/no-such-one")
+    assert "leads to /dev/pts/no-such-one, which is gone" in str(not_found(str(tmp_path / "arm"), []))
+
+
+def test_the_owner_is_named() -> None:
+    error = busy("/dev/ttyACM0", Owner(1, "init"))
+    assert (error.owner, error.summary) == (1, "/dev/ttyACM0 is held by process 1 (init)")
+    assert busy("/dev/ttyACM0", Owner(os.getpid(), "x")).owner == os.getpid()
+
+
+@pytest.mark.parametrize("program", ["ModemManager", "brltty"])
+def test_programs_that_grab_adapters_are_known(program: str) -> None:
+    assert busy("/dev/ttyUSB0", Owner(1, program)).advice != busy("/dev/ttyUSB0", Owner(1, "x")).advice
+
+
+@pytest.mark.parametrize("group", ["dialout", "uaccess"])
+def test_no_permission_says_how_to_get_it(group: str) -> None:
+    assert group in str(forbidden("/dev/ttyACM0", "/dev/null"))
+
+
+def test_the_group_is_the_one_of_the_device(tmp_path: Path) -> None:
+    (tmp_path / "device").touch()
+    os.chown(tmp_path / "device", -1, os.getgid())
+    told = str(forbidden("/dev/ttyACM0", str(tmp_path / "device")))
+    assert "usermod -aG root" not in told
+    assert "usermod -aG" in told
+
+
+def test_the_reason_of_a_loss_is_told() -> None:
+    assert (
+        lost("/dev/ttyACM0", OSError(5, "Input/output error")).summary
+        == "/dev/ttyACM0 is gone: Input/output error"
+    )
+    assert lost("/dev/ttyACM0", "it hung up").summary == "/dev/ttyACM0 is gone: it hung up"
+
+
+def test_figures_are_told() -> None:
+    assert "76800 bit/s" in str(wrong_rate("/dev/ttyACM0", 76_800, "no"))
+    assert "3 of 8" in str(full("/dev/ttyACM0", 3, 8))

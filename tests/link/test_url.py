@@ -1,0 +1,71 @@
+"""From a port's text to a link, or to one clear error."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from motorbus.errors import PortNotFound, RequestError
+from motorbus.link.pty import PtyMaster
+from motorbus.link.serial import SerialLink
+from motorbus.link.tcp import TcpLink
+from motorbus.link.url import open_link
+
+
+def test_a_device_is_opened(master: PtyMaster) -> None:
+    link = open_link(master.slave_name, rate=500_000)
+    assert isinstance(link, SerialLink)
+    assert (link.name, link.rate) == (master.slave_name, 500_000)
+    link.close()
+
+
+def test_a_symbolic_link_to_a_device_is_opened(master: PtyMaster, tmp_path: Path) -> None:
+    master.symlink(tmp_path / "arm")
+    link = open_link(str(tmp_path / "arm"), rate=1_000_000)
+    assert link.name == str(tmp_path / "arm")
+    link.close()
+
+
+def test_a_socket_is_opened() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        link = open_link(f"SOCKET://127.0.0.1:{server.getsockname()[1]}", rate=1_000_000)
+        assert isinstance(link, TcpLink)
+        link.close()
+
+
+@pytest.mark.parametrize("port", ["/dev/no-such-port", "COM77", "no such port"])
+def test_a_device_that_does_not_exist(port: str) -> None:
+    with pytest.raises(PortNotFound, match="there is no such port"):
+        open_link(port, rate=1_000_000)
+
+
+@pytest.mark.parametrize("port", ["tcp://host:4000", "http://host", "://", "x://y"])
+def test_an_unknown_scheme_comes_with_those_that_exist(port: str) -> None:
+    with pytest.raises(RequestError, match=r"socket://HOST:PORT|no port"):
+        open_link(port, rate=1_000_000)
+
+
+@pytest.mark.parametrize(("port", "kind"), [("can://socketcan/can0", "bytes"), ("/dev/ttyACM0", "frames")])
+def test_can_is_still_to_come(port: str, kind: str) -> None:
+    with pytest.raises(RequestError, match="KST"):
+        open_link(port, rate=500_000, kind=kind)
+
+
+@pytest.mark.parametrize("port", ["", "   ", "/dev/tty\0ACM0"])
+def test_what_is_no_port(port: str) -> None:
+    with pytest.raises(RequestError, match="is not a port"):
+        open_link(port, rate=1_000_000)
+
+
+@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
+def test_a_bad_address(scheme: str) -> None:
+    with pytest.raises(RequestError, match=f"{scheme}://HOST:PORT"):
+        open_link(f"{scheme}://host", rate=1_000_000)
+
+
+@pytest.mark.parametrize("rate", [0, -9600])
+def test_what_is_no_rate(rate: int, master: PtyMaster) -> None:
+    with pytest.raises(RequestError, match="not a rate"):
+        open_link(master.slave_name, rate=rate)

@@ -1,0 +1,42 @@
+"""Waiting for bytes, below and above the descriptor that select stops at."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from motorbus.link import waiting
+from motorbus.link.waiting import wait_readable
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    ends = os.pipe()
+    yield ends
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture(params=["select", "poll"], autouse=True)
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if request.param == "poll":
+        monkeypatch.setattr(waiting, "LIMIT", 0)
+
+
+def test_what_is_there_is_seen(pipe: tuple[int, int]) -> None:
+    os.write(pipe[1], b"x")
+    assert wait_readable(pipe[0], float("inf"))
+
+
+def test_nothing_is_nothing(pipe: tuple[int, int]) -> None:
+    assert not wait_readable(pipe[0], 0.001)
+
+
+def test_the_end_of_the_other_side_is_seen(pipe: tuple[int, int]) -> None:
+    reader, writer = os.pipe()
+    os.close(writer)
+    assert wait_readable(reader, float("inf"))
+    assert os.read(reader, 1) == b""
+    os.close(reader)

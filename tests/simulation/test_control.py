@@ -1,0 +1,212 @@
+"""Orders over a local socket: answered in one line each, refused in one line, and for the owner alone."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import stat
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from motorbus.errors import LinkError, PortBusy, RequestError
+from motorbus.families.feetech.simulator import simulate
+from motorbus.simulation.control import LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
+from motorbus.simulation.listener import TcpListener
+from motorbus.simulation.mount import Mount
+from tests.simulation.served import asked, served
+
+
+@pytest.fixture
+def path() -> Iterator[Path]:
+    with TemporaryDirectory() as folder:  # a short name: local sockets allow some hundred bytes
+        yield Path(folder) / "control"
+
+
+def order(path: Path, text: str) -> str:
+    """Send an order from a client of its own and read one line."""
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(10.0)
+        client.connect(os.fspath(path))
+        client.sendall(text.encode() + b"\n")
+        with client.makefile() as lines:
+            return lines.readline().rstrip("\n")
+
+
+def test_orders_while_the_bus_is_served(path: Path) -> None:
+    bus = simulate((1, 2))
+    control = ControlSocket(path, bus)
+    with (
+        closing(control),
+        closing(TcpListener()) as listener,
+        served(Mount(bus, listener, attendants=[control])),
+        socket.create_connection((listener.host, listener.port)) as client,
+    ):
+        assert asked(client.fileno(), "FF FF 02 04 03 29 09 C4", 6) == "FF FF 02 02 00 FB"
+        assert order(path, "unplug 2") == "ok"
+        status = json.loads(order(path, "status"))
+        assert [status["schema"], status["simulated"]] == ["motorbus.simulator/1", True]
+        assert [(node["id"], node["plugged"]) for node in status["nodes"]] == [(1, True), (2, False)]
+        assert order(path, "plug 2") == "ok"
+        assert asked(client.fileno(), "FF FF 02 04 02 29 01 CD", 7) == "FF FF 02 03 00 00 FA"  # RAM is lost
+
+
+def test_power_cycle_of_one_and_of_all() -> None:
+    bus = simulate((1, 2))
+    for servo in bus.servos:
+        servo.memory["acceleration"] = 9
+    assert obey(bus, "power-cycle 2") == "ok"
+    assert [servo.memory["acceleration"] for servo in bus.servos] == [9, 0]
+    assert obey(bus, "power-cycle") == "ok"
+    assert [servo.memory["acceleration"] for servo in bus.servos] == [0, 0]
+
+
+def test_help_names_every_order() -> None:
+    bus = simulate((1,))
+    for word in obey(bus, "help").split(" | "):
+        assert not obey(bus, word.replace("[ID]", "").replace("ID", "1")).startswith("error")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "error: '' is not an order; there are: status"),
+        ("explode", "error: 'explode' is not an order"),
+        ("unplug", "error: the order is: unplug ID"),
+        ("plug 1 2", "error: the order is: plug ID"),
+        ("status now", "error: the order is: status"),
+        ("power-cycle 1 2", "error: the order is: power-cycle [ID]"),
+        ("unplug 9", "error: there is no node 9; there are: 1, 3"),
+        ("unplug one", "error: there is no node one"),
+    ],
+)
+def test_a_bad_order_gets_one_clear_line(text: str, says: str) -> None:
+    answer = obey(simulate((1, 3)), text)
+    assert answer.startswith(says)
+    assert "\n" not in answer
+
+
+def test_ids_may_be_hexadecimal() -> None:
+    bus = simulate((16,))
+    assert obey(bus, "unplug 0x10") == "ok"
+    assert not bus.nodes[16].plugged
+
+
+# The socket itself.
+
+
+def pumped(control: ControlSocket) -> None:
+    """Attend to everything that is readable, until nothing is."""
+    import select
+
+    while ready := select.select(control.descriptors(), (), (), 0.0)[0]:
+        for descriptor in ready:
+            control.attend(descriptor)
+
+
+def connected(path: Path) -> socket.socket:
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(10.0)
+    client.connect(os.fspath(path))
+    return client
+
+
+def test_it_is_for_its_owner_alone_and_goes_when_closed(path: Path) -> None:
+    control = ControlSocket(path, simulate((1,)))
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    control.close()
+    control.close()
+    assert not path.exists()
+
+
+def test_several_orders_in_one_piece_and_one_order_in_several(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
+        client.sendall(b"unplug 1\nplug 1\nexpl")
+        pumped(control)
+        assert client.recv(100) == b"ok\nok\n"
+        client.sendall(b"ode\n")
+        pumped(control)
+        assert client.recv(100).startswith(b"error: 'explode'")
+
+
+def test_bytes_that_are_no_text(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
+        client.sendall(b"\xff\xfe\n")
+        pumped(control)
+        assert client.recv(200).startswith(b"error: ")
+
+
+def test_an_endless_line_is_hung_up_on(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
+        client.sendall(b"x" * (LONGEST_LINE + 1))
+        pumped(control)
+        assert len(control.descriptors()) == 1
+
+
+def test_a_client_that_leaves_is_forgotten(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))) as control:
+        connected(path).close()
+        pumped(control)
+        assert len(control.descriptors()) == 1
+
+
+def test_a_client_that_does_not_read_is_hung_up_on(path: Path) -> None:
+    with (
+        closing(ControlSocket(path, simulate(tuple(range(100))))) as control,
+        closing(connected(path)) as client,
+    ):
+        client.sendall(b"status\n" * 100)
+        pumped(control)
+        assert len(control.descriptors()) == 1
+
+
+def test_too_many_clients_are_sent_away(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))) as control:
+        clients = []
+        for _ in range(MOST_CLIENTS + 1):
+            clients.append(connected(path))
+            pumped(control)
+        assert len(control.descriptors()) == MOST_CLIENTS + 1
+        assert clients[-1].recv(1) == b""
+        for client in clients:
+            client.close()
+
+
+def test_what_a_dead_simulator_left_is_taken_over(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(os.fspath(path))
+    with closing(ControlSocket(path, simulate((1,)))):
+        assert path.exists()
+
+
+def test_a_live_one_is_busy_and_not_disturbed(path: Path) -> None:
+    with closing(ControlSocket(path, simulate((1,)))):
+        with pytest.raises(PortBusy):
+            ControlSocket(path, simulate((1,)))
+        assert path.exists()
+
+
+def test_another_file_is_not_removed(path: Path) -> None:
+    path.write_text("mine")
+    with pytest.raises(RequestError, match="no socket"):
+        ControlSocket(path, simulate((1,)))
+    assert path.read_text() == "mine"
+
+
+def test_a_folder_that_is_not_there_and_a_path_too_long(path: Path) -> None:
+    with pytest.raises(LinkError):
+        ControlSocket(path / "missing" / "control", simulate((1,)))
+    with pytest.raises(RequestError):
+        ControlSocket(path.with_name("x" * 200), simulate((1,)))
+
+
+def test_a_socket_that_somebody_put_in_its_place_is_left(path: Path) -> None:
+    control = ControlSocket(path, simulate((1,)))
+    path.unlink()
+    path.write_text("another")
+    control.close()
+    assert path.read_text() == "another"
