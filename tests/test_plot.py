@@ -12,8 +12,8 @@ from motorbus import plot
 from motorbus.errors import MotorbusError, RequestError
 
 TIMES = [0.0, 0.5, 1.0]
-GOALS = [[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]
-PRESENTS = [[0.0, 0.4, 0.9], [1.0, None, 0.1]]
+GOALS: list[list[float]] = [[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]
+PRESENTS: list[list[float | None]] = [[0.0, 0.4, 0.9], [1.0, None, 0.1]]
 
 
 def draw(path: Path, *, title: str = "Two servos", simulated: bool = True) -> None:

@@ -24,6 +24,7 @@ from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.link.base import Link
 from motorbus.link.lock import socket_path
+from motorbus.link.memory import MemoryLink
 from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
 from motorbus.simulation.named import Simulation, find
@@ -112,8 +113,8 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     word = "baud" if family.link.kind == "bytes" else "bitrate"
     rate = _number(word, merged.pop(word, family.link.rate))
     simulated = spot.port == "sim"
-    known = {option.name for option in family.link.options} if simulated else set()
-    unknown = sorted(set(merged) - known - ({"ids", "model"} if simulated else set()))
+    known = {"ids", "model", *(option.name for option in family.link.options)} if simulated else set()
+    unknown = sorted(set(merged) - known)
     if unknown:
         raise RequestError(
             f"{address!r}: unknown option {unknown[0]!r}",
@@ -152,7 +153,7 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
 
 
 class OpenAsyncBus(AsyncBus):
-    """An async bus that opens its port when its `async with` is entered."""
+    """An async bus that finds out about echo when its `async with` is entered."""
 
     async def __aenter__(self) -> Self:
         test = _echo_test(self)
@@ -197,9 +198,8 @@ def _link(opening: Opening) -> Link:
     if opening.port == "sim":
         ids = parse_ids(str(opening.options.pop("ids", "1")))
         model = str(opening.options.pop("model", ""))
-        return Simulation(opening.family, ids, model=model, clock="real", **opening.options).link(
-            opening.rate
-        )
+        simulator = opening.family.simulator(ids, model, **opening.options)
+        return MemoryLink(simulator, rate=opening.rate, virtual=False, name=f"{opening.family.name}:sim")
     if opening.port.startswith("sim:"):
         return find(opening.port.removeprefix("sim:"), opening.family.name).link(opening.rate)
     return open_link(opening.port, rate=opening.rate, kind=opening.family.link.kind)

@@ -141,7 +141,9 @@ def test_verbose_says_what_happens_on_stderr_and_only_then(run: Run) -> None:
     quiet = run("ping", "feetech:sim,ids=1#1")
     chatty = run("ping", "feetech:sim,ids=1#1", "-vv")
     assert quiet.err == ""
-    assert "motorbus" in chatty.err
+    assert "tx FF FF 01 02 01 FB" in chatty.err
+    assert "#1: sent" in chatty.err
+    assert "tx" not in run("ping", "feetech:sim,ids=1#1", "-v").err
     assert logging.getLogger("motorbus").level == logging.NOTSET
 
 

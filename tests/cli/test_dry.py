@@ -6,7 +6,8 @@ import pytest
 
 import motorbus
 from motorbus.cli import dry
-from motorbus.cli.dry import DryBus, Unforeseeable
+from motorbus.cli.dry import DryBus
+from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
 from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together
 from motorbus.errors import LimitExceeded

@@ -98,7 +98,10 @@ def test_moving_together_is_one_packet(arm: Simulation) -> None:
     with motorbus.open(arm.url) as bus:
         trace = bus.trace.subscribe()
         feetech.move_together(bus, {1: 2.5, 2: 2.0, 3: 3.0}, velocity=3.0)
-        sync_writes = [record.data for record in trace if record.direction == "tx" and record.data[4] == 0x83]
+        sent = [
+            record.data for record in trace if record.direction == "tx" and isinstance(record.data, bytes)
+        ]
+        sync_writes = [data for data in sent if data[4] == 0x83]
         assert len(sync_writes) == 1
         assert [motorbus.feetech.Servo(bus, node).position() for node in (1, 2, 3)] == [
             pytest.approx(2.5, abs=0.05),

@@ -50,7 +50,9 @@ FLAGS = Entry(
     [("1.5", 1.5), ("90deg", math.pi / 2), ("-45°", -math.pi / 4), ("0.25 turn", math.pi / 2)],
 )
 def test_an_angle_is_typed_with_or_without_unit(text: str, number: float) -> None:
-    assert quantity.typed(ANGLE, text) == (pytest.approx(number), False)
+    typed = quantity.typed(ANGLE, text)
+    assert typed.number == pytest.approx(number)
+    assert not typed.raw
 
 
 @pytest.mark.parametrize(

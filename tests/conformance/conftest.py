@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
+from motorbus.core.family import Family
 from tests.conformance.subjects import FAMILIES, Vector, vectors
 from tests.conformance.world import locks, moves
 
@@ -29,6 +30,8 @@ VECTORS: dict[str, Callable[[Vector], bool]] = {
     "bad": lambda vector: not vector.valid,
 }
 """Which vectors a test gets that asks by this name."""
+SUITS: dict[str, Callable[[Family], object]] = {"lockable": locks, "mover": moves, "family": bool}
+"""Which families a test gets that asks by this name."""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -36,7 +39,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         if name in metafunc.fixturenames:
             metafunc.parametrize(("family", name), _vectors(wanted))
             return
-    for name, suits in {"lockable": locks, "mover": moves, "family": bool}.items():
+    for name, suits in SUITS.items():
         if name in metafunc.fixturenames:
             suitable = {key: family for key, family in FAMILIES.items() if suits(family)}
             metafunc.parametrize(name, suitable.values(), ids=suitable)

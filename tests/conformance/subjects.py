@@ -67,10 +67,11 @@ def vectors(name: str) -> list[Vector]:
 
 
 def _vector(one: dict[str, Any]) -> Vector:
-    data: Data = bytes.fromhex(one["hex"])
+    data = bytes.fromhex(one["hex"])
     if "can_id" in one:
         identifier = int(one["can_id"], 16)
-        data = CanFrame(identifier, bytes(data), extended=identifier > 0x7FF)
+        frame = CanFrame(identifier, data, extended=identifier > 0x7FF)
+        return Vector(one["id"], frame, one["direction"], one["verdict"] == "valid", one["source"])
     return Vector(one["id"], data, one["direction"], one["verdict"] == "valid", one["source"])
 
 

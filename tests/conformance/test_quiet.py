@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from motorbus.bus.trace import TraceRecord
 from motorbus.core.family import Family, Found
-from motorbus.core.operation import Data, Effect, Exchange, Operation, Progress, Runnable, Together
+from motorbus.core.operation import Effect, Exchange, Operation, Progress, Runnable, Together
 from motorbus.errors import NoReply
 from tests.conformance.world import IDS, Steps, World, has, said, sent, world
 
@@ -122,12 +123,12 @@ def test_a_scan_finds_at_each_rate_who_is_there(family: Family) -> None:
 
 
 def test_the_same_said_is_the_same_heard(family: Family) -> None:
-    def heard() -> list[tuple[float, str, Data]]:
+    def heard() -> list[TraceRecord]:
         with world(family) as there:
             watch = there.bus.trace.subscribe(limit=100_000)
             for operation in looks(there).values():
                 there.bus.run(operation)
-            return [tuple(record) for record in watch]
+            return list(watch)
 
     once = heard()
     assert once

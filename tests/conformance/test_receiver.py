@@ -6,7 +6,7 @@ what is missing is what it holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from random import Random
 
 import pytest
@@ -29,7 +29,7 @@ def fed(receiver: Receiver, pieces: Iterable[Data]) -> list[Event]:
     return [event for piece in pieces for event in receiver.feed(piece)] + receiver.flush()
 
 
-def ways(data: Data) -> Iterator[list[Data]]:
+def ways(data: Data) -> Iterator[Sequence[Data]]:
     """Whole, byte by byte, and cut once at every place; a CAN frame cannot be cut."""
     yield [data]
     if isinstance(data, bytes):
@@ -145,7 +145,7 @@ frames = st.builds(
     st.binary(max_size=8),
     st.booleans(),
 )
-deliveries = {"bytes": st.binary(max_size=700), "frames": frames}
+deliveries: dict[str, st.SearchStrategy[Data]] = {"bytes": st.binary(max_size=700), "frames": frames}
 
 
 def judged(receiver: Receiver, pieces: Iterable[Data]) -> None:

@@ -81,7 +81,7 @@ def test_when_everything_moves(mover: Family) -> None:
         under_way(there)
         assert_at_rest(there, there.bus.estop())
         ways = [abs(end - start) for start, end in zip(begin, positions(there), strict=True)]
-        assert all(0 < way < WAY for way in ways)
+        assert all(0 < way < WAY / 2 for way in ways)
 
 
 def test_when_the_torque_is_off(mover: Family) -> None:

@@ -54,7 +54,9 @@ LAWS: dict[str, Callable[[Entry], bool]] = {
     "its choices are in range": lambda row: all(row.low <= value <= row.high for value in row.choices),
     "its bits lie inside": lambda row: all(0 <= bit < 8 * row.size for bit in row.bits),
     "its unit is known": lambda row: row.unit in {"", *QUANTITIES},
-    "its scale is positive, and 1 without a unit": lambda row: row.scale > 0 and (row.unit or row.scale == 1),
+    "its scale is positive, and 1 without a unit": lambda row: (
+        row.scale > 0 and (row.unit != "" or row.scale == 1)
+    ),
     "what cannot be written has no effect": lambda row: row.writable or row.effect is Effect.NONE,
     "a maker's own row is not written plainly": lambda row: (
         row.storage is not Storage.FACTORY or row.protected or not row.writable

@@ -2,15 +2,23 @@
 
 Runs in a process of its own with nothing of ours in it. Each line is a request in JSON, `["read", 1, 56, 2]`; each
 answer is one line `{"value": …}`, or `{"error": …}` with what the SDK said. Bytes travel as lists of numbers.
+
+The SDK gives up after 34 ms, which a busy machine may need to wake the simulator, and it would then take a late
+answer for the next one. So its user has to do what is done here: let the line fall quiet, empty the input, ask again.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import time
+from collections.abc import Callable
 from typing import Any
 
 import scservo_sdk as sdk  # type: ignore[import-not-found]
+
+TRIES = 4
+QUIET = 0.2  # s
 
 
 class Client:
@@ -24,44 +32,44 @@ class Client:
 
     def ping(self, node: int) -> int:
         """The model number: this SDK's ping asks for it too."""
-        model, result, error = self.packets.ping(self.port, node)
-        return int(self._good(model, result, error))
+        return int(self._good(lambda: self.packets.ping(self.port, node)))
 
     def read(self, node: int, address: int, count: int) -> list[int]:
-        return list(self._good(*self.packets.readTxRx(self.port, node, address, count)))
+        return list(self._good(lambda: self.packets.readTxRx(self.port, node, address, count)))
 
     def read_word(self, node: int, address: int) -> int:
-        return int(self._good(*self.packets.read2ByteTxRx(self.port, node, address)))
+        return int(self._good(lambda: self.packets.read2ByteTxRx(self.port, node, address)))
 
     def write(self, node: int, address: int, data: list[int]) -> None:
-        self._good(None, *self.packets.writeTxRx(self.port, node, address, len(data), data))
-
-    def write_word(self, node: int, address: int, value: int) -> None:
-        self._good(None, *self.packets.write2ByteTxRx(self.port, node, address, value))
+        self._good(lambda: (None, *self.packets.writeTxRx(self.port, node, address, len(data), data)))
 
     def sync_read(self, nodes: list[int], address: int, count: int) -> list[list[int]]:
         group = sdk.GroupSyncRead(self.port, self.packets, address, count)
         for node in nodes:
             group.addParam(node)
-        self._good(None, group.txRxPacket(), 0)
+        self._good(lambda: (None, group.txRxPacket(), 0))
         return [[group.getData(node, address + i, 1) for i in range(count)] for node in nodes]
 
     def sync_write(self, nodes: list[int], address: int, data: list[list[int]]) -> None:
         group = sdk.GroupSyncWrite(self.port, self.packets, address, len(data[0]))
         for node, share in zip(nodes, data, strict=True):
             group.addParam(node, share)
-        self._good(None, group.txPacket(), 0)
+        self._good(lambda: (None, group.txPacket(), 0))
 
     def reg_write(self, node: int, address: int, data: list[int]) -> None:
-        self._good(None, *self.packets.regWriteTxRx(self.port, node, address, len(data), data))
+        self._good(lambda: (None, *self.packets.regWriteTxRx(self.port, node, address, len(data), data)))
 
     def action(self) -> None:
-        self._good(None, self.packets.action(self.port, sdk.BROADCAST_ID), 0)
+        self._good(lambda: (None, self.packets.action(self.port, sdk.BROADCAST_ID), 0))
 
-    def _good(self, value: Any, result: int, error: int) -> Any:
-        if result != sdk.COMM_SUCCESS or error:
-            raise OSError(f"{self.packets.getTxRxResult(result)} alarm byte {error}")
-        return value
+    def _good(self, call: Callable[[], tuple[Any, int, int]]) -> Any:
+        for _ in range(TRIES):
+            value, result, error = call()
+            if result == sdk.COMM_SUCCESS and not error:
+                return value
+            time.sleep(QUIET)
+            self.port.ser.reset_input_buffer()
+        raise OSError(f"{self.packets.getTxRxResult(result)} alarm byte {error}")
 
 
 def main() -> None:

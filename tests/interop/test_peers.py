@@ -12,7 +12,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -225,7 +225,7 @@ def test_rustypot_names_the_model_and_the_radians(port: str) -> None:
 
 
 def test_rustypots_negative_goal_arrives_as_it_was_sent(
-    port: str, record_property: pytest.RecordProperty
+    port: str, record_property: Callable[[str, object], None]
 ) -> None:
     """Its typed controller writes two's complement where the register is sign-magnitude (seen with 1.13.1).
 

@@ -62,12 +62,17 @@ def test_the_simulator_behind_a_pseudo_terminal_is_not_its_user(tmp_path: Path) 
             assert owner.pid == user.pid
 
 
-def test_a_file_of_the_same_name_in_a_container_is_another(master: PtyMaster, tmp_path: Path) -> None:
-    """Its descriptor leads to the same name and to another device."""
-    proc = tmp_path / "proc"
-    (proc / "77" / "fd").mkdir(parents=True)
-    (proc / "77" / "fd" / "3").symlink_to("/dev/null")
-    assert who_holds(master.slave_name, proc) is None
+@pytest.mark.parametrize(("theirs", "is_found"), [("/dev/zero", False), ("/dev/null", True)])
+def test_the_same_name_in_a_container_is_another_device(
+    theirs: str, is_found: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    descriptors = tmp_path / "proc" / "77" / "fd"
+    descriptors.mkdir(parents=True)
+    (tmp_path / "tty").symlink_to("/dev/null")
+    (descriptors / "tty").symlink_to(theirs)
+    (descriptors / "3").symlink_to("tty")
+    assert (who_holds("tty", tmp_path / "proc") is not None) is is_found
 
 
 @pytest.mark.parametrize("gone", ["no such folder", "."])

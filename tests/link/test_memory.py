@@ -289,9 +289,7 @@ def test_a_fault_fires_and_changes_what_arrives(fault: str) -> None:
 )
 def test_what_a_fault_does(fault: str, possible: list[list[Data]]) -> None:
     line = NoisyLine(3, **{fault: 1.0})  # type: ignore[arg-type]
-    seen: list[list[Data]] = []
-    for _ in range(100):
-        seen.append([delivery.data for delivery in line.carry(Side.DEVICE, b"abcd", 0.0)])
+    seen = [[delivery.data for delivery in line.carry(Side.DEVICE, b"abcd", 0.0)] for _ in range(100)]
     assert all(arrived in possible for arrived in seen)
     assert all(arrived in seen for arrived in possible)
 

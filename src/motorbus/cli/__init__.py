@@ -136,6 +136,7 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
             result = command(*bound.args, **bound.kwargs)
         return result if isinstance(result, int) else Exit.OK
 
+    app.meta.suppress_keyboard_interrupt = False
     code = app.meta(words, exit_on_error=False, print_error=False, result_action="return_value")
     return code if isinstance(code, int) else Exit.OK
 

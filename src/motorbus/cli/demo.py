@@ -149,6 +149,7 @@ def _loop(opening: Bus, train: Any, duration: float, bar: Bar) -> Course:
     first = opening.run(train.positions).values
     nodes = list(first)
     course = Course([], [[] for _ in nodes], [[] for _ in nodes], train.air_time(list(first.values())))
+    _note(course, 0.0, list(first.values()), list(first.values()))
     began = opening.link.now()
     while (now := opening.link.now() - began) < duration:
         goals = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from motorbus.cli.exits import Unforeseeable
 from motorbus.core.operation import Alone, Effect, Exchange, Rank, Together
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
     from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
-
-
-class Unforeseeable(MotorbusError):
-    """What would be sent next depends on an answer to what was withheld."""
 
 
 class _AsWritten:

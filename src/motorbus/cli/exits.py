@@ -55,6 +55,10 @@ class Partial(errors.MotorbusError):
     """Some devices did what was asked and others did not."""
 
 
+class Unforeseeable(errors.MotorbusError):
+    """What a dry run would send next depends on an answer that only a real run gets."""
+
+
 CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.MotorbusError: Exit.FAILURE,
     errors.LinkError: Exit.FAILURE,
@@ -77,6 +81,7 @@ CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.OutcomeUnknown: Exit.FAILURE,
     NeedsConsent: Exit.UNSAFE,
     Partial: Exit.PARTIAL,
+    Unforeseeable: Exit.FAILURE,
     KeyboardInterrupt: Exit.CANCELLED,
     BrokenPipeError: Exit.CANCELLED,
     OSError: Exit.FAILURE,

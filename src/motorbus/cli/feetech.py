@@ -13,7 +13,7 @@ from motorbus.cli import dry, quantity, registers
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
-from motorbus.core.operation import ANY, Answer, Exchange, Rank, Together
+from motorbus.core.operation import ANY, Answer, Exchange, Pause, Rank, Together
 from motorbus.errors import RequestError
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import Move, arrive
@@ -137,8 +137,7 @@ def _value(one: Any, entry: Any, text: str) -> Any:
     help_epilogue="""Examples:
 
     motorbus feetech reg-write feetech:/dev/ttyACM0#1 goal_position=90deg
-    motorbus feetech reg-write feetech:/dev/ttyACM0#2 goal_position=-0.5
-    motorbus feetech action feetech:/dev/ttyACM0""",
+    motorbus feetech reg-write feetech:/dev/ttyACM0#2 goal_position=-0.5""",
 )
 def reg_write(
     device_: Annotated[str, Parameter(name="BUS#ID")],
@@ -194,10 +193,18 @@ def action(bus: Annotated[str, Parameter(name="BUS[#ID]")], /, *, output: Silent
         for node in wanted.nodes:
             face(opening, node).action()
         if not wanted.nodes:
-            opening.run(driver.action_all())
+            opening.run(_action_all(opening))
     output.document("motorbus.feetech.action/1", {"ids": list(wanted.nodes) or "all"})
     output.text(f"action sent to {', '.join(f'#{node}' for node in wanted.nodes) or 'everyone'}")
     return Exit.OK
+
+
+def _action_all(bus: Bus) -> Operation[None]:
+    everyone = driver.action_all()
+    yield from everyone
+    yield from Pause(
+        bus.family.air_time(everyone, bus.rate)
+    )  # nobody answers: let it leave before the port is closed
 
 
 @app.command(

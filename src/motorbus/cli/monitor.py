@@ -99,7 +99,7 @@ def _watch(
             show(sample)
             done += 1
             passed = bus.link.now() - began
-            if done == count or (duration and passed + period > duration):
+            if done == count or (duration and passed + period >= duration):
                 break
             bus.run(_pause(max(0.0, done * period - passed)))
     except KeyboardInterrupt:

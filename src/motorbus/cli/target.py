@@ -5,10 +5,12 @@ Whatever can be refused without the port is refused before the port is opened.
 
 from __future__ import annotations
 
+import logging
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus import families
+from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.errors import DeviceError, NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.core.entry import Table
     from motorbus.core.family import Family
+
+
+LOG = logging.getLogger("motorbus.cli")
 
 
 class Target(NamedTuple):
@@ -69,9 +74,24 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
 
     with session.open(bus, report=None, **options) as found:
         output.simulated = output.simulated or found.simulated
+        LOG.info("%s is open at %d bit/s", bus, found.rate)
+        if LOG.isEnabledFor(logging.DEBUG):
+            found.trace.subscriptions = (*found.trace.subscriptions, _Told(0))
         for warning in found.link.warnings:
             output.note(f"note: {warning}")
-        yield found
+        try:
+            yield found
+        finally:
+            for node, counts in sorted(found.statistics.nodes.items()):
+                LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
+
+
+class _Told(Subscription[TraceRecord]):
+    """Logs every request and delivery at the moment it happens."""
+
+    def put(self, record: TraceRecord) -> None:
+        shown = record.data.hex(" ").upper() if isinstance(record.data, bytes) else record.data
+        LOG.debug("%s %s", record.direction, shown)
 
 
 def face(bus: Bus | DryBus, node: int) -> Any:

@@ -11,6 +11,7 @@ import contextlib
 import errno
 import os
 import socket
+import stat
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -37,6 +38,7 @@ TOLERANCE = 0.025  # of the rate; beyond it the stop bit of a byte is missed
 ASK_AGAIN = 0.001  # s between two looks at a port that has no descriptor
 REMOTE_LATENCY = 0.020  # s for an RFC 2217 server: the network, and whatever adapter is at its other end
 PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
+MEMORY_DEVICES = 1  # Linux Documentation/admin-guide/devices.txt
 GONE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
 UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
 
@@ -85,6 +87,8 @@ class SerialLink:
         self.paced = not self._device.startswith(PSEUDO_TERMINALS)
         if not os.path.exists(self._device):
             raise not_found(port, ports())
+        if not _could_be_a_port(self._device):
+            raise LinkError(f"{port} is not a serial port")
         self._lock = PortLock(port).acquire()
         try:
             self._open(sysfs)
@@ -180,6 +184,7 @@ class PolledLink:
         self.latency = REMOTE_LATENCY if remote else adapters.WINDOWS_LATENCY
         self.warnings: tuple[str, ...] = ()
         self._turn = Lock()
+        self._closed = False
         self._lock = PortLock(port).acquire()
         try:
             self._serial = _opened(port, port, rate)
@@ -194,6 +199,7 @@ class PolledLink:
     def write(self, data: Data) -> None:
         assert isinstance(data, bytes)
         with self._turn:
+            self._check()
             try:
                 self._serial.write(data, timeout=0)
             except (BlockingIOError, TimeoutError):
@@ -213,6 +219,7 @@ class PolledLink:
         """What has arrived, without waiting."""
         room = bytearray(CHUNK)
         with self._turn:
+            self._check()
             try:
                 return bytes(room[: self._serial.readinto(room, timeout=0)])
             except _failures() as error:
@@ -220,6 +227,7 @@ class PolledLink:
 
     def tune(self, rate: int) -> None:
         with self._turn:
+            self._check()
             _retune(self.name, self._serial, rate)
             self.rate = rate
 
@@ -228,8 +236,13 @@ class PolledLink:
 
     def close(self) -> None:
         with self._turn, contextlib.suppress(OSError):
+            self._closed = True
             self._serial.close()
         self._lock.release()
+
+    def _check(self) -> None:
+        if self._closed:
+            raise lost(self.name, "it is closed")
 
 
 def open_serial(port: str, *, rate: int) -> SerialLink | PolledLink:
@@ -240,6 +253,13 @@ def open_serial(port: str, *, rate: int) -> SerialLink | PolledLink:
 
 
 # -- opening ----------------------------------------------------------------------------------------------------
+
+
+def _could_be_a_port(device: str) -> bool:
+    """A character device, and not one like /dev/null that half of all programs have open."""
+    about = os.stat(device)
+    is_memory = sys.platform == "linux" and os.major(about.st_rdev) == MEMORY_DEVICES
+    return stat.S_ISCHR(about.st_mode) and not is_memory
 
 
 def _opened(port: str, target: str, rate: int) -> BaseSerial:

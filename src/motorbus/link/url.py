@@ -14,7 +14,7 @@ def open_link(port: str, *, rate: int, kind: str = "bytes") -> Link:
     `rate` in bit/s, `kind` what the family wants: bytes or frames. Raises RequestError for what is no port,
     PortNotFound, PortBusy (naming its owner) or LinkError.
     """
-    scheme = port.partition("://")[0].lower() if "://" in port else ""
+    scheme = port.partition("://")[0].lower() if "://" in port else None
     _check(port, scheme, rate, kind)
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
@@ -25,14 +25,14 @@ def open_link(port: str, *, rate: int, kind: str = "bytes") -> Link:
     return open_serial(port, rate=rate)
 
 
-def _check(port: str, scheme: str, rate: int, kind: str) -> None:
+def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:
     if kind == "frames" or scheme == "can":
         raise RequestError(
             f"{port!r}: this version has no CAN adapters",
             cause="they come together with the first CAN family, KST",
             advice="a simulated bus needs none: write sim in place of the port",
         )
-    if scheme not in ("", "socket", "rfc2217"):
+    if scheme not in (None, "socket", "rfc2217"):
         raise RequestError(
             f"{port!r}: unknown scheme {scheme!r}",
             expected=f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",

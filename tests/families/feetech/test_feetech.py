@@ -29,7 +29,7 @@ def test_it_asks_for_bytes_at_a_megabaud_and_knows_twelve_rates() -> None:
     link = FAMILY.link
     assert (link.kind, link.rate, len(link.rates)) == ("bytes", 1_000_000, 12)
     assert {76_800, 128_000, 4_800} < set(link.rates)
-    assert ["baud", "ids", "model", "position"] == [option.name for option in link.options][:4]
+    assert [option.name for option in link.options][:4] == ["baud", "ids", "model", "position"]
     assert all(option.help for option in link.options)
 
 

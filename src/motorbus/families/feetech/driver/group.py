@@ -21,6 +21,7 @@ from motorbus.families.feetech.driver.orders import check_names, check_values, o
 from motorbus.families.feetech.driver.registers import Span, decode, rows_of, spans
 
 T = TypeVar("T")
+One = TypeVar("One", bound=int | Node)
 
 RATE: Final = 1_000_000
 """bit/s taken for granted where nobody says otherwise: how STS servos ship."""
@@ -184,7 +185,7 @@ def _values(node: Node, names: Sequence[str], raws: Mapping[str, int]) -> dict[s
 
 
 def sync_write(
-    values: Mapping[int, Mapping[str, Value]] | Mapping[Node, Mapping[str, Value]],
+    values: Mapping[One, Mapping[str, Value]],
     *,
     rate: int = RATE,
     air: float = AIR,

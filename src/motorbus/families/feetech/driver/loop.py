@@ -5,16 +5,16 @@ They need servos that are prepared (limits, mode and units known), and ask nobod
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Answer, Exchange, Goal
-from motorbus.errors import LimitExceeded, RequestError
+from motorbus.core.operation import Answer, Exchange
+from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
-from motorbus.families.feetech.driver.node import POSITION, Node
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import position_goal
 
 
 class Positions(NamedTuple):
@@ -79,21 +79,7 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
 
 def _goal(node: Node, to: float) -> Block:
     row = _row(node, "goal_position")
-    if node.mode != POSITION:
-        raise RequestError(
-            f"node {node.node} cannot go to a position in operating mode {node.mode}",
-            expected="operating mode 0, position",
-            advice="write(operating_mode=0) puts it into position mode; nothing was sent",
-            node=node.node,
-        )
-    if not math.isfinite(to):
-        raise LimitExceeded(
-            f"node {node.node}: {to} is no position",
-            advice="give a number in rad; nothing was sent",
-            node=node.node,
-        )
-    raw = node.raw(row, to)
-    order = Goal(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+    raw, order = position_goal(node, row, to)
     return Block(row.address, row.encode(raw), row.effect, (order,))
 
 

@@ -19,6 +19,7 @@ from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
 from motorbus.families.feetech.driver.identity import prepare, writable
 from motorbus.families.feetech.driver.node import POSITION, PWM, STEP, VELOCITY, Node
+from motorbus.families.feetech.driver.orders import position_goal
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
 
 TOLERANCE: Final = 0.05
@@ -162,19 +163,11 @@ def move_block(
     node: Node, table: Table, to: float, velocity: float | None = None, acceleration: float | None = None
 ) -> Block:
     """Registers 41 to 47 at once: acceleration, goal position, goal time, goal velocity."""
-    if node.mode != POSITION:
-        raise RequestError(
-            f"node {node.node} cannot move to a position in operating mode {node.mode}",
-            expected="operating mode 0, position",
-            advice="write(operating_mode=0) puts it into position mode; nothing was sent",
-            node=node.node,
-        )
     goal, time, speed, ramp = (
         table[name] for name in ("goal_position", "goal_time", "goal_velocity", "acceleration")
     )
-    raw = node.raw(goal, to)
+    raw, order = position_goal(node, goal, to)
     data = ramp.encode(_positive(node, ramp, acceleration)) + goal.encode(raw) + time.encode(0)
-    order = Goal(node.node, "position", node.value(goal, raw), *(node.limits or (None, None)))
     return Block(ramp.address, data + speed.encode(_speed(node, speed, velocity)), goal.effect, (order,))
 
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
 from motorbus.core.operation import Effect, Goal
-from motorbus.errors import RequestError
+from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.node import MANY_TURNS, SCALED, STEP, Node
+from motorbus.families.feetech.driver.node import MANY_TURNS, POSITION, SCALED, STEP, Node
 from motorbus.families.feetech.table import TABLES
 
 _DUTY = 0.001
@@ -57,6 +57,29 @@ def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
         advice="leave out what does not belong, or write() it; nothing was sent",
         node=node.node,
     )
+
+
+def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
+    """A goal position in rad: its raw value, and the goal for the gate, which judges the limits.
+
+    Raises RequestError in other than position mode, LimitExceeded for what is no number or fits no register.
+    """
+    if node.mode != POSITION:
+        raise RequestError(
+            f"node {node.node} cannot go to a position in operating mode {node.mode}",
+            expected="operating mode 0, position",
+            advice="write(operating_mode=0) puts it into position mode; nothing was sent",
+            node=node.node,
+        )
+    raw = node.raw(row, to) if math.isfinite(to) else row.high + 1
+    if not row.low <= raw <= row.high:
+        raise LimitExceeded(
+            f"node {node.node}: {to} is no position it could go to",
+            expected=f"{node.value(row, row.low):.4g} to {node.value(row, row.high):.4g} rad at the very most",
+            advice="give a number in rad; nothing was sent",
+            node=node.node,
+        )
+    return raw, Goal(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
 
 
 def check_names(names: Iterable[str]) -> None:

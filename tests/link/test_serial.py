@@ -1,0 +1,528 @@
+"""Serial links over real pseudo-terminals and a real RFC 2217 server."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import socket
+import struct
+import sys
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Thread
+
+import pytest
+import serialx
+
+from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
+from motorbus.link import serial
+from motorbus.link.base import Link
+from motorbus.link.lock import holders
+from motorbus.link.pty import PtyMaster
+from motorbus.link.serial import PolledLink, SerialLink, open_serial, ports
+from motorbus.link.waiting import wait_readable
+from tests.link.other import other_process, run
+from tests.link.rfc2217 import Server
+
+PING = bytes.fromhex("ff ff 01 02 01 fb")
+ALL_BYTES = bytes(range(256))
+TIOCGEXCL = 0x80045440
+HOLD_OPEN = """
+import os, sys
+held = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+HOLD_LINK = """
+import sys
+from motorbus.link.serial import SerialLink
+held = SerialLink(sys.argv[1], rate=1_000_000)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def link(master: PtyMaster) -> Iterator[SerialLink]:
+    opened = SerialLink(master.slave_name, rate=1_000_000)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def like_a_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have pseudo-terminals treated as real devices."""
+    monkeypatch.setattr(serial, "PSEUDO_TERMINALS", ("no such prefix",))
+
+
+def soon(link: Link) -> float:
+    return link.now() + 30
+
+
+def heard(master: PtyMaster, count: int) -> bytes:
+    """That many bytes at the simulator's end."""
+    told = b""
+    while len(told) < count:
+        assert wait_readable(master.fileno(), 30)
+        told += master.read()
+    return told
+
+
+# -- bytes ------------------------------------------------------------------------------------------------------
+
+
+def test_every_byte_passes_both_ways(link: SerialLink, master: PtyMaster) -> None:
+    link.write(ALL_BYTES)
+    assert heard(master, 256) == ALL_BYTES
+    master.write(ALL_BYTES)
+    assert b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes)) == ALL_BYTES
+
+
+def test_what_it_says_of_itself(link: SerialLink, master: PtyMaster) -> None:
+    face: Link = link
+    assert (face.name, face.rate, face.warnings) == (master.slave_name, 1_000_000, ())
+    assert (face.paced, face.virtual, face.simulated, face.latency) == (False, False, False, 0.002)
+    assert face.fileno() == link._descriptor >= 0
+
+
+def test_nothing_by_the_deadline_is_nothing(link: SerialLink) -> None:
+    until = link.now() + 0.002
+    assert link.read(until) == []
+    assert link.now() >= until
+
+
+@pytest.mark.parametrize("until", [0.0, float("-inf")])
+def test_a_deadline_in_the_past_never_waits(
+    until: float, link: SerialLink, master: PtyMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial, "wait_readable", None)  # calling it would raise
+    assert link.read(until) == []
+    master.write(PING)
+    while not (arrived := link.read(until)):
+        pass
+    assert arrived == [PING]
+
+
+def test_a_port_that_takes_no_more_blocks_nobody(link: SerialLink) -> None:
+    with pytest.raises(LinkError, match=r"takes no more bytes: \d+ of 1000000"):
+        link.write(bytes(1_000_000))
+
+
+def test_what_lay_in_the_port_before_it_was_opened_is_not_read(master: PtyMaster) -> None:
+    master.write(b"stale")
+    link = SerialLink(master.slave_name, rate=1_000_000)
+    assert link.read(0.0) == []
+    link.close()
+
+
+# -- gone -------------------------------------------------------------------------------------------------------
+
+
+def test_a_port_that_vanished_is_a_lost_link(link: SerialLink, master: PtyMaster) -> None:
+    master.close()
+    with pytest.raises(LinkLost, match="is gone"):
+        link.read(soon(link))
+    with pytest.raises(LinkLost, match="is gone"):
+        link.write(PING)
+
+
+def test_a_port_that_vanishes_while_one_waits_is_a_lost_link(link: SerialLink, master: PtyMaster) -> None:
+    errors: list[Exception] = []
+
+    def wait() -> None:
+        try:
+            link.read(soon(link))
+        except LinkError as error:
+            errors.append(error)
+
+    reader = Thread(target=wait)
+    reader.start()
+    master.close()
+    reader.join(30)
+    assert [type(error) for error in errors] == [LinkLost]
+
+
+def test_what_came_before_the_end_is_read_first(link: SerialLink, master: PtyMaster) -> None:
+    master.write(b"last words")
+    assert wait_readable(link._descriptor, 30)
+    assert link.read(soon(link)) == [b"last words"]
+    master.close()
+    with pytest.raises(LinkLost):
+        link.read(soon(link))
+
+
+def test_used_after_close_it_is_lost(link: SerialLink) -> None:
+    link.close()
+    link.close()
+    with pytest.raises(LinkLost):
+        link.write(PING)
+    with pytest.raises(LinkLost):
+        link.read(soon(link))
+    with pytest.raises(LinkLost):
+        link.tune(9600)
+
+
+def test_no_descriptor_is_left_behind(master: PtyMaster) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(3):
+        SerialLink(master.slave_name, rate=1_000_000).close()
+        with pytest.raises(LinkError):
+            SerialLink("/dev/null", rate=1_000_000)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+# -- held by somebody -------------------------------------------------------------------------------------------
+
+
+def test_a_second_link_in_this_process_is_refused(link: SerialLink, master: PtyMaster) -> None:
+    with pytest.raises(PortBusy, match="this very program") as refused:
+        SerialLink(master.slave_name, rate=1_000_000)
+    assert refused.value.owner == os.getpid()
+
+
+def test_another_motorbus_process_is_named_by_any_name_of_the_port(master: PtyMaster, tmp_path: Path) -> None:
+    (tmp_path / "arm").symlink_to(master.slave_name)
+    with other_process(HOLD_LINK, master.slave_name) as process:
+        with pytest.raises(PortBusy, match=f"process {process.pid}") as refused:
+            SerialLink(str(tmp_path / "arm"), rate=1_000_000)
+        assert refused.value.owner == process.pid
+        assert [owner.pid for owner in holders()] == [process.pid]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
+def test_a_foreign_program_is_named(master: PtyMaster) -> None:
+    with other_process(HOLD_OPEN, master.slave_name) as process:
+        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as refused:
+            SerialLink(master.slave_name, rate=1_000_000)
+        assert refused.value.owner == process.pid
+    SerialLink(master.slave_name, rate=1_000_000).close()
+
+
+def test_a_program_that_locks_the_device_is_seen_even_where_nobody_can_look(
+    master: PtyMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial, "who_holds", lambda _: None)
+    held = os.open(master.slave_name, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    with pytest.raises(PortBusy, match="another program") as refused:
+        SerialLink(master.slave_name, rate=1_000_000)
+    assert refused.value.owner is None
+    os.close(held)
+
+
+def test_a_killed_owner_leaves_the_port_free(master: PtyMaster) -> None:
+    with other_process(HOLD_LINK, master.slave_name) as process:
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=30)
+        link = SerialLink(master.slave_name, rate=1_000_000)
+        link.write(PING)
+        assert heard(master, 6) == PING
+        link.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="TIOCGEXCL is Linux's")
+@pytest.mark.usefixtures("like_a_device")
+def test_the_kernel_keeps_others_out_of_a_device(master: PtyMaster) -> None:
+    def is_exclusive() -> int:
+        return int(struct.unpack("i", fcntl.ioctl(master._slave, TIOCGEXCL, bytes(4)))[0])
+
+    link = SerialLink(master.slave_name, rate=1_000_000)
+    assert is_exclusive() == 1
+    link.close()
+    assert is_exclusive() == 0
+
+
+# -- refused ----------------------------------------------------------------------------------------------------
+
+
+def test_a_port_that_does_not_exist_comes_with_those_that_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serialx, "list_serial_ports", lambda: [usb_port()])
+    with pytest.raises(PortNotFound, match=r"one of /dev/ttyACM0 \(CH343"):
+        SerialLink("/dev/no-such-port", rate=1_000_000)
+
+
+@pytest.mark.parametrize("path", ["/dev/null", "/tmp", "file"])
+def test_what_is_no_serial_port(path: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(LinkError, match="is not a serial port"):
+        SerialLink(str(tmp_path / path), rate=1_000_000)
+
+
+FORBIDDEN = """
+import os, sys, tempfile
+from motorbus.errors import LinkError
+from motorbus.link import serial
+import serialx
+if os.geteuid() == 0:
+    os.setgroups([])
+    os.setgid(65534)
+    os.setuid(65534)
+with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+    os.environ["XDG_STATE_HOME"] = folder
+    try:
+        serial.SerialLink(sys.argv[1], rate=1_000_000)
+    except LinkError as error:
+        print(error)
+"""
+
+
+def test_no_permission_says_how_to_get_it(master: PtyMaster) -> None:
+    Path(master.slave_name).chmod(0)
+    told = run(FORBIDDEN, master.slave_name)
+    assert "no permission to open it" in told
+    assert "dialout" in told
+    assert "uaccess" in told
+
+
+# -- latency ----------------------------------------------------------------------------------------------------
+
+
+def sysfs_with_timer(folder: Path, device: str, timer: int) -> Path:
+    place = folder / "class" / "tty" / Path(device).name / "device"
+    place.mkdir(parents=True)
+    (place / "latency_timer").write_text(f"{timer}\n")
+    return folder
+
+
+@pytest.mark.parametrize(("timer", "latency", "warnings"), [(16, 0.019, 1), (1, 0.004, 0)])
+def test_a_slow_latency_timer_is_counted_in_and_warned_about(
+    timer: int, latency: float, warnings: int, master: PtyMaster, tmp_path: Path
+) -> None:
+    link = SerialLink(
+        master.slave_name, rate=1_000_000, sysfs=sysfs_with_timer(tmp_path, master.slave_name, timer)
+    )
+    assert link.latency == pytest.approx(latency)
+    assert len(link.warnings) == warnings
+    assert all("latency_timer" in warning for warning in link.warnings)
+    link.close()
+
+
+@pytest.mark.usefixtures("like_a_device")
+def test_a_device_without_a_timer_has_the_usual_latency_and_is_paced(master: PtyMaster) -> None:
+    link = SerialLink(master.slave_name, rate=1_000_000)
+    assert (link.latency, link.paced) == (0.004, True)
+    link.close()
+
+
+# -- rates ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [1_000_000, 128_000, 76_800, 4_800])
+def test_the_rate_arrives_at_the_other_end(rate: int, master: PtyMaster) -> None:
+    link = SerialLink(master.slave_name, rate=rate)
+    assert master.rate() == rate
+    link.close()
+
+
+def test_the_rate_can_be_changed_and_bytes_still_pass(link: SerialLink, master: PtyMaster) -> None:
+    for rate in (76_800, 128_000, 1_000_000):
+        link.tune(rate)
+        assert (link.rate, master.rate()) == (rate, rate)
+        link.write(PING)
+        assert heard(master, 6) == PING
+
+
+def test_what_is_going_out_keeps_its_rate(link: SerialLink) -> None:
+    link.tune(9600)
+    begin = link.now()
+    link.write(bytes(48))
+    link.tune(1_000_000)
+    assert link.now() - begin >= 480 / 9600
+
+
+def test_an_adapter_that_rounds_too_far_is_refused(
+    master: PtyMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial, "line_speed", lambda _: 115_200)
+    with pytest.raises(LinkError, match=r"cannot do 128000 bit/s: the adapter makes 115200"):
+        SerialLink(master.slave_name, rate=128_000)
+    SerialLink(master.slave_name, rate=115_000).close()
+
+
+def test_what_is_no_rate(link: SerialLink) -> None:
+    with pytest.raises(RequestError, match="0 is not a rate"):
+        link.tune(0)
+
+
+# -- the ports there are ----------------------------------------------------------------------------------------
+
+
+def usb_port(**changes: object) -> serialx.SerialPortInfo:
+    about: dict[str, object] = {
+        "device": "/dev/serial/by-id/usb-1a86_USB_Single_Serial_585A-if00",
+        "resolved_device": "/dev/ttyACM0",
+        "vid": 0x1A86,
+        "pid": 0x55D3,
+        "serial_number": "585A0076891",
+        "manufacturer": None,
+        "product": "USB Single Serial",
+        "bcd_device": None,
+        "interface_description": None,
+        "interface_num": 0,
+    }
+    return serialx.SerialPortInfo(**{**about, **changes})  # type: ignore[arg-type]
+
+
+PLAIN = usb_port(device="/dev/ttyS0", resolved_device="/dev/ttyS0", vid=None, pid=None, product=None)
+
+
+def test_ports_are_listed_with_what_they_probably_are() -> None:
+    usb, plain = ports(lambda: [PLAIN, usb_port()])
+    assert usb.device == "/dev/ttyACM0"
+    assert usb.stable == "/dev/serial/by-id/usb-1a86_USB_Single_Serial_585A-if00"
+    assert (usb.vid, usb.pid, usb.serial_number) == (0x1A86, 0x55D3, "585A0076891")
+    assert usb.guess == "CH343: usual on FEETECH and Waveshare servo boards"
+    assert (plain.device, plain.stable, plain.vid, plain.guess) == ("/dev/ttyS0", "", None, "")
+
+
+def fake_usb(root: Path) -> tuple[Path, Path]:
+    """The kernel's tree for one CDC adapter, and its device nodes."""
+    usb = root / "sys" / "devices" / "usb1" / "1-1"
+    interface = usb / "1-1:1.0"
+    interface.mkdir(parents=True)
+    (root / "sys" / "bus" / "usb").mkdir(parents=True)
+    for name, text in {
+        "idVendor": "0483",
+        "idProduct": "5740",
+        "bcdDevice": "0200",
+        "serial": "3669",
+        "manufacturer": "STM",
+        "product": "Virtual ComPort",
+    }.items():
+        (usb / name).write_text(f"{text}\n")
+    (interface / "bInterfaceNumber").write_text("00\n")
+    (interface / "subsystem").symlink_to(root / "sys" / "bus" / "usb")
+    (interface / "driver").mkdir()
+    terminal = root / "sys" / "class" / "tty" / "ttyACM3"
+    terminal.mkdir(parents=True)
+    (terminal / "device").symlink_to(interface)
+    by_id = root / "dev" / "serial" / "by-id"
+    by_id.mkdir(parents=True)
+    (root / "dev" / "ttyACM3").touch()
+    (by_id / "usb-STM_3669-if00").symlink_to("../../ttyACM3")
+    return root / "sys", root / "dev"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sysfs is Linux's")
+def test_the_kernels_tree_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sysfs, devices = fake_usb(tmp_path)
+    monkeypatch.setattr("serialx.platforms.serial_linux.SYS_ROOT", sysfs)
+    monkeypatch.setattr("serialx.platforms.serial_linux.DEV_ROOT", devices)
+    [port] = ports()
+    assert port.device == str(devices / "ttyACM3")
+    assert port.stable == str(devices / "serial" / "by-id" / "usb-STM_3669-if00")
+    assert (port.vid, port.pid, port.serial_number) == (0x0483, 0x5740, "3669")
+    assert port.description == "STM Virtual ComPort"
+    assert port.guess.startswith("STM32")
+
+
+def test_this_machine_can_be_asked() -> None:
+    assert all(port.device for port in ports())
+
+
+# -- servers that speak RFC 2217 --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    serving = Server()
+    yield serving
+    serving.close()
+
+
+@pytest.fixture
+def remote(server: Server) -> Iterator[PolledLink]:
+    link = open_serial(server.url, rate=1_000_000)
+    assert isinstance(link, PolledLink)
+    yield link
+    link.close()
+
+
+def everything(link: Link, count: int) -> bytes:
+    told = b""
+    while len(told) < count:
+        told += b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes))
+    return told
+
+
+def test_bytes_pass_through_a_server_and_back(remote: PolledLink, server: Server) -> None:
+    remote.write(PING + ALL_BYTES)
+    assert everything(remote, 262) == PING + ALL_BYTES
+    assert bytes(server.heard) == PING + ALL_BYTES
+
+
+def test_the_server_is_told_the_rate(remote: PolledLink, server: Server) -> None:
+    assert server.rate == 1_000_000
+    remote.tune(76_800)
+    assert (server.rate, remote.rate) == (76_800, 76_800)
+
+
+def test_what_a_remote_link_says_of_itself(remote: PolledLink, server: Server) -> None:
+    link: Link = remote
+    assert (link.name, link.fileno(), link.paced, link.virtual) == (server.url, None, False, False)
+    assert link.latency > 0.01
+    connection = getattr(remote._serial, "_socket")  # noqa: B009 - serialx does not offer it
+    assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def test_nothing_from_a_server_is_nothing(remote: PolledLink) -> None:
+    until = remote.now() + 0.002
+    assert remote.read(until) == []
+    assert remote.now() >= until
+    assert remote.read(float("-inf")) == []
+
+
+def test_a_reader_that_waits_does_not_keep_a_writer_out(remote: PolledLink) -> None:
+    arrived: list[bytes] = []
+    reader = Thread(target=lambda: arrived.append(everything(remote, 6)))
+    reader.start()
+    remote.write(PING)
+    reader.join(30)
+    assert arrived == [PING]
+
+
+def test_a_server_that_hangs_up_is_a_lost_link(remote: PolledLink, server: Server) -> None:
+    server.hang_up()
+    with pytest.raises(LinkLost, match="is gone"):
+        remote.read(soon(remote))
+
+
+def test_used_after_close_a_remote_link_is_lost(remote: PolledLink) -> None:
+    remote.close()
+    remote.close()
+    with pytest.raises(LinkLost):
+        remote.write(PING)
+    with pytest.raises(LinkLost):
+        remote.read(0.0)
+
+
+def test_a_remote_port_has_one_owner(remote: PolledLink, server: Server) -> None:
+    with pytest.raises(PortBusy, match="this very program"):
+        open_serial(server.url, rate=1_000_000)
+
+
+def test_no_server_is_no_port(server: Server) -> None:
+    server.close()
+    with pytest.raises(PortNotFound, match="cannot be reached"):
+        open_serial(server.url, rate=1_000_000)
+
+
+def test_a_server_that_does_not_speak_it_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial, "CONNECT_TIME", 0.05)
+    with socket.create_server(("127.0.0.1", 0)) as raw, pytest.raises(LinkError, match="socket://"):
+        open_serial(f"rfc2217://127.0.0.1:{raw.getsockname()[1]}", rate=1_000_000)
+
+
+# -- what is loaded ---------------------------------------------------------------------------------------------
+
+
+def test_importing_it_loads_no_serial_library() -> None:
+    code = "import sys, motorbus.link.serial as s; print({'serialx', 'termios', 'fcntl', 'tty'} & set(sys.modules))"
+    assert run(code) == "set()\n"
+
+
+def test_terminal_settings_are_not_left_cooked(link: SerialLink, master: PtyMaster) -> None:
+    local = termios.tcgetattr(master.fileno())[3]
+    assert local & (termios.ECHO | termios.ICANON | termios.ISIG) == 0
