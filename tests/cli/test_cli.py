@@ -149,7 +149,7 @@ def test_verbose_says_what_happens_on_stderr_and_only_then(run: Run) -> None:
 
 def test_a_reader_that_goes_away_ends_it_quietly() -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "motorbus.cli", "monitor", "feetech:sim,ids=1", "--rate", "1000", "--json"],
+        [sys.executable, "-m", "motorbus.cli", "monitor", "feetech:sim#1", "--rate", "1000", "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,7 +1,7 @@
 """Runs each test once for every family it suits, and each test of vectors once for every vector.
 
 A test asks by name: `family`; `lockable`, a family whose EEPROM has a lock; `mover`, a family whose devices move;
-or a family together with one of its vectors, see `VECTORS`.
+`reporter`, a family whose devices say something unasked; or a family together with one of its vectors, see `VECTORS`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import pytest
 
 from motorbus.core.family import Family
 from tests.conformance.subjects import FAMILIES, Vector, vectors
-from tests.conformance.world import locks, moves
+from tests.conformance.world import locks, moves, reports
 
 
 def _is_reply(vector: Vector) -> bool:
@@ -30,7 +30,13 @@ VECTORS: dict[str, Callable[[Vector], bool]] = {
     "bad": lambda vector: not vector.valid,
 }
 """Which vectors a test gets that asks by this name."""
-SUITS: dict[str, Callable[[Family], object]] = {"lockable": locks, "mover": moves, "family": bool}
+SUITS: dict[str, Callable[[Family], object]] = {
+    "lockable": locks,
+    "mover": moves,
+    "reporter": reports,
+    "reporting_mover": lambda family: moves(family) and reports(family),
+    "family": bool,
+}
 """Which families a test gets that asks by this name."""
 
 

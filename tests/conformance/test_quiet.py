@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -11,7 +13,7 @@ from motorbus.bus.trace import TraceRecord
 from motorbus.core.family import Family, Found
 from motorbus.core.operation import Effect, Exchange, Operation, Progress, Runnable, Together
 from motorbus.errors import NoReply
-from tests.conformance.world import IDS, Steps, World, has, said, sent, world
+from tests.conformance.world import IDS, Cut, Steps, World, has, said, sent, world
 
 NODE = IDS[0]
 LOOKS = ("ping", "identify", "read", "telemetry", "position")
@@ -120,6 +122,37 @@ def test_a_scan_finds_at_each_rate_who_is_there(family: Family) -> None:
         assert {(one.node, one.rate) for one in found} == {(node, family.link.rate) for node in IDS}
         there.bus.run(family.scan(IDS, (family.link.rate,)))
         assert there.device(NODE).ping() is True
+
+
+@pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
+def test_a_scan_that_is_cut_leaves_the_rate_as_it_was(family: Family, before: bool) -> None:
+    number = cuts = 0
+    while number == 0 or cuts:
+        with world(family) as there:
+            steps = Steps(there.bus, cut_at=number, before=before)
+            with suppress(Cut):
+                steps.run(family.scan(IDS, family.link.rates))
+            assert (there.bus.rate, there.link.rate) == (family.link.rate, family.link.rate)
+            number, cuts = number + 7, steps.cuts
+
+
+def test_looking_is_the_same_blocking_and_async(family: Family) -> None:
+    async def looked(there: World) -> list[object]:
+        bus = there.async_bus()
+        device = family.devices.awaiting(bus, NODE)
+        found = [
+            await device.ping(),
+            await device.identify(),
+            await device.read(),
+            await bus.run(family.scan(IDS)),
+        ]
+        await bus.close()
+        return found
+
+    with world(family) as there:
+        device = there.device(NODE)
+        found = [device.ping(), device.identify(), device.read(), there.bus.run(family.scan(IDS))]
+        assert asyncio.run(looked(there)) == found
 
 
 def test_the_same_said_is_the_same_heard(family: Family) -> None:

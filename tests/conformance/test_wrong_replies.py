@@ -15,7 +15,7 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError, WireError
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.conformance.subjects import payload
+from tests.conformance.subjects import payload, vectors
 from tests.conformance.world import IDS, World, sent, world
 
 NODE, OTHER = IDS[:2]
@@ -118,6 +118,30 @@ def assert_never_taken(
     assert isinstance(raised.value, WireError | TimeoutError)
     line.times = 0
     assert there.table(NODE)[name].to_raw(device.read(name)[name]) == there.memory(NODE)[name]
+
+
+class Babbling(PerfectLine):
+    """Lets senseless frames come with every reply."""
+
+    babble: tuple[Data, ...] = ()
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        real = super().carry(sender, data, at)
+        senseless = [Delivery(at, Side.HOST, one) for one in self.babble] if sender is Side.DEVICE else []
+        return [*senseless, *real, *senseless]
+
+
+def test_senseless_frames_disturb_nobody_where_frames_stand_by_themselves(family: Family) -> None:
+    if family.link.kind != "frames":
+        return  # on a byte line they make a reply doubtful; the tests of the bus say how
+    line = Babbling()
+    with world(family, line=line) as there:
+        values = [there.device(node).read() for node in IDS]
+        line.babble = tuple(vector.data for vector in vectors(family.name) if not vector.valid)
+        with sent(there.bus) as frames:
+            assert [there.device(node).read() for node in IDS] == values
+        assert len(frames) == len(set(frames)), "nothing had to be asked twice"
+        assert line.babble
 
 
 def test_the_answer_of_another_node_is_never_taken(family: Family) -> None:

@@ -14,10 +14,11 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
-from motorbus.core.operation import Alone, Data, Effect, Exchange, Operation, Runnable, Step, Together
+from motorbus.core.operation import Alone, Data, Effect, Exchange, Notice, Operation, Runnable, Step, Together
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
+from tests.conformance.subjects import vectors
 
 IDS = (1, 2, 3)
 
@@ -114,6 +115,12 @@ def has(family: Family, verb: str) -> bool:
 def moves(family: Family) -> bool:
     """Whether the devices of this family can be moved."""
     return has(family, "move")
+
+
+def reports(family: Family) -> list[Notice]:
+    """What devices of this family are known to say on their own account."""
+    events = [event for vector in vectors(family.name) for event in family.receiver().feed(vector.data)]
+    return [event for event in events if isinstance(event, Notice)]
 
 
 def locks(family: Family) -> list[Entry]:

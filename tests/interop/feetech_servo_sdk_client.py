@@ -17,8 +17,8 @@ from typing import Any
 
 import scservo_sdk as sdk  # type: ignore[import-not-found]
 
-TRIES = 4
-QUIET = 0.2  # s
+TRIES = 12
+QUIET = 0.1  # s
 
 
 class Client:
@@ -64,11 +64,11 @@ class Client:
 
     def _good(self, call: Callable[[], tuple[Any, int, int]]) -> Any:
         for _ in range(TRIES):
+            self.port.ser.reset_input_buffer()
             value, result, error = call()
             if result == sdk.COMM_SUCCESS and not error:
                 return value
             time.sleep(QUIET)
-            self.port.ser.reset_input_buffer()
         raise OSError(f"{self.packets.getTxRxResult(result)} alarm byte {error}")
 
 

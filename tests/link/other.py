@@ -19,7 +19,7 @@ def environment() -> dict[str, str]:
 
 @contextmanager
 def other_process(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Another Python that runs this code; entered once it has printed a line, ended (by closing its stdin) at exit."""
+    """Another Python that runs this code; entered once it has printed `ready`, killed at exit."""
     process = subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
         stdin=subprocess.PIPE,

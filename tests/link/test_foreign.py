@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,8 +10,6 @@ import pytest
 from motorbus.link.foreign import who_holds
 from motorbus.link.pty import PtyMaster
 from tests.link.other import other_process
-
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
 
 HOLD = """
 import os, sys

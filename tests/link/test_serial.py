@@ -1,13 +1,11 @@
-"""Serial links over real pseudo-terminals and a real RFC 2217 server."""
+"""Serial links over real pseudo-terminals."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import signal
-import socket
 import struct
-import sys
 import termios
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,10 +19,10 @@ from motorbus.link import serial
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
 from motorbus.link.pty import PtyMaster
-from motorbus.link.serial import PolledLink, SerialLink, open_serial, ports
+from motorbus.link.serial import SerialLink
 from motorbus.link.waiting import wait_readable
 from tests.link.other import other_process, run
-from tests.link.rfc2217 import Server
+from tests.link.usb import usb_port
 
 PING = bytes.fromhex("ff ff 01 02 01 fb")
 ALL_BYTES = bytes(range(256))
@@ -191,7 +189,6 @@ def test_another_motorbus_process_is_named_by_any_name_of_the_port(master: PtyMa
         assert [owner.pid for owner in holders()] == [process.pid]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
 def test_a_foreign_program_is_named(master: PtyMaster) -> None:
     with other_process(HOLD_OPEN, master.slave_name) as process:
         with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as refused:
@@ -222,7 +219,6 @@ def test_a_killed_owner_leaves_the_port_free(master: PtyMaster) -> None:
         link.close()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="TIOCGEXCL is Linux's")
 @pytest.mark.usefixtures("like_a_device")
 def test_the_kernel_keeps_others_out_of_a_device(master: PtyMaster) -> None:
     def is_exclusive() -> int:
@@ -344,175 +340,6 @@ def test_an_adapter_that_rounds_too_far_is_refused(
 def test_what_is_no_rate(link: SerialLink) -> None:
     with pytest.raises(RequestError, match="0 is not a rate"):
         link.tune(0)
-
-
-# -- the ports there are ----------------------------------------------------------------------------------------
-
-
-def usb_port(**changes: object) -> serialx.SerialPortInfo:
-    about: dict[str, object] = {
-        "device": "/dev/serial/by-id/usb-1a86_USB_Single_Serial_585A-if00",
-        "resolved_device": "/dev/ttyACM0",
-        "vid": 0x1A86,
-        "pid": 0x55D3,
-        "serial_number": "585A0076891",
-        "manufacturer": None,
-        "product": "USB Single Serial",
-        "bcd_device": None,
-        "interface_description": None,
-        "interface_num": 0,
-    }
-    return serialx.SerialPortInfo(**{**about, **changes})  # type: ignore[arg-type]
-
-
-PLAIN = usb_port(device="/dev/ttyS0", resolved_device="/dev/ttyS0", vid=None, pid=None, product=None)
-
-
-def test_ports_are_listed_with_what_they_probably_are() -> None:
-    usb, plain = ports(lambda: [PLAIN, usb_port()])
-    assert usb.device == "/dev/ttyACM0"
-    assert usb.stable == "/dev/serial/by-id/usb-1a86_USB_Single_Serial_585A-if00"
-    assert (usb.vid, usb.pid, usb.serial_number) == (0x1A86, 0x55D3, "585A0076891")
-    assert usb.guess == "CH343: usual on FEETECH and Waveshare servo boards"
-    assert (plain.device, plain.stable, plain.vid, plain.guess) == ("/dev/ttyS0", "", None, "")
-
-
-def fake_usb(root: Path) -> tuple[Path, Path]:
-    """The kernel's tree for one CDC adapter, and its device nodes."""
-    usb = root / "sys" / "devices" / "usb1" / "1-1"
-    interface = usb / "1-1:1.0"
-    interface.mkdir(parents=True)
-    (root / "sys" / "bus" / "usb").mkdir(parents=True)
-    for name, text in {
-        "idVendor": "0483",
-        "idProduct": "5740",
-        "bcdDevice": "0200",
-        "serial": "3669",
-        "manufacturer": "STM",
-        "product": "Virtual ComPort",
-    }.items():
-        (usb / name).write_text(f"{text}\n")
-    (interface / "bInterfaceNumber").write_text("00\n")
-    (interface / "subsystem").symlink_to(root / "sys" / "bus" / "usb")
-    (interface / "driver").mkdir()
-    terminal = root / "sys" / "class" / "tty" / "ttyACM3"
-    terminal.mkdir(parents=True)
-    (terminal / "device").symlink_to(interface)
-    by_id = root / "dev" / "serial" / "by-id"
-    by_id.mkdir(parents=True)
-    (root / "dev" / "ttyACM3").touch()
-    (by_id / "usb-STM_3669-if00").symlink_to("../../ttyACM3")
-    return root / "sys", root / "dev"
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="sysfs is Linux's")
-def test_the_kernels_tree_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sysfs, devices = fake_usb(tmp_path)
-    monkeypatch.setattr("serialx.platforms.serial_linux.SYS_ROOT", sysfs)
-    monkeypatch.setattr("serialx.platforms.serial_linux.DEV_ROOT", devices)
-    [port] = ports()
-    assert port.device == str(devices / "ttyACM3")
-    assert port.stable == str(devices / "serial" / "by-id" / "usb-STM_3669-if00")
-    assert (port.vid, port.pid, port.serial_number) == (0x0483, 0x5740, "3669")
-    assert port.description == "STM Virtual ComPort"
-    assert port.guess.startswith("STM32")
-
-
-def test_this_machine_can_be_asked() -> None:
-    assert all(port.device for port in ports())
-
-
-# -- servers that speak RFC 2217 --------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    serving = Server()
-    yield serving
-    serving.close()
-
-
-@pytest.fixture
-def remote(server: Server) -> Iterator[PolledLink]:
-    link = open_serial(server.url, rate=1_000_000)
-    assert isinstance(link, PolledLink)
-    yield link
-    link.close()
-
-
-def everything(link: Link, count: int) -> bytes:
-    told = b""
-    while len(told) < count:
-        told += b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes))
-    return told
-
-
-def test_bytes_pass_through_a_server_and_back(remote: PolledLink, server: Server) -> None:
-    remote.write(PING + ALL_BYTES)
-    assert everything(remote, 262) == PING + ALL_BYTES
-    assert bytes(server.heard) == PING + ALL_BYTES
-
-
-def test_the_server_is_told_the_rate(remote: PolledLink, server: Server) -> None:
-    assert server.rate == 1_000_000
-    remote.tune(76_800)
-    assert (server.rate, remote.rate) == (76_800, 76_800)
-
-
-def test_what_a_remote_link_says_of_itself(remote: PolledLink, server: Server) -> None:
-    link: Link = remote
-    assert (link.name, link.fileno(), link.paced, link.virtual) == (server.url, None, False, False)
-    assert link.latency > 0.01
-    connection = getattr(remote._serial, "_socket")  # noqa: B009 - serialx does not offer it
-    assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
-
-
-def test_nothing_from_a_server_is_nothing(remote: PolledLink) -> None:
-    until = remote.now() + 0.002
-    assert remote.read(until) == []
-    assert remote.now() >= until
-    assert remote.read(float("-inf")) == []
-
-
-def test_a_reader_that_waits_does_not_keep_a_writer_out(remote: PolledLink) -> None:
-    arrived: list[bytes] = []
-    reader = Thread(target=lambda: arrived.append(everything(remote, 6)))
-    reader.start()
-    remote.write(PING)
-    reader.join(30)
-    assert arrived == [PING]
-
-
-def test_a_server_that_hangs_up_is_a_lost_link(remote: PolledLink, server: Server) -> None:
-    server.hang_up()
-    with pytest.raises(LinkLost, match="is gone"):
-        remote.read(soon(remote))
-
-
-def test_used_after_close_a_remote_link_is_lost(remote: PolledLink) -> None:
-    remote.close()
-    remote.close()
-    with pytest.raises(LinkLost):
-        remote.write(PING)
-    with pytest.raises(LinkLost):
-        remote.read(0.0)
-
-
-def test_a_remote_port_has_one_owner(remote: PolledLink, server: Server) -> None:
-    with pytest.raises(PortBusy, match="this very program"):
-        open_serial(server.url, rate=1_000_000)
-
-
-def test_no_server_is_no_port(server: Server) -> None:
-    server.close()
-    with pytest.raises(PortNotFound, match="cannot be reached"):
-        open_serial(server.url, rate=1_000_000)
-
-
-def test_a_server_that_does_not_speak_it_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serial, "CONNECT_TIME", 0.05)
-    with socket.create_server(("127.0.0.1", 0)) as raw, pytest.raises(LinkError, match="socket://"):
-        open_serial(f"rfc2217://127.0.0.1:{raw.getsockname()[1]}", rate=1_000_000)
 
 
 # -- what is loaded ---------------------------------------------------------------------------------------------

@@ -64,6 +64,16 @@ class AsyncServo(_Verbs, Awaiting):
         Awaiting.__init__(self, bus)
 
 
+_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
+    "state": driver.telemetry,
+    "position": driver.position,
+    "move": driver.move,
+    "stop": driver.stop,
+    "enable_torque": driver.enable_torque,
+    "disable_torque": driver.disable_torque,
+}
+
+
 class Template:
     """Fulfils `motorbus.core.family.Family`; no state."""
 
@@ -122,12 +132,11 @@ class Template:
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
         """Every id, or these."""
-        return driver.scan(ids, rates, usual=RATE)
+        return driver.scan(ids, rates, rate=RATE)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        """SI operations by capability."""
-        names = ("position", "telemetry", "move", "enable_torque", "disable_torque", "stop")
-        return {name: getattr(driver, name) for name in names}
+        """SI operations by capability; what a model cannot do is absent."""
+        return _AXIS if model == "metronome" else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         """Raises RequestError for ids, models and options that do not exist."""

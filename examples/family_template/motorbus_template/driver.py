@@ -196,21 +196,33 @@ def identify(node: Node) -> Operation[Identity]:
     return Identity(node.node, name, f"{firmware >> 8}.{firmware & 0xFF}", known, {"model_number": model})
 
 
-def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, usual: int) -> Operation[list[Found]]:
-    """Ask every id, two at a time because each has a lane of its own; whoever is silent is asked once more."""
-    nodes = ids or tuple(wire.NODES)
+def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, rate: int) -> Operation[list[Found]]:
+    """Ask every id, two at a time because each has a lane of its own; `rate` is set again in the end."""
     found: list[Found] = []
-    for rate in rates or (usual,):
-        if rates:
-            yield from Tune(rate)
-        here: dict[int, Found] = {}
-        for _ in range(2):
-            silent = [node for node in nodes if node not in here]
-            looks = yield from Together([_look(Node(node), rate) for node in silent])
-            here |= {one.node: one for one in looks if one is not None}
-        yield from Report(Progress(len(nodes), len(nodes), f"{rate} bit/s"))
-        found += [here[node] for node in nodes if node in here]
-    return found
+    try:
+        for other in rates:
+            yield from Tune(other)
+            found += yield from _everyone(ids or tuple(wire.NODES), other)
+    except GeneratorExit:
+        raise
+    except BaseException:
+        yield from Tune(rate)
+        raise
+    if rates:
+        yield from Tune(rate)
+        return found
+    return (yield from _everyone(ids or tuple(wire.NODES), rate))
+
+
+def _everyone(nodes: tuple[int, ...], rate: int) -> Operation[list[Found]]:
+    """Whoever is silent is asked once more, for the first frame after power-up may be missed."""
+    found: dict[int, Found] = {}
+    for turn in range(2):
+        silent = [node for node in nodes if node not in found]
+        looks = yield from Together([_look(Node(node), rate) for node in silent])
+        found |= {one.node: one for one in looks if one is not None}
+        yield from Report(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
+    return [found[node] for node in nodes if node in found]
 
 
 def _look(node: Node, rate: int) -> Operation[Found | None]:

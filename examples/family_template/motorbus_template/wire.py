@@ -137,8 +137,9 @@ def _event(frame: CanFrame) -> Event:
     if (report := decode_report(frame)) is not None:
         node, reason, _ = report
         return Notice(node, reason.name.lower(), frame.data)
-    ours = not frame.extended and frame.id - ANSWER in NODES
-    return Noise(frame.data, "framing" if ours else "foreign")
+    return Noise(
+        frame.data, "foreign"
+    )  # a frame stands by itself: a senseless one casts no doubt on the next
 
 
 # --- in words -----------------------------------------------------------------------------------------------

@@ -203,7 +203,7 @@ class Turns(Air):
         return ticket.tune
 
     def _admitted(self, exchange: Exchange[Any]) -> None:
-        if exchange.effect not in GATED:
+        if exchange.effect not in GATED or exchange.rank is Rank.STOP:
             return
         if self.admit is None:
             raise RequestError(

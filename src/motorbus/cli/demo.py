@@ -153,7 +153,7 @@ def _loop(opening: Bus, train: Any, duration: float, bar: Bar) -> Course:
     began = opening.link.now()
     while (now := opening.link.now() - began) < duration:
         goals = [
-            start + _wave(now, duration, index / len(nodes)) for index, start in enumerate(first.values())
+            start + wave(now, duration, index / len(nodes)) for index, start in enumerate(first.values())
         ]
         opening.run(train.goals(goals))
         presents = opening.run(train.positions).values
@@ -163,7 +163,7 @@ def _loop(opening: Bus, train: Any, duration: float, bar: Bar) -> Course:
     return course
 
 
-def _wave(now: float, duration: float, phase: float) -> float:
+def wave(now: float, duration: float, phase: float) -> float:
     """A sine that grows from rest and dies to rest; every device a part of a turn later than the one before."""
     return (
         AMPLITUDE * _grown(now) * _grown(duration - now) * math.sin(math.tau * (FREQUENCY * now - phase / 2))

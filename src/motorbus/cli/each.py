@@ -22,7 +22,7 @@ def each(what: str, verb: str, devices: tuple[str, ...], options: Mapping[str, s
     errors: list[MotorbusError] = []
     for name, nodes in gathered(devices).items():
         with opened(name, options, output) as bus:
-            visited = everyone(name, bus, nodes)
+            visited = everyone(name, bus, nodes, output)
             results += [{"bus": name, "id": node, **_tried(bus, node, verb, errors)} for node in visited]
     output.document(f"motorbus.{verb}/1", {"devices": results})
     shown = [(f"{one['bus']}#{one['id']}", one.get("error") or one.get("promise") or what) for one in results]

@@ -86,13 +86,16 @@ def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> 
     """Nobody offers the stop: send it from here, then have each device that was named confirm it."""
     with opened(wanted.bus, options, output) as opening:
         outcome = opening.estop()
+        confirmed, silent = set(outcome.acknowledged), set(outcome.silent)
         for node in wanted.nodes:
             try:
                 face(opening, node).disable_torque()
+                confirmed.add(node)
             except MotorbusError:
-                outcome = outcome._replace(silent=(*outcome.silent, node))
-            else:
-                outcome = outcome._replace(acknowledged=(*outcome.acknowledged, node))
+                silent.add(node)
+    outcome = outcome._replace(
+        acknowledged=tuple(sorted(confirmed)), silent=tuple(sorted(silent - confirmed))
+    )
     return _facts(wanted.bus, "this process", outcome)
 
 

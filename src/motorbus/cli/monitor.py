@@ -31,7 +31,7 @@ Examples:
 
     motorbus monitor feetech:/dev/ttyACM0
     motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
-    motorbus monitor feetech:sim,ids=1-2 --count 3 --json""",
+    motorbus monitor feetech:sim,ids=1-2#1+2 --count 3 --json""",
 )
 
 Sample = dict[tuple[str, int], "State | MotorbusError"]
@@ -74,7 +74,7 @@ def _watched(
     found = {}
     for name, nodes in wanted.items():
         bus = stack.enter_context(opened(name, options, output))
-        for node in everyone(name, bus, nodes):
+        for node in everyone(name, bus, nodes, output):
             one = face(bus, node)
             able(one, "telemetry")
             found[name, node] = one

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
+from motorbus.core.operation import Progress
 from motorbus.errors import DeviceError, NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -130,12 +131,20 @@ def check_names(family: Family, names: Iterable[str]) -> None:
             tables[0][name]
 
 
-def everyone(name: str, bus: Bus, nodes: tuple[int, ...]) -> tuple[int, ...]:
+def everyone(name: str, bus: Bus, nodes: tuple[int, ...], output: Output) -> tuple[int, ...]:
     """The nodes that were named, or every node that answers at the present rate. Raises NoReply for none."""
-    found = nodes or tuple(one.node for one in bus.run(bus.family.scan()))
+    if nodes:
+        return nodes
+    with output.progress("looking for devices") as bar:
+
+        def listen(event: object) -> None:
+            if isinstance(event, Progress):
+                bar.advance(event.done, event.total)
+
+        found = bus.run(bus.family.scan(), report=listen)
     if not found:
         raise nobody(name)
-    return found
+    return tuple(one.node for one in found)
 
 
 def nobody(bus: str) -> NoReply:

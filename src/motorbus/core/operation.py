@@ -50,12 +50,12 @@ class Effect(IntEnum):
     MOTION = 4
 
 
-class Timeout(Enum):
+class Timeout(IntEnum):
     """How long the device itself may take before it answers; the family gives the seconds."""
 
-    REPLY = "reply"
-    SCAN = "scan"
-    STORE = "store"
+    REPLY = 0
+    SCAN = 1
+    STORE = 2
 
 
 class Due(NamedTuple):

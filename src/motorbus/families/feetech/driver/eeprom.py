@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout
-from motorbus.errors import MotorbusError
-from motorbus.families.feetech.driver.exchanges import Block, confirmed, verified, write_block
+from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
+from motorbus.families.feetech.driver.exchanges import Block, confirmed, verified
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.torque import disable_torque
 
@@ -25,24 +24,24 @@ _ATTEMPTS: Final = 2
 
 def store(node: Node, table: Table, blocks: Sequence[Block]) -> Operation[None]:
     """Write these blocks of EEPROM registers for good, with nobody else on the bus meanwhile."""
+    lock = table["lock"].address
+    trouble: list[BaseException] = []
     try:
-        yield from Alone(_guarded(node, table["lock"].address, blocks))
+        yield from Alone(
+            afterwards(_written(node, lock, blocks, trouble), lambda: _locked(node, lock, trouble))
+        )
     finally:
         node.forget_settings()
 
 
-def _guarded(node: Node, lock: int, blocks: Sequence[Block]) -> Operation[None]:
+def _written(node: Node, lock: int, blocks: Sequence[Block], trouble: list[BaseException]) -> Operation[None]:
     try:
         yield from disable_torque(node)
         yield from _put(node, _lock(lock, 0))
         for block in blocks:
             yield from _stored(node, block._replace(effect=Effect.PERSISTENT))  # it is limp: nothing can move
-        yield from _put(node, _lock(lock, 1))
-        yield from verified(node, _lock(lock, 1), timeout=Timeout.STORE)
-    except GeneratorExit:  # thrown away by whoever carried it out: nothing can be sent any more
-        raise
     except BaseException as error:
-        yield from _relock(node, lock, error)
+        trouble.append(error)
         raise
 
 
@@ -57,23 +56,25 @@ def _put(node: Node, block: Block) -> Operation[None]:
     yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
-def _relock(node: Node, lock: int, error: BaseException) -> Operation[None]:
-    """Close the lock on the way out; that it could not be closed is added to the error already on its way."""
-    trouble: BaseException | None = None
+def _locked(node: Node, lock: int, trouble: Sequence[BaseException]) -> Operation[None]:
+    """Close the lock and see that it is closed. When something has gone wrong already, that is what is raised, and
+    a lock that cannot be closed is told with it."""
     for _ in range(_ATTEMPTS):
-        try:
-            yield from write_block(node, _lock(lock, 1), rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-        except GeneratorExit:
-            raise
-        except BaseException as failure:  # a second Ctrl-C too: it must be said all the same
-            trouble = failure
-        else:
+        failure = yield from outcome(_closed(node, lock))
+        if failure is None:
             return
-    summary = trouble.summary if isinstance(trouble, MotorbusError) else repr(trouble)
-    error.add_note(
+    assert failure is not None
+    if not trouble:
+        raise failure
+    trouble[0].add_note(
         f"the EEPROM lock of node {node.node} may still be open, which makes later writes permanent: "
-        f"write(lock=1) closes it ({summary})"
+        f"write(lock=1) closes it ({failure.summary})"
     )
+
+
+def _closed(node: Node, lock: int) -> Operation[None]:
+    yield from _put(node, _lock(lock, 1))
+    yield from verified(node, _lock(lock, 1), timeout=Timeout.STORE)
 
 
 def _lock(address: int, value: int) -> Block:

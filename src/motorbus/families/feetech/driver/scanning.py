@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from motorbus.core.family import Found, Identity
-from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, outcome
+from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, afterwards, outcome
 from motorbus.errors import NoReply, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.group import RATE
@@ -24,24 +24,17 @@ def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, rate: int = RATE
     `rate` is the present rate of the bus in bit/s; it is set again at the end, whatever happens. Reports `Found`
     as soon as one answers (its identity is asked afterwards) and `Progress`. Writes nothing to any servo.
     """
-    nodes = as_nodes(ids or range(wire.MAX_ID + 1))
+    asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
     if not rates:
-        return (yield from _at_one_rate([node.node for node in nodes], rate, 0, 1))
-    return (yield from Alone(_at_all_rates([node.node for node in nodes], rates, rate)))
+        return (yield from _at_one_rate(asked, rate, 0, 1))
+    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(rate)))))
 
 
-def _at_all_rates(ids: Sequence[int], rates: Sequence[int], home: int) -> Operation[list[Found]]:
+def _at_all_rates(ids: Sequence[int], rates: Sequence[int]) -> Operation[list[Found]]:
     found: list[Found] = []
-    try:
-        for index, rate in enumerate(rates):
-            yield from Tune(rate)
-            found += yield from _at_one_rate(ids, rate, index, len(rates))
-    except GeneratorExit:
-        raise
-    except BaseException:
-        yield from Tune(home)
-        raise
-    yield from Tune(home)
+    for index, rate in enumerate(rates):
+        yield from Tune(rate)
+        found += yield from _at_one_rate(ids, rate, index, len(rates))
     return found
 
 

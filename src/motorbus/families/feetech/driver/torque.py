@@ -7,9 +7,9 @@ of a stop: it passes whoever holds the bus, and an emergency stop that is latche
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Final
+from typing import Final
 
-from motorbus.core.operation import Effect, Exchange, Operation, Rank, Runnable
+from motorbus.core.operation import Effect, Exchange, Operation, Rank, afterwards, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
@@ -48,21 +48,23 @@ def disable_torque_all(ids: Iterable[int | Node]) -> Operation[dict[int, Motorbu
     """
     nodes = as_nodes(ids)
     errors: dict[int, MotorbusError] = {}
-    interruption: BaseException | None = None
-    for exchange in all_limp(nodes):
-        failure = yield from _attempt(exchange)
-        if not isinstance(failure, MotorbusError):  # whoever did not hear is visited below
-            interruption = interruption or failure
-    for node in nodes:
-        failure = yield from _attempt(disable_torque(node))
-        if failure is not None and not isinstance(failure, MotorbusError):
-            interruption = interruption or failure
-            failure = yield from _attempt(disable_torque(node))
-        if isinstance(failure, MotorbusError):
-            errors[node.node] = failure
-    if interruption is not None:
-        raise interruption
+    waiting = list(nodes)
+    yield from afterwards(_at_once(nodes), lambda: _one_by_one(waiting, errors))
     return errors
+
+
+def _at_once(nodes: Sequence[Node]) -> Operation[None]:
+    for exchange in all_limp(nodes):
+        yield from outcome(exchange)  # whoever did not hear is visited
+
+
+def _one_by_one(waiting: list[Node], errors: dict[int, MotorbusError]) -> Operation[None]:
+    """Visit those who wait, and begin again where it was when interrupted."""
+    while waiting:
+        failure = yield from outcome(disable_torque(waiting[0]))
+        if failure is not None:
+            errors[waiting[0].node] = failure
+        del waiting[0]
 
 
 def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
@@ -71,14 +73,3 @@ def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
     for start in range(0, len(nodes), capacity):
         items = [(node.node, LIMP.data) for node in nodes[start : start + capacity]]
         yield unanswered(wire.sync_write(LIMP.address, items), LIMP.effect, rank=Rank.STOP)
-
-
-def _attempt(runnable: Runnable[Any]) -> Operation[BaseException | None]:
-    """Carry it out; whatever it raises, an interruption included, becomes the value."""
-    try:
-        yield from runnable
-    except GeneratorExit:
-        raise
-    except BaseException as error:
-        return error
-    return None

@@ -26,6 +26,11 @@ class Layout:
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
                 self.rows[address] = entry
+        self.plain = {
+            entry.name: entry.address
+            for entry in table.values()
+            if entry.size == 1 and entry.coding is Coding.UNSIGNED
+        }
         self.factory = bytes(_image(table, defaults))
 
     def keeps(self, address: int) -> bool:
@@ -57,6 +62,9 @@ class Memory:
 
     def __getitem__(self, name: str) -> int:
         """The raw value of a row."""
+        plain = self.layout.plain.get(name)  # most rows are one byte, and each packet asks for ten of them
+        if plain is not None:
+            return self.live[plain]
         entry = self.layout.table[name]
         return entry.decode(bytes(self.live[entry.address : entry.address + entry.size]))
 

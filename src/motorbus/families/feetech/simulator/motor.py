@@ -60,6 +60,7 @@ def plan(settings: Settings, motion: Motion, at: float, drive: Drive, switches: 
         return rest(at, shaft)  # limp: a gear of 1:345 holds by its friction
     acceleration = settings.acceleration * switches.acceleration_unit or switches.full_acceleration
     if settings.mode == VELOCITY:
+        # 0 stops a wheel whatever bit 3 of the phase register says of moves: as shipped it would race otherwise.
         goal = _bounded(settings.goal_velocity * settings.velocity_unit, drive)
         return run(at, shaft, goal, velocity=velocity, acceleration=acceleration)
     if settings.mode == PWM:

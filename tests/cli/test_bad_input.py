@@ -1,0 +1,109 @@
+"""Everything that can be wrong with a request: one clear error, its own exit code, and nothing sent.
+
+That nothing was sent is seen at the simulated devices themselves: they count what they hear.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from motorbus.cli.simulated import Simulated
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+from tests.cli.test_estop import FOREIGN, WATCHING, program
+
+pytestmark = pytest.mark.usefixtures("state_folder")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["read", "feetech:/dev/no-such-port#1"], 3, "no-such-port"),
+        (["read", "feetech:socket://127.0.0.1:1#1"], 3, "127.0.0.1"),
+        (["read", "feetech:pigeon://coop#1"], 2, "pigeon"),
+        (["read", "feetech:sim:nobody#1"], 3, "nobody"),
+        (["read", "feetech:sim,model=abacus#1"], 2, "abacus"),
+        (["scan", "nobody:/dev/ttyACM0"], 2, "nobody"),
+        (["scan", "feetech:sim,baud=fast"], 2, "fast"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else str(value),
+)
+def test_a_bus_that_cannot_be_opened(words: list[str], code: int, told: str, run: Run) -> None:
+    ran = run(*words)
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.startswith("error: ")
+    assert told in ran.err
+
+
+def test_a_port_that_another_motorbus_process_holds(served: Simulated, run: Run) -> None:
+    with program(WATCHING, served.bus) as process:
+        ran = run("read", f"{served.bus}#1")
+    assert ran.code == 4
+    assert str(process.pid) in ran.err
+
+
+def test_a_port_that_a_foreign_program_holds(served: Simulated, run: Run) -> None:
+    with program(FOREIGN, served.bus.partition(":")[2]) as process:
+        ran = run("read", f"{served.bus}#1")
+    assert ran.code == 4
+    assert str(process.pid) in ran.err
+
+
+def test_a_port_that_vanishes_meanwhile(tmp_path: Path) -> None:
+    with Simulated("feetech", ids="1", link=tmp_path / "bus") as simulated:
+        command = [
+            sys.executable,
+            "-m",
+            "motorbus.cli",
+            "monitor",
+            f"{simulated.bus}#1",
+            "--rate",
+            "1000",
+            "--json",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watching:
+            assert watching.stdout is not None
+            assert watching.stderr is not None
+            assert watching.stdout.readline()
+            simulated.end()
+            watching.stdout.read()
+            told = watching.stderr.read()
+            assert watching.wait(timeout=30) == 3, told
+    assert '"LinkLost"' in told
+
+
+def test_a_wrong_rate_is_silence_with_advice(served: Simulated, run: Run) -> None:
+    ran = run("read", f"{served.bus},baud=500000#1")
+    assert ran.code == 5
+    assert "--baud all" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["read", "BUS#254", "present_position"], 2),
+        (["read", "BUS#1", "present_positon"], 2),
+        (["write", "BUS#1", "id=254", "--yes"], 2),
+        (["write", "BUS#254", "goal_position=1"], 2),
+        (["write", "BUS#1", "goal_position=nan"], 2),
+        (["write", "BUS#1", "torque_limit=101%"], 2),
+        (["move", "BUS#1=nan"], 2),
+        (["move", "BUS#254=1"], 2),
+        (["move", "BUS#1=7", "--yes"], 8),
+        (["torque", "off", "BUS#254"], 2),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else str(value),
+)
+def test_a_request_that_is_impossible_changes_nothing(
+    words: list[str], code: int, run: Run, arm: Simulation
+) -> None:
+    before = arm[1].status()
+    ran = run(*(word.replace("BUS", arm.url) for word in words))
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.startswith("error: ")
+    assert ran.err.count("error: ") == 1
+    assert arm[1].status() == before

@@ -1,0 +1,130 @@
+"""The emergency stop from another shell: of a program that loops, of one that hangs, of a bus that nobody holds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+import motorbus
+from motorbus.cli.simulated import Simulated
+from tests.cli.conftest import Run
+
+LOOPING = """
+import sys, motorbus
+with motorbus.open(sys.argv[1]) as bus:
+    servos = [motorbus.feetech.Servo(bus, node) for node in (1, 2, 3)]
+    for servo in servos:
+        servo.enable_torque()
+    print("looping", flush=True)
+    try:
+        while True:
+            for servo in servos:
+                servo.move(servo.position() + 0.01, wait=False)
+    except motorbus.Interrupted:
+        print("interrupted", flush=True)
+"""
+HANGING = """
+import asyncio, sys, motorbus
+async def main():
+    async with motorbus.open_async(sys.argv[1]) as bus:
+        for node in (1, 2, 3):
+            await motorbus.feetech.AsyncServo(bus, node).enable_torque()
+        print("hanging", flush=True)
+        sys.stdin.read()  # the event loop stands still
+asyncio.run(main())
+"""
+WATCHING = """
+import sys, motorbus
+with motorbus.open(sys.argv[1]) as bus:
+    print("watching", flush=True)
+    sys.stdin.read()
+"""
+FOREIGN = """
+import os, sys
+descriptor = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+print("holding", flush=True)
+sys.stdin.read()
+"""
+
+pytestmark = pytest.mark.usefixtures("state_folder")
+
+
+@contextmanager
+def program(code: str, argument: str) -> Iterator[subprocess.Popen[str]]:
+    """Another program, from its first line of output on; it ends when its stdin does."""
+    command = [sys.executable, "-c", code, argument]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        try:
+            yield process
+        finally:
+            process.communicate(timeout=30)
+
+
+def torque(bus: str) -> list[float]:
+    with motorbus.open(bus) as opening:
+        return [
+            motorbus.feetech.Servo(opening, node).read("torque_enable")["torque_enable"] for node in (1, 2, 3)
+        ]
+
+
+@pytest.mark.parametrize("named", [True, False], ids=["named", "every bus"])
+def test_a_program_that_loops_is_stopped(named: bool, served: Simulated, run: Run) -> None:
+    with program(LOOPING, served.bus) as process:
+        ran = run("estop", *([served.bus] if named else []), "--json")
+        assert process.stdout is not None
+        assert process.stdout.readline() == "interrupted\n"
+    assert ran.code == 0
+    (stop,) = ran.document["buses"]
+    assert stop["acknowledged"] == [1, 2, 3]
+    assert str(process.pid) in stop["by"]
+    assert torque(served.bus) == [0, 0, 0]
+
+
+def test_a_program_whose_event_loop_hangs_is_stopped(served: Simulated, run: Run) -> None:
+    with program(HANGING, served.bus) as process:
+        ran = run("estop", served.bus, "--json")
+        assert process.poll() is None
+    assert ran.code == 0
+    assert ran.document["buses"][0]["acknowledged"] == [1, 2, 3]
+    assert torque(served.bus) == [0, 0, 0]
+
+
+def test_a_bus_that_nobody_holds_is_stopped_from_here(served: Simulated, run: Run) -> None:
+    with motorbus.open(served.bus) as bus:
+        for node in (1, 2, 3):
+            motorbus.feetech.Servo(bus, node).enable_torque()
+    ran = run("estop", served.bus)
+    assert (ran.code, ran.err) == (0, "")
+    assert "sags or falls" in ran.out
+    assert torque(served.bus) == [0, 0, 0]
+
+
+def test_devices_that_are_named_confirm_it(served: Simulated, run: Run) -> None:
+    ran = run("estop", f"{served.bus}#1+9", "--json")
+    assert ran.code == 6
+    (stop,) = ran.document["buses"]
+    assert (stop["acknowledged"], stop["silent"], stop["by"]) == ([1], [9], "this process")
+
+
+def test_a_foreign_program_is_named(served: Simulated, run: Run) -> None:
+    port = served.bus.partition(":")[2]
+    with program(FOREIGN, port) as process:
+        ran = run("estop", served.bus)
+    assert ran.code == 4
+    assert str(process.pid) in ran.err
+
+
+def test_without_a_bus_there_must_be_one(run: Run) -> None:
+    ran = run("estop")
+    assert ran.code == 2
+    assert "no motorbus process" in ran.err
+
+
+def test_the_help_says_that_the_arm_will_sag(run: Run) -> None:
+    assert "SAG" in run("estop", "--help").out

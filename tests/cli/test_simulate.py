@@ -1,0 +1,143 @@
+"""Simulated devices for any program: on a terminal or a socket, under control, and tidy when they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import motorbus
+from motorbus.cli.simulated import Simulated
+from tests.cli.conftest import Run
+
+PING, PONG = bytes.fromhex("FFFF0102 01FB"), bytes.fromhex("FFFF0102 00FC")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_cleanly_and_takes_its_files_with_it(number: signal.Signals, tmp_path: Path) -> None:
+    link, control = tmp_path / "bus", tmp_path / "control"
+    with Simulated("feetech", ids="1-2", link=link, control=str(control)) as simulated:
+        assert link.is_symlink()
+        assert stat.S_IMODE(control.stat().st_mode) == 0o600
+        simulated.process.send_signal(number)
+        out, err = simulated.process.communicate(timeout=30)
+        assert (simulated.process.returncode, out, err) == (0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_any_program_can_open_the_terminal(tmp_path: Path) -> None:
+    with Simulated("feetech", link=tmp_path / "bus"):
+        descriptor = os.open(tmp_path / "bus", os.O_RDWR | os.O_NOCTTY)
+        try:
+            os.write(descriptor, PING)
+            answer = b""
+            while len(answer) < len(PONG):
+                answer += os.read(descriptor, 64)
+            assert answer == PONG
+        finally:
+            os.close(descriptor)
+
+
+def test_without_a_link_the_terminal_is_named() -> None:
+    with Simulated("feetech") as simulated, motorbus.open(simulated.bus) as bus:
+        assert simulated.bus.startswith("feetech:/dev/")
+        assert motorbus.feetech.Servo(bus, 1).ping()
+
+
+@pytest.mark.parametrize("endpoint", ["0", ":0", "127.0.0.1:0"])
+def test_a_socket_is_for_this_machine_unless_said_otherwise(endpoint: str) -> None:
+    with Simulated("feetech", ids="1", tcp=endpoint) as simulated:
+        _, _, host, port = simulated.bus.replace("//", "").split(":")
+        assert host == "127.0.0.1"
+        with socket.create_connection((host, int(port)), timeout=30) as client:
+            client.sendall(PING)
+            assert client.recv(64) == PONG
+
+
+def test_it_is_poked_while_it_runs(tmp_path: Path) -> None:
+    control = tmp_path / "control"
+    with (
+        Simulated("feetech", ids="1-2", link=tmp_path / "bus", control=str(control)) as simulated,
+        motorbus.open(simulated.bus) as bus,
+        socket.socket(socket.AF_UNIX) as client,
+    ):
+        client.settimeout(30)
+        client.connect(str(control))
+        lines = client.makefile("rw")
+
+        def order(text: str) -> str:
+            lines.write(f"{text}\n")
+            lines.flush()
+            return lines.readline().strip()
+
+        assert len(json.loads(order("status"))["nodes"]) == 2
+        assert motorbus.feetech.Servo(bus, 2).ping()
+        assert order("unplug 2") == "ok"
+        assert not motorbus.feetech.Servo(bus, 2).ping()
+
+
+def test_a_switch_changes_how_they_behave(tmp_path: Path, run: Run) -> None:
+    with Simulated("feetech", ids="1-3", link=tmp_path / "bus", switch="broadcast_ping=in_turn") as simulated:
+        found = run("ping", simulated.bus, "--broadcast", "--json").document["devices"]
+    assert [one["id"] for one in found] == [1, 2, 3]
+
+
+def test_a_ready_line_for_people(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--ids", "1-6"]
+    with subprocess.Popen(
+        [*command, "--link", str(tmp_path / "bus")], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        process.terminate()
+    assert line == f"ready: feetech:{tmp_path / 'bus'}  (simulated: 6 feetech devices, ids 1-6)\n"
+    assert process.returncode == 0
+
+
+def test_the_switches_are_listed(run: Run) -> None:
+    ran = run("simulate", "feetech", "--switches")
+    assert ran.code == 0
+    assert "broadcast_ping" in ran.out
+    names = [
+        switch["name"] for switch in run("simulate", "feetech", "--switches", "--json").document["switches"]
+    ]
+    assert "broadcast_ping" in names
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["nobody"], 2),
+        (["feetech", "--model", "abacus"], 2),
+        (["feetech", "--ids", "254"], 2),
+        (["feetech", "--ids", "x"], 2),
+        (["feetech", "--switch", "gravity=off"], 2),
+        (["feetech", "--switch", "gravity"], 2),
+        (["feetech", "--tcp", "0", "--link", "bus"], 2),
+        (["feetech", "--tcp", "somewhere"], 2),
+        (["feetech", "--link", "/no/such/folder/bus"], 1),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else str(value),
+)
+def test_what_cannot_be_served(words: list[str], code: int, run: Run) -> None:
+    ran = run("simulate", *words)
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.startswith("error: ")
+
+
+def test_a_port_that_is_taken_is_busy(run: Run) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        assert run("simulate", "feetech", "--tcp", str(taken.getsockname()[1])).code == 4
+
+
+def test_a_link_that_is_somebody_elses_stays(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "bus").write_text("precious")
+    assert run("simulate", "feetech", "--link", str(tmp_path / "bus")).code == 2
+    assert (tmp_path / "bus").read_text() == "precious"

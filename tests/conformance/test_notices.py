@@ -1,0 +1,87 @@
+"""What devices say unasked reaches whoever listens, and disturbs nothing: no exchange, no trust, no other node."""
+
+from __future__ import annotations
+
+from motorbus.core.family import Family
+from motorbus.core.operation import Data, Listen, Notice, Operation
+from motorbus.link.base import Delivery, PerfectLine, Side
+from tests.conformance.subjects import vectors
+from tests.conformance.world import IDS, reports, said, sent, world
+
+NODE = IDS[0]
+
+
+class Chattering(PerfectLine):
+    """Lets devices say something unasked before and after each of their replies, and says how often."""
+
+    def __init__(self, notices: list[Data]) -> None:
+        self.notices = notices
+        self.fired = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        replies = super().carry(sender, data, at)
+        if sender is Side.HOST:
+            return replies
+        self.fired += 1
+        chatter = [Delivery(at, Side.HOST, notice) for notice in self.notices]
+        return [*chatter, *replies, *chatter]
+
+
+def said_unasked(family: Family) -> list[Data]:
+    return [
+        vector.data
+        for vector in vectors(family.name)
+        if any(isinstance(event, Notice) for event in family.receiver().feed(vector.data))
+    ]
+
+
+def test_notices_disturb_nothing(reporter: Family) -> None:
+    line = Chattering([])
+    with world(reporter, line=line) as there:
+        looked = []
+        for line.notices in ([], said_unasked(reporter)):
+            device = there.device(NODE)
+            with sent(there.bus) as frames:
+                values = [device.ping(), device.identify(), device.read(), there.bus.run(reporter.scan(IDS))]
+            looked.append((values, frames))
+        assert line.fired
+        assert looked[0] == looked[1]
+        assert there.bus.statistics.other["notices"] >= line.fired
+
+
+def test_a_notice_names_its_node_and_reaches_who_listens(reporter: Family) -> None:
+    expected = reports(reporter)
+    line = Chattering(said_unasked(reporter))
+    with world(reporter, line=line) as there:
+        heard = there.bus.notices.subscribe()
+        assert there.device(NODE).ping() is True
+        there.link.advance(0.1)
+        assert there.device(NODE).ping() is True
+        assert list(heard)[: len(expected)] == expected
+    assert {notice.node for notice in expected} <= set(IDS)
+
+
+def test_who_listens_in_vain_goes_on_in_time(reporter: Family) -> None:
+    def listening() -> Operation[Notice | None]:
+        return (yield from Listen(lambda notice: True, 0.5))
+
+    with world(reporter) as there:
+        begun = there.link.now()
+        assert there.bus.run(listening()) is None
+        assert 0.5 <= there.link.now() - begun < 0.6
+
+
+def test_a_device_under_way_says_so_and_the_bus_listens(reporting_mover: Family) -> None:
+    def moved() -> Operation[tuple[Notice | None, float]]:
+        to = (yield from said(device, "position")) + 1.0
+        yield from said(device, "move", to, wait=False)
+        notice = yield from Listen(lambda notice: notice.node == NODE, 10.0)
+        there.link.advance(5.0)
+        return notice, abs((yield from said(device, "position")) - to)
+
+    with world(reporting_mover) as there:
+        device = there.device(NODE)
+        device.enable_torque()
+        notice, off = there.bus.run(moved())
+        assert notice is not None
+        assert off < 0.01

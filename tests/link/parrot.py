@@ -1,0 +1,48 @@
+"""The simplest simulated bus there can be, for the tests of what lies between it and a host."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from motorbus.core.family import SimulatedNode
+from motorbus.core.operation import CanFrame, Data
+from motorbus.link.memory import MemoryLink
+
+DELAY = 0.001
+PING = bytes.fromhex("ff ff 01 02 01 fb")
+
+
+class Parrot:
+    """A simulated bus that says everything back, reversed, after `delay` seconds; a frame with its id plus one."""
+
+    def __init__(self, delay: float = DELAY) -> None:
+        self.delay = delay
+        self.rate = 0
+        self.heard: list[tuple[float, Data]] = []
+        self.coming: list[tuple[float, Data]] = []
+        self.nodes: Mapping[int, SimulatedNode] = {}
+
+    def receive(self, data: Data, at: float) -> None:
+        self.heard.append((at, data))
+        said = data._replace(id=data.id + 1) if isinstance(data, CanFrame) else data[::-1]
+        self.coming.append((at + self.delay, said))
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        ready = [item for item in self.coming if item[0] <= to]
+        self.coming = [item for item in self.coming if item[0] > to]
+        return ready
+
+    def due(self) -> float | None:
+        return min((when for when, _ in self.coming), default=None)
+
+    def tune(self, rate: int) -> None:
+        self.rate = rate
+
+
+def drain(link: MemoryLink, seconds: float = 10.0) -> list[Data]:
+    """Everything that arrives within this time."""
+    end = link.now() + seconds
+    arrived: list[Data] = []
+    while link.now() < end:
+        arrived += link.read(end)
+    return arrived
