@@ -105,7 +105,7 @@ def check(version: tuple[int, int]) -> Row:
     except subprocess.CalledProcessError as error:
         return Row(label, path, f"FAILED: no environment ({error})", passed=False)
     print(f"the quick tests on {path}", flush=True)
-    command = [str(python), "-m", "pytest", "--quick", "-q", "-p", "no:cacheprovider"]
+    command = [str(python), "-m", "pytest", "--quick", "-q", "-n", "auto", "-p", "no:cacheprovider"]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     lines = ended.stdout.strip().splitlines() or ["pytest printed nothing"]
     if ended.returncode:

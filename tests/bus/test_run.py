@@ -59,11 +59,12 @@ def test_a_listener_gets_none_when_nothing_is_said() -> None:
 def test_tune_reaches_link_and_turns() -> None:
     bus, responder = memory_bus()
 
-    def change() -> Operation[int]:
-        yield from Tune(500_000)
-        return (yield from position(1))
+    def change() -> Operation[tuple[int, int, int]]:
+        before = yield from Tune(500_000)
+        present = yield from Tune(0)
+        return before, present, (yield from position(1))
 
-    assert bus.run(change()) == 1
+    assert bus.run(change()) == (1_000_000, 500_000, 1)
     assert (bus.rate, responder.rate) == (500_000, 500_000)
 
 

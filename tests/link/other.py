@@ -14,7 +14,8 @@ SOURCE = Path(__file__).parents[2] / "src"
 
 def environment() -> dict[str, str]:
     """Ours, with the package to be found."""
-    return {**os.environ, "PYTHONPATH": str(SOURCE)}
+    paths = [str(SOURCE), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
 
 
 @contextmanager

@@ -48,11 +48,9 @@ def test_a_client_may_come_and_go(master: PtyMaster) -> None:
 
 
 def test_what_nobody_reads_is_dropped_without_blocking(master: PtyMaster) -> None:
-    taken = 0
-    while (written := master.write(bytes(4096))) == 4096:
-        taken += written
-    assert master.write(bytes(4096)) == 0
-    assert taken > 0
+    taken = [master.write(bytes(4096)) for _ in range(100)]
+    assert taken[0] > 0
+    assert 0 in taken
 
 
 @pytest.mark.parametrize("name", ["B9600", "B115200", "B1000000"])

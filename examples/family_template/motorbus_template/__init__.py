@@ -26,6 +26,7 @@ from motorbus.core.operation import ANY, Answer, CanFrame, Exchange, Operation, 
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
 
 from . import driver, wire
+from .scanning import scan
 from .simulator import Metronomes
 from .table import TABLE
 
@@ -132,7 +133,7 @@ class Template:
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
         """Every id, or these."""
-        return driver.scan(ids, rates, rate=RATE)
+        return scan(ids, rates)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
         """SI operations by capability; what a model cannot do is absent."""

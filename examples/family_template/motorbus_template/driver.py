@@ -13,7 +13,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from motorbus.core.entry import Entry, Storage, Value
-from motorbus.core.family import Found, Identity, State, Stop
+from motorbus.core.family import Identity, State, Stop
 from motorbus.core.operation import (
     Alone,
     Answer,
@@ -24,18 +24,12 @@ from motorbus.core.operation import (
     Listen,
     Notice,
     Operation,
-    Progress,
     Rank,
-    Report,
     Timeout,
-    Together,
-    Tune,
-    outcome,
 )
 from motorbus.errors import (
     DeviceError,
     LimitExceeded,
-    MotorbusError,
     NoReply,
     RequestError,
     Stalled,
@@ -194,45 +188,6 @@ def identify(node: Node) -> Operation[Identity]:
     name = TABLE["model"].choices.get(model, f"unknown model 0x{model:04X}")
     known = TABLE.name if model in TABLE["model"].choices else ""
     return Identity(node.node, name, f"{firmware >> 8}.{firmware & 0xFF}", known, {"model_number": model})
-
-
-def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, rate: int) -> Operation[list[Found]]:
-    """Ask every id, two at a time because each has a lane of its own; `rate` is set again in the end."""
-    found: list[Found] = []
-    try:
-        for other in rates:
-            yield from Tune(other)
-            found += yield from _everyone(ids or tuple(wire.NODES), other)
-    except GeneratorExit:
-        raise
-    except BaseException:
-        yield from Tune(rate)
-        raise
-    if rates:
-        yield from Tune(rate)
-        return found
-    return (yield from _everyone(ids or tuple(wire.NODES), rate))
-
-
-def _everyone(nodes: tuple[int, ...], rate: int) -> Operation[list[Found]]:
-    """Whoever is silent is asked once more, for the first frame after power-up may be missed."""
-    found: dict[int, Found] = {}
-    for turn in range(2):
-        silent = [node for node in nodes if node not in found]
-        looks = yield from Together([_look(Node(node), rate) for node in silent])
-        found |= {one.node: one for one in looks if one is not None}
-        yield from Report(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
-    return [found[node] for node in nodes if node in found]
-
-
-def _look(node: Node, rate: int) -> Operation[Found | None]:
-    heard = yield from outcome(proof(node, timeout=Timeout.SCAN))
-    if heard is not True:
-        return None
-    identity = yield from outcome(identify(node))
-    found = Found(node.node, rate, None if isinstance(identity, MotorbusError) else identity)
-    yield from Report(found)
-    return found
 
 
 # --- objects by name ----------------------------------------------------------------------------------------

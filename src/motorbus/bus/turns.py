@@ -195,11 +195,14 @@ class Turns(Air):
             return not self._flying
         return ticket.exchange.lane not in self._flying
 
-    def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Tune:
+    def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Tune | None:
+        before, wanted = self.rate, ticket.tune.rate
         queue.remove(ticket)
-        self.rate = ticket.tune.rate
+        self._settle(ticket, before)
+        if wanted in (0, before):
+            return None
+        self.rate = wanted
         self.receiver = self.family.receiver()
-        self._settle(ticket)
         return ticket.tune
 
     def _admitted(self, exchange: Exchange[Any]) -> None:

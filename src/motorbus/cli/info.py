@@ -78,4 +78,5 @@ def _show(identity: Identity, rows: Sequence[dict[str, Any]], registers: bool, o
     words = {**named, "table": identity.table or "unknown firmware: read only"}
     output.table(identity.model, ["", ""], words.items())
     if rows:
+        output.text("")
         table_rows.show(title.capitalize(), rows, output, full=registers)

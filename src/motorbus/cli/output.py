@@ -46,7 +46,7 @@ class Output:
         if self.json:
             return
         if title:
-            self.text(self.marked(title))
+            self.console().print(self.marked(title), style="bold", markup=False, soft_wrap=True)
         self.draw(self.grid(columns, rows))
 
     def text(self, text: str) -> None:
@@ -77,6 +77,7 @@ class Output:
         terminal = sys.stdout.isatty()
         grid = Table(
             box=box.SIMPLE_HEAD if terminal else None,
+            show_edge=False,
             pad_edge=False,
             header_style="bold" if terminal else "",
             show_header=any(columns),

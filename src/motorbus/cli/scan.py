@@ -57,12 +57,13 @@ def scan(
     from motorbus import session
 
     asked = session.parse_ids(ids) if ids else target(bus).nodes
-    with opened(target(bus).bus, options, output) as opening, output.progress("scanning") as bar:
-        early: list[Found] = []
-        found: list[Found] | None = None
+    early: list[Found] = []
+    found: list[Found] | None = None
+    with opened(target(bus).bus, options, output) as opening:
+        operation = opening.family.scan(asked, rates(baud, opening.family) or (opening.rate,))
         try:
-            operation = opening.family.scan(asked, rates(baud, opening.family) or (opening.rate,))
-            found = opening.run(operation, report=lambda event: listen(event, early, bar))
+            with output.progress("scanning") as bar:
+                found = opening.run(operation, report=lambda event: listen(event, early, bar))
         finally:
             _show(bus, early if found is None else found, output)
         if not found:
@@ -81,6 +82,7 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
 
 
 def listen(event: object, found: list[Found], bar: Bar) -> None:
+    """Take note of what a scan reports on its way: an early result, or how far it has come."""
     if isinstance(event, Found):
         found.append(event)
         bar.say(f"#{event.node} answers at {event.rate} bit/s")

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from motorbus import families
+from motorbus import families, session
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
+from motorbus.simulation.control import ControlSocket
+from motorbus.simulation.mount import Mount
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -82,15 +84,12 @@ def simulate(
     switches
         List the switches of the family and end.
     """
-    from motorbus import session
-    from motorbus.simulation.control import ControlSocket
-    from motorbus.simulation.mount import Mount
-
     output.simulated = True
     found = families.load(family)
     if switches:
         return _list(found, output)
-    simulator = found.simulator(session.parse_ids(ids), model, **_switched(switch))
+    nodes = session.parse_ids(ids)
+    simulator = found.simulator(nodes, model, **_switched(switch))
     rate = baud or found.link.rate
     simulator.tune(rate)
     with ExitStack() as stack:
@@ -99,14 +98,17 @@ def simulate(
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
         kind, paced = found.link.kind, rate if pace else None
         mount = Mount(simulator, endpoint, pace=paced, rate=rate, kind=kind, attendants=controls)
-        nodes = sorted(simulator.nodes)
-        bus = f"{family}:{port}"
-        output.document(
-            "motorbus.simulate/1", {"bus": bus, "family": family, "ids": nodes, "pid": os.getpid()}
-        )
-        output.text(f"ready: {bus}  (simulated: {len(nodes)} {family} devices, ids {ids})")
+        _announce(f"{family}:{port}", family, nodes, output)
         mount.serve(stop)
     return Exit.OK
+
+
+def _announce(bus: str, family: str, nodes: Sequence[int], output: Output) -> None:
+    output.document(
+        "motorbus.simulate/1", {"bus": bus, "family": family, "ids": list(nodes), "pid": os.getpid()}
+    )
+    ids = ", ".join(map(str, nodes)) if len(nodes) <= 10 else f"{nodes[0]} to {nodes[-1]}"
+    output.text(f"ready: {bus}  (simulated: {len(nodes)} {family} devices, ids {ids})")
 
 
 def _endpoint(stack: ExitStack, link: Path | None, tcp: str) -> tuple[Endpoint, str]:

@@ -243,15 +243,16 @@ class Listen:
 
 
 class Tune:
-    """Set the rate of the link, in bit/s, once nothing is in flight."""
+    """Set the rate of the link, in bit/s, once nothing is in flight; gives the rate it had. 0 only asks."""
 
     __slots__ = ("rate",)
 
     def __init__(self, rate: int) -> None:
         self.rate: Final = rate
 
-    def __iter__(self) -> Generator[Step, Any, None]:
-        yield self
+    def __iter__(self) -> Generator[Step, Any, int]:
+        before: int = yield self
+        return before
 
 
 class Progress(NamedTuple):

@@ -103,11 +103,14 @@ def prepared(id: int = 3, **changes: int) -> Node:
 class Played:
     """What happened: exchanges, packets, events, rates and pauses in order, and the value in the end."""
 
-    def __init__(self, script: Sequence[Line], interrupt_at: int | None = None) -> None:
+    def __init__(
+        self, script: Sequence[Line], interrupt_at: int | None = None, *, rate: int = 1_000_000
+    ) -> None:
         self.script = list(script)
         self.interrupt_at = interrupt_at
         self.exchanges: list[Exchange[Any]] = []
         self.events: list[object] = []
+        self.rate = rate
         self.rates: list[int] = []
         self.alone = 0
         self.now = 100.0
@@ -141,14 +144,21 @@ class Played:
             self.alone += 1
             return self.run(step.operation)
         if isinstance(step, Tune):
-            self.rates.append(step.rate)
-        elif isinstance(step, Report):
+            return self._tune(step.rate)
+        if isinstance(step, Report):
             self.events.append(step.event)
         elif isinstance(step, Pause):
             self.now += step.seconds
         else:
             raise AssertionError(f"unexpected step {step!r}")
         return None
+
+    def _tune(self, rate: int) -> int:
+        """The rate there was; 0 only asks."""
+        before = self.rates[-1] if self.rates else self.rate
+        if rate:
+            self.rates.append(rate)
+        return before
 
     def _exchange(self, exchange: Exchange[Any]) -> Any:
         number = len(self.exchanges)

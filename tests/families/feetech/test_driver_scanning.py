@@ -32,11 +32,11 @@ def test_the_silent_are_asked_once_more_and_the_found_are_identified() -> None:
 
 
 def test_news_come_early_and_progress_counts_up_to_the_end() -> None:
-    played = watch(scan([1, 2], rate=500_000), asks(1), answers(2), asks(1), tells(2))
-    assert [event for event in played.events if isinstance(event, Found)] == [Found(2, 500_000, None)]
+    played = watch(scan([1, 2]), asks(1), answers(2), asks(1), tells(2))
+    assert [event for event in played.events if isinstance(event, Found)] == [Found(2, 1_000_000, None)]
     progress = [event for event in played.events if isinstance(event, Progress)]
     assert [(event.done, event.total) for event in progress] == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    assert played.events.index(Found(2, 500_000, None)) == 1
+    assert played.events.index(Found(2, 1_000_000, None)) == 1
 
 
 def test_every_id_is_asked_when_none_is_named() -> None:
@@ -61,17 +61,17 @@ def test_who_answers_and_does_not_tell_what_it_is_is_found_all_the_same() -> Non
 
 
 def test_several_rates_are_tried_alone_and_the_rate_is_set_back() -> None:
-    played = Played([asks(1), asks(1), answers(1), tells(1)])
-    found = played.run(scan([1], [500_000, 115_200], rate=250_000))
+    played = Played([asks(1), asks(1), answers(1), tells(1)], rate=250_000)
+    found = played.run(scan([1], [500_000, 115_200]))
     assert [(one.node, one.rate) for one in found] == [(1, 115_200)]
     assert (played.rates, played.alone) == ([500_000, 115_200, 250_000], 1)
 
 
 @pytest.mark.parametrize("step", range(4))
 def test_an_interruption_sets_the_rate_back(step: int) -> None:
-    played = Played([asks(1), asks(1), answers(1), tells(1)], interrupt_at=step)
+    played = Played([asks(1), asks(1), answers(1), tells(1)], interrupt_at=step, rate=250_000)
     with pytest.raises(KeyboardInterrupt):
-        played.run(scan([1], [500_000, 115_200], rate=250_000))
+        played.run(scan([1], [500_000, 115_200]))
     assert played.rates[-1] == 250_000
 
 

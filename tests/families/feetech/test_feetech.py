@@ -62,8 +62,8 @@ def test_stop_lets_go_of_every_node_it_is_given() -> None:
 def test_identify_and_scan_need_no_servo_object() -> None:
     head = reads(3, 0, 3, 10, 0, 9, 3)
     assert play(FAMILY.identify(3), head).model == "STS3215"
-    found = play(FAMILY.scan((3,), rate=500_000), Line(packet(3, PING), packet(3, 0)), head)
-    assert [(one.node, one.rate) for one in found] == [(3, 500_000)]
+    found = play(FAMILY.scan((3,)), Line(packet(3, PING), packet(3, 0)), head)
+    assert [(one.node, one.rate) for one in found] == [(3, 1_000_000)]
 
 
 def test_what_explains_a_frame_is_the_family_s() -> None:

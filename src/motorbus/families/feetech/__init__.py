@@ -133,10 +133,8 @@ class Feetech:
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(Node(node))
 
-    def scan(
-        self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = (), *, rate: int = BAUD_CODES[0]
-    ) -> Operation[list[Found]]:
-        return scan(ids, rates, rate=rate)
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+        return scan(ids, rates)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
         names = {known.name for known in MODELS.values()}

@@ -13,21 +13,21 @@ from motorbus.core.family import Found, Identity
 from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, afterwards, outcome
 from motorbus.errors import NoReply, WireError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.group import RATE
 from motorbus.families.feetech.driver.identity import identify, ping_exchange
 from motorbus.families.feetech.driver.node import Node, as_nodes
 
 
-def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, rate: int = RATE) -> Operation[list[Found]]:
+def scan(ids: Sequence[int] = (), rates: Sequence[int] = ()) -> Operation[list[Found]]:
     """Every servo that answers, with what it is; `ids` () means 0 to 253, `rates` () the present rate alone.
 
-    `rate` is the present rate of the bus in bit/s; it is set again at the end, whatever happens. Reports `Found`
-    as soon as one answers (its identity is asked afterwards) and `Progress`. Writes nothing to any servo.
+    The present rate of the bus is set again at the end, whatever happens. Reports `Found` as soon as one answers
+    (its identity is asked afterwards) and `Progress`. Writes nothing to any servo.
     """
     asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
+    present = yield from Tune(0)
     if not rates:
-        return (yield from _at_one_rate(asked, rate, 0, 1))
-    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(rate)))))
+        return (yield from _at_one_rate(asked, present, 0, 1))
+    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(present)))))
 
 
 def _at_all_rates(ids: Sequence[int], rates: Sequence[int]) -> Operation[list[Found]]:
