@@ -33,4 +33,4 @@ def main(address: str = "feetech:sim,ids=1-6", cycles: int = 200) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(int, sys.argv[2:3]))
+    main(*sys.argv[1:2])

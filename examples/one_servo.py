@@ -24,4 +24,7 @@ def main(address: str = "feetech:sim,ids=1-6", node: int = 3) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(int, sys.argv[2:3]))
+    if len(sys.argv) > 2:
+        main(sys.argv[1], int(sys.argv[2]))
+    else:
+        main()

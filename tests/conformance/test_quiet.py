@@ -120,8 +120,16 @@ def test_a_scan_finds_at_each_rate_who_is_there(family: Family) -> None:
         rates = family.link.rates
         found = there.bus.run(family.scan(IDS, rates))
         assert {(one.node, one.rate) for one in found} == {(node, family.link.rate) for node in IDS}
-        there.bus.run(family.scan(IDS, (family.link.rate,)))
         assert there.device(NODE).ping() is True
+
+
+def test_a_scan_leaves_the_rate_as_it_was(family: Family) -> None:
+    usual, other = family.link.rate, family.link.rates[-1]
+    with world(family, rate=other) as there:
+        found = there.bus.run(family.scan(IDS, (usual,)))
+        assert {(one.node, one.rate) for one in found} == {(node, usual) for node in IDS}
+        assert (there.bus.rate, there.link.rate) == (other, other)
+        assert bool(there.bus.run(family.scan(IDS))) == (usual == other)
 
 
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])

@@ -39,11 +39,12 @@ class World:
         ids: tuple[int, ...] = IDS,
         line: Line | None = None,
         link: type[MemoryLink] = MemoryLink,
+        rate: int = 0,
     ) -> None:
         self.family = family
         self.ids = ids
         self.simulator = family.simulator(ids)
-        self.link = link(self.simulator, rate=family.link.rate, line=line)
+        self.link = link(self.simulator, rate=rate or family.link.rate, line=line)
         self.events: list[object] = []
         self.bus = Bus(self.link, family, admit=Gate(), report=self.events.append)
 

@@ -53,19 +53,22 @@ def words(answer: Answer) -> list[int]:
 
 
 def ping(rig: Rig) -> None:
-    answer = rig.bus.run(Exchange(wire.ping(1), (Due(1, 1, 6),), repeatable=True))
+    exchange: Exchange[Answer] = Exchange(wire.ping(1), (Due(1, 1, 6),), repeatable=True)
+    answer = rig.bus.run(exchange)
     assert answer.replies[0].data == wire.encode_status(1, 0)
 
 
 def read_word(rig: Rig) -> None:
     raw = rig.stir()
-    exchange = Exchange(wire.read(1, 56, 2), (Due(1, 1, 8),), repeatable=True)
+    exchange: Exchange[Answer] = Exchange(wire.read(1, 56, 2), (Due(1, 1, 8),), repeatable=True)
     assert words(rig.bus.run(exchange)) == [raw]
 
 
 def read_feedback(rig: Rig) -> None:
     raw = rig.stir()
-    exchange = Exchange(wire.read(1, 56, FEEDBACK), (Due(1, 1, 6 + FEEDBACK),), repeatable=True)
+    exchange: Exchange[Answer] = Exchange(
+        wire.read(1, 56, FEEDBACK), (Due(1, 1, 6 + FEEDBACK),), repeatable=True
+    )
     assert words(rig.bus.run(exchange)) == [raw]
 
 
@@ -73,7 +76,7 @@ def write_byte(rig: Rig) -> None:
     """Register 41, the acceleration: success must mean that it was written."""
     rig.count += 1
     value = rig.count % 250
-    exchange = Exchange(wire.write(1, 41, bytes([value])), (Due(1, 1, 6),), repeatable=True)
+    exchange: Exchange[Answer] = Exchange(wire.write(1, 41, bytes([value])), (Due(1, 1, 6),), repeatable=True)
     rig.bus.run(exchange)
     assert rig.servos[1].memory["acceleration"] == value
 
@@ -82,7 +85,7 @@ def sync_read(rig: Rig) -> None:
     """A node may be missing; one that is there is right."""
     raw = rig.stir()
     nodes = (1, 2, 3)
-    exchange = Exchange(
+    exchange: Exchange[Answer] = Exchange(
         wire.sync_read(56, 2, nodes), tuple(Due(node, node, 8) for node in nodes), repeatable=True
     )
     answer = rig.bus.run(exchange)

@@ -98,7 +98,9 @@ def test_random_corruption_is_caught_but_for_the_computed_rest(rounds: Callable[
         except AssertionError:
             wrong += 1
     assert rig.line.count("corrupt") > total * 0.05
-    print(f"\n{total} reads, {rig.line.count('corrupt')} corrupted replies, {wrong} wrong, {good / total:.3%} good")
+    print(
+        f"\n{total} reads, {rig.line.count('corrupt')} corrupted replies, {wrong} wrong, {good / total:.3%} good"
+    )
     assert wrong == 0, "one changed byte in a packet is always seen"
     assert good > 0.97 * total
 

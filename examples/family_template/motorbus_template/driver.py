@@ -26,6 +26,8 @@ from motorbus.core.operation import (
     Operation,
     Rank,
     Timeout,
+    afterwards,
+    outcome,
 )
 from motorbus.errors import (
     DeviceError,
@@ -244,31 +246,26 @@ def _checked(row: Entry, value: Value) -> int:
 def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> Operation[None]:
     """Unlock, write, read back, and lock again whatever happens, Ctrl-C and a second Ctrl-C included.
 
-    The unlock stands inside the `try`, for it may have been heard although its answer was not.
+    The unlock belongs to what is cleaned up after, for it may have been heard although its answer was not.
     """
     node.limits = None
-    try:
-        yield from write_row(node, TABLE["lock"], 0)
-        for row, raw in orders:
-            yield from write_row(node, row, raw)
-            found = yield from read_row(node, row)
-            if found != raw:
-                raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
-        yield from write_row(node, TABLE["lock"], 1)
-    except GeneratorExit:  # thrown away by whoever carried it out: nothing can be said any more
-        raise
-    except BaseException:
-        yield from _relock(node)
-        raise
+    yield from afterwards(_unlocked(node, orders), lambda: _locked(node))
 
 
-def _relock(node: Node) -> Operation[None]:
-    try:
-        yield from write_row(node, TABLE["lock"], 1)
-    except GeneratorExit:
-        raise
-    except BaseException:
-        yield from write_row(node, TABLE["lock"], 1)
+def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> Operation[None]:
+    yield from write_row(node, TABLE["lock"], 0)
+    for row, raw in orders:
+        yield from write_row(node, row, raw)
+        found = yield from read_row(node, row)
+        if found != raw:
+            raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
+
+
+def _locked(node: Node) -> Operation[None]:
+    """Said again when it was not acknowledged, beside what the bus repeats by itself."""
+    lock = write_row(node, TABLE["lock"], 1)
+    if (yield from outcome(lock)) is not None:
+        yield from lock
 
 
 # --- moving -------------------------------------------------------------------------------------------------

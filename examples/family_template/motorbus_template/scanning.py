@@ -7,7 +7,17 @@ is found is reported at once, for a scan of all rates takes long.
 from __future__ import annotations
 
 from motorbus.core.family import Found
-from motorbus.core.operation import Operation, Progress, Report, Timeout, Together, Tune, outcome
+from motorbus.core.operation import (
+    Alone,
+    Operation,
+    Progress,
+    Report,
+    Timeout,
+    Together,
+    Tune,
+    afterwards,
+    outcome,
+)
 from motorbus.errors import MotorbusError
 
 from . import driver, wire
@@ -19,7 +29,7 @@ def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[li
     present = yield from Tune(0)
     if not rates:
         return (yield from _everyone(asked, present))
-    return (yield from afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(present))))
+    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(present)))))
 
 
 def _at_all_rates(nodes: tuple[int, ...], rates: tuple[int, ...]) -> Operation[list[Found]]:

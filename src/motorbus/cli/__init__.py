@@ -23,30 +23,34 @@ from motorbus.cli.output import Output
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-_COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
-    "Find": {
+# A command's parser lives as long as its module, so the groups it belongs to are made once, too.
+_COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
+    Group("Find", sort_key=0): {
         "ports": "List the serial ports of this machine and what hangs on them.",
         "scan": "Find the devices on a bus.",
         "ping": "Ask devices whether they are there.",
         "info": "Say what a device is: model, firmware, limits, registers.",
     },
-    "Look": {
+    Group("Look", sort_key=1): {
         "read": "Read registers, or the telemetry, of a device.",
         "monitor": "Watch devices: position, velocity, load, current, voltage, temperature, alarms.",
         "decode": "Explain the bytes of frames, and why a bad one is bad.",
     },
-    "Act": {
+    Group("Act", sort_key=2): {
         "write": "Write registers of a device.",
         "move": "Move devices to positions, several of them together.",
         "torque": "Switch the power stage on or off.",
         "stop": "Decelerate and hold.",
         "estop": "Emergency stop: cut the torque of a bus at once, from any shell.",
     },
-    "Without hardware": {
+    Group("Without hardware", sort_key=3): {
         "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
         "demo": "Find, identify and move six simulated devices, and draw what they did.",
     },
 }
+_FAMILIES: Final = Group("One family", sort_key=8)
+_EVERYWHERE: Final = Group("Everywhere", sort_key=9)
+_PROGRAM: Final = Group("Program", sort_key=10)
 
 
 def build() -> App:
@@ -60,15 +64,14 @@ def build() -> App:
         default_parameter=Parameter(show_default=_default_shown),
         suppress_keyboard_interrupt=False,
     )
-    for place, (title, commands) in enumerate(_COMMANDS.items()):
-        group = Group(title, sort_key=place)
+    for group, commands in _COMMANDS.items():
         for name, line in commands.items():
             app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=group)
     for name in faces.names():
         line = f"What only {name} devices can do."
-        app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=Group("One family", sort_key=10))
-    app["--help"].group = app["--version"].group = Group("Program", sort_key=11)
-    app.register_install_completion_command(help="Install completion for this shell.", group="Program")
+        app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=_FAMILIES)
+    app["--help"].group = app["--version"].group = _PROGRAM
+    app.register_install_completion_command(help="Install completion for this shell.", group=_PROGRAM)
     return app
 
 
@@ -139,9 +142,6 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
     app.meta.suppress_keyboard_interrupt = False
     code = app.meta(words, exit_on_error=False, print_error=False, result_action="return_value")
     return code if isinstance(code, int) else Exit.OK
-
-
-_EVERYWHERE = Group("Everywhere", sort_key=9)
 
 
 @contextmanager

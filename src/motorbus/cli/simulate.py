@@ -14,7 +14,9 @@ from motorbus import families, session
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
+from motorbus.link.pty import PtyMaster
 from motorbus.simulation.control import ControlSocket
+from motorbus.simulation.listener import TcpListener, parse_endpoint
 from motorbus.simulation.mount import Mount
 
 if TYPE_CHECKING:
@@ -45,51 +47,28 @@ Flag = Annotated[bool, Parameter(negative="")]
 
 @app.default
 def simulate(
-    family: str,
+    family: Annotated[str, Parameter(help="Whose devices, as feetech")],
     /,
     *,
-    ids: str = "1",
-    model: str = "",
-    link: Path | None = None,
-    tcp: str = "",
-    pace: Flag = False,
-    baud: int = 0,
-    control: Path | None = None,
-    switch: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    switches: Flag = False,
+    ids: Annotated[str, Parameter(help="Their ids, as 1-6 or 1,4,7.")] = "1",
+    model: Annotated[str, Parameter(help="Their model; the usual one of the family when left out.")] = "",
+    link: Annotated[Path | None, Parameter(help="A symbolic link to make to the pseudo-terminal.")] = None,
+    tcp: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve a socket instead.")] = "",
+    pace: Annotated[Flag, Parameter(help="Bytes take their time, as on a wire.")] = False,
+    baud: Annotated[int, Parameter(help="The rate of the wire until a client sets one.")] = 0,
+    control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
+    switch: Annotated[
+        tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
+    ] = (),
+    switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
 ) -> Exit:
-    """Serve simulated devices on a pseudo-terminal or a socket.
-
-    Parameters
-    ----------
-    family
-        Whose devices, as feetech
-    ids
-        Their ids, as 1-6 or 1,4,7.
-    model
-        Their model; the usual one of the family when left out.
-    link
-        A symbolic link to make, which leads to the pseudo-terminal.
-    tcp
-        HOST:PORT or PORT, to serve a socket instead.
-    pace
-        Bytes take their time, as on a wire.
-    baud
-        The rate of the wire until a client sets one.
-    control
-        A local socket to make, which takes orders while it runs.
-    switch
-        NAME=VALUE, how the devices behave where real ones differ; may be repeated.
-    switches
-        List the switches of the family and end.
-    """
+    """Serve simulated devices on a pseudo-terminal or a socket."""
     output.simulated = True
     found = families.load(family)
     if switches:
         return _list(found, output)
-    nodes = session.parse_ids(ids)
-    simulator = found.simulator(nodes, model, **_switched(switch))
+    simulator = found.simulator(session.parse_ids(ids), model, **_switched(switch))
     rate = baud or found.link.rate
     simulator.tune(rate)
     with ExitStack() as stack:
@@ -98,24 +77,16 @@ def simulate(
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
         kind, paced = found.link.kind, rate if pace else None
         mount = Mount(simulator, endpoint, pace=paced, rate=rate, kind=kind, attendants=controls)
-        _announce(f"{family}:{port}", family, nodes, output)
+        nodes = sorted(simulator.nodes)
+        facts = {"bus": f"{family}:{port}", "family": family, "ids": nodes, "pid": os.getpid()}
+        output.document("motorbus.simulate/1", facts)
+        output.text(f"ready: {family}:{port}  (simulated: {len(nodes)} {family} devices, ids {ids})")
         mount.serve(stop)
     return Exit.OK
 
 
-def _announce(bus: str, family: str, nodes: Sequence[int], output: Output) -> None:
-    output.document(
-        "motorbus.simulate/1", {"bus": bus, "family": family, "ids": list(nodes), "pid": os.getpid()}
-    )
-    ids = ", ".join(map(str, nodes)) if len(nodes) <= 10 else f"{nodes[0]} to {nodes[-1]}"
-    output.text(f"ready: {bus}  (simulated: {len(nodes)} {family} devices, ids {ids})")
-
-
 def _endpoint(stack: ExitStack, link: Path | None, tcp: str) -> tuple[Endpoint, str]:
     """The open port, and what a host calls it."""
-    from motorbus.link.pty import PtyMaster
-    from motorbus.simulation.listener import TcpListener, parse_endpoint
-
     if tcp and link:
         raise RequestError("a bus is served on --link or on --tcp, not on both")
     if tcp:
