@@ -33,4 +33,4 @@ def main(address: str = "feetech:sim,ids=1-6", cycles: int = 200) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    main(sys.argv[1] if len(sys.argv) > 1 else "feetech:sim,ids=1-6")

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import shlex
+import signal
 import subprocess
 import sys
 
@@ -45,6 +46,14 @@ def test_every_command_shows_examples(words: tuple[str, ...]) -> None:
     assert found
     assert all(line.startswith(f"motorbus {' '.join(words)}") for line in found)
     assert all(len(line) <= 76 for line in found), "an example must fit a terminal"
+
+
+@pytest.mark.parametrize("words", ALL, ids="-".join)
+def test_help_fits_a_terminal(words: tuple[str, ...]) -> None:
+    app = APP
+    for word in words:
+        app = app[word]
+    assert max(map(len, (app.help_epilogue or "").splitlines()), default=0) <= 79
 
 
 @pytest.mark.parametrize("line", EXAMPLES)
@@ -180,3 +189,17 @@ def test_no_color_is_obeyed_by_the_help() -> None:
         env={**os.environ, "NO_COLOR": "1"},
     )
     assert "\x1b[" not in ended.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_being_told_to_end_cleans_up(number: signal.Signals) -> None:
+    code = "import sys; from motorbus.cli import main; print(main(sys.argv[1:]), file=sys.stderr)"
+    words = ["monitor", "feetech:sim#1", "--rate", "50", "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        process.send_signal(number)
+        _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (0, "0\n")

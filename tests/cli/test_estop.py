@@ -95,6 +95,27 @@ def test_a_program_whose_event_loop_hangs_is_stopped(served: Simulated, run: Run
     assert torque(served.bus) == [0, 0, 0]
 
 
+def test_a_move_that_is_stopped_says_so(served: Simulated, run: Run) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "motorbus.cli",
+        "move",
+        f"{served.bus}#1=90deg",
+        "--velocity",
+        "0.1",
+        "-vv",
+    ]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        while "tx FF FF 01 0A 03 29" not in process.stderr.readline():
+            assert process.poll() is None
+        assert run("estop", served.bus).code == 0
+        _, told = process.communicate(timeout=30)
+    assert process.returncode == 10
+    assert "an emergency stop ended this" in told
+
+
 def test_a_bus_that_nobody_holds_is_stopped_from_here(served: Simulated, run: Run) -> None:
     with motorbus.open(served.bus) as bus:
         for node in (1, 2, 3):

@@ -82,7 +82,7 @@ class Template:
     link = LinkNeeds(
         "frames",
         RATE,
-        (RATE,),
+        (RATE, 250_000),
         (Option("temperature", float, 25.0, "of the simulated servos, in °C; an alarm above 80"),),
     )
     tables: Mapping[str, Table] = {TABLE.name: TABLE}

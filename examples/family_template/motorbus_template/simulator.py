@@ -20,6 +20,8 @@ from motorbus.errors import RequestError
 from . import wire
 from .table import COUNT, TABLE
 
+RATE: Final = 500_000
+"""bit/s; what those of the first year have (250 kbit/s) is not simulated."""
 THINKS: Final = 0.0003
 """s from the end of a request to the beginning of the answer."""
 STORES: Final = 0.004
@@ -178,13 +180,13 @@ class Metronomes:
         return self._nodes
 
     def tune(self, rate: int) -> None:
-        """The host's rate. On CAN one wrong node silences everyone, so there is but one rate: 500 kbit/s."""
+        """The host's rate; at another one than `RATE` they neither hear nor are heard."""
         self.rate = rate
 
     def receive(self, data: Data, at: float) -> None:
         """A frame of the host has arrived."""
         self.now = max(self.now, at)
-        if not isinstance(data, CanFrame) or self.rate != 500_000:
+        if not isinstance(data, CanFrame) or self.rate != RATE:
             return
         request = wire.decode_request(data)
         if request is None:

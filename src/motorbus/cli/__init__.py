@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import io
 import logging
+import signal
 import sys
+import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -76,7 +78,7 @@ def build() -> App:
 
 
 def _default_shown(default: object) -> str | None:
-    return None if default in ("", False, 0) else str(default)
+    return str(default) if default else None
 
 
 _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#ID:
@@ -97,12 +99,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a console that lacks "²" must not end the program
     output = Output(json="--json" in words)
     try:
-        return _launch(build(), words, output)
+        with _ended_like_ctrl_c():
+            return _launch(build(), words, output)
     except (Exception, KeyboardInterrupt) as error:
         code = exit_code(error)
         if code is None:
             raise
         return _report(error, code, output)
+
+
+@contextmanager
+def _ended_like_ctrl_c() -> Iterator[None]:
+    """Being told to end, or losing the terminal, cleans up as Ctrl-C does: an EEPROM lock must be closed again."""
+    names = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    taken = [name for name in names if signal.getsignal(name) is signal.SIG_DFL]
+    if threading.current_thread() is not threading.main_thread():
+        taken = []  # Python lets only the main thread have handlers
+    for name in taken:
+        signal.signal(name, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for name in taken:
+            signal.signal(name, signal.SIG_DFL)
 
 
 def _report(error: BaseException, code: Exit, output: Output) -> Exit:

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 app = App(
     name="estop",
-    help_epilogue="""THE ARM WILL SAG: an emergency stop cuts the torque of FEETECH servos, and nothing
-holds them up then. `motorbus stop` decelerates and holds instead.
+    help_epilogue="""THE ARM WILL SAG: an emergency stop cuts the torque of FEETECH servos, and
+nothing holds them up then. `motorbus stop` decelerates and holds instead.
 
 A bus that another motorbus process holds is stopped by that process, even if
 its event loop hangs, and stays stopped until that process says reset(). A bus
-that nobody holds is opened and stopped from here; with ids (BUS#1-6) each device
-is asked to acknowledge. A port that a foreign program holds cannot be reached:
-the error names that program. Without BUS, every bus that a motorbus process of
-yours holds is stopped.
+that nobody holds is opened and stopped from here; with ids (BUS#1-6) each
+device is asked to acknowledge. A port that a foreign program holds cannot be
+reached: the error names that program. Without BUS, every bus that a motorbus
+process of yours holds is stopped.
 
 Examples:
 

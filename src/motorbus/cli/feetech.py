@@ -209,8 +209,8 @@ def _action_all(bus: Bus) -> Operation[None]:
 
 @app.command(
     usage="Usage: motorbus feetech sync-read BUS#IDS NAME... [OPTIONS]",
-    help_epilogue="""One packet asks, all answer one after the other. Ends with exit code 6 when some
-are silent.
+    help_epilogue="""One packet asks, all answer one after the other. Ends with exit code 6 when
+some are silent.
 
 Examples:
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 app = App(
     name="read",
     usage="Usage: motorbus read BUS#ID [NAME...] [OPTIONS]",
-    help_epilogue="""Values are in rad, rad/s, A, V, °C, s and fractions; `raw` is what stands on the
-wire. `motorbus info BUS#ID --registers` lists the names.
+    help_epilogue="""Values are in rad, rad/s, A, V, °C, s and fractions; `raw` is what stands on
+the wire. `motorbus info BUS#ID --registers` lists the names.
 
 Examples:
 

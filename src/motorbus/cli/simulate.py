@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 app = App(
     name="simulate",
-    help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and removes
-its link and its control socket. Without --link and --tcp it says which
+    help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and
+removes its link and its control socket. Without --link and --tcp it says which
 pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
 login. The control socket takes one order a line: status, power-cycle [ID],
 unplug ID, plug ID, help.

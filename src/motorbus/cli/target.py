@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.operation import Progress
-from motorbus.errors import DeviceError, NoReply, RequestError
+from motorbus.errors import DeviceError, Interrupted, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -82,9 +82,23 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
             output.note(f"note: {warning}")
         try:
             yield found
+        except MotorbusError as error:
+            raise (_stopped(error) if found.turns.latched else error) from error
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
+
+
+def _stopped(error: MotorbusError) -> MotorbusError:
+    """An emergency stop from elsewhere looks like a stall to who waits for an arrival."""
+    if isinstance(error, Interrupted):
+        return error
+    return Interrupted(
+        "an emergency stop ended this",
+        cause=error.summary,
+        advice="when it is safe, say it again",
+        node=error.node,
+    )
 
 
 class _Told(Subscription[TraceRecord]):
