@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from motorbus.bus.trust import FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
-from motorbus.core.operation import Due
+from motorbus.core.operation import Due, Exchange
 from motorbus.families.feetech import FAMILY
 from tests.bus.script import position
 
@@ -74,11 +74,19 @@ def test_doubt_falls_on_those_asked_within_the_quiet_time() -> None:
     assert trust.of(2).quiet_until == 10.51 + QUIET
 
 
+def test_doubt_about_one_lane_leaves_the_others_alone() -> None:
+    trust = Trust(FAMILY)
+    for node in (1, 2):
+        trust.ask(Exchange(b"\x01", (Due(node, node, 8),), lane=node), 10.0)
+        trust.believe(Due(node, node, 8), barrier=False)
+    trust.doubt(10.01, QUIET, lane=2)
+    assert (trust.of(1).tainted, trust.of(2).tainted) == (False, True)
+
+
 def test_more_doubt_does_not_put_the_probe_off() -> None:
     trust = asked()
     trust.missed(0, DUE, 10.0, QUIET)
     trust.doubt(10.03, QUIET)
-    trust.doubt_node(1, 10.03, QUIET)
     assert trust.of(1).quiet_until == 10.0 + QUIET
 
 

@@ -83,10 +83,7 @@ def test_a_vector_is_explained_and_a_bad_one_is_faulted(family: Family, vector: 
 
 
 def flat(data: Data) -> bytes:
-    """How a CAN frame stands in a run of bytes: identifier (4, top bit for 29 bits), count of data, data."""
-    if isinstance(data, bytes):
-        return data
-    return (data.id | data.extended << 31).to_bytes(4, "big") + bytes((len(data.data),)) + data.data
+    return data if isinstance(data, bytes) else data.flat()
 
 
 def all_of(explained: Iterable[Explanation]) -> bytes:

@@ -9,6 +9,7 @@ import pytest
 from motorbus.core.operation import (
     Alone,
     Answer,
+    CanFrame,
     Due,
     Exchange,
     Listen,
@@ -143,3 +144,10 @@ def test_a_clean_up_that_fails_is_not_repeated_for_ever() -> None:
     with pytest.raises(NoReply):
         operation.throw(NoReply("silent"))
     assert log == ["lock"]
+
+
+def test_a_can_frame_is_written_as_candump_writes_it_and_lies_flat() -> None:
+    assert str(CanFrame(0x201, b"\x01\x30")) == "201#0130"
+    assert str(CanFrame(0x201, b"", extended=True)) == "00000201#"
+    assert CanFrame(0x201, b"\x01\x30").flat() == bytes.fromhex("00000201 02 0130")
+    assert CanFrame(0x201, b"", extended=True).flat() == bytes.fromhex("80000201 00")

@@ -145,12 +145,7 @@ def _event(frame: CanFrame) -> Event:
 # --- in words -----------------------------------------------------------------------------------------------
 
 HEAD: Final = 5
-"""In a run of bytes a CAN frame stands as identifier (4, big-endian), number of data bytes (1), data."""
-
-
-def flat(frame: CanFrame) -> bytes:
-    """One frame as a run of bytes; the top bit marks a 29-bit identifier."""
-    return (frame.id | frame.extended << 31).to_bytes(4, "big") + bytes((len(frame.data),)) + frame.data
+"""In a run of bytes a CAN frame stands as `CanFrame.flat()` says: identifier (4), number of data bytes (1), data."""
 
 
 def explain(data: bytes) -> list[Explanation]:

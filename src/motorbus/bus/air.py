@@ -166,18 +166,18 @@ class Air:
         if self._late(reply):
             return
         self.statistics.other["foreign"] += 1
-        self.trust.doubt(now, self._quiet)
+        self.trust.doubt(now, self._quiet, reply.lane)
 
     def _take_noise(self, noise: Noise, now: float) -> None:
         self.statistics.other[noise.fault] += 1
         if noise.fault == "foreign":
             return
-        for flight in self._flying.values():
-            if flight.complete:
-                flight.surplus = True
-            flight.noise.append((noise.fault, noise.data[:64]))
-            del flight.noise[:-16]
-        self.trust.doubt(now, self._quiet)
+        for lane, flight in self._flying.items():
+            if noise.lane in (None, lane):
+                flight.surplus = flight.surplus or flight.complete
+                flight.noise.append((noise.fault, noise.data[:64]))
+                del flight.noise[:-16]
+        self.trust.doubt(now, self._quiet, noise.lane)
 
     def _echo_broke(self, now: float) -> None:
         self.echo.broken = False

@@ -22,10 +22,20 @@ ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding 
 class NodeTrust:
     """One node: may it be believed, what is still outstanding, when may it be probed."""
 
-    __slots__ = ("asked_at", "attempt", "outstanding", "probe_at", "quiet_until", "silent", "tainted")
+    __slots__ = (
+        "asked_at",
+        "attempt",
+        "lane",
+        "outstanding",
+        "probe_at",
+        "quiet_until",
+        "silent",
+        "tainted",
+    )
 
     def __init__(self) -> None:
         self.tainted = False
+        self.lane = 0
         self.asked_at = 0.0
         self.quiet_until = 0.0
         self.probe_at = 0.0
@@ -55,6 +65,7 @@ class Trust:
                 trust = self.of(due.node)
                 trust.tainted = True
                 trust.asked_at = now
+                trust.lane = exchange.lane
 
     def missed(self, lane: int, due: Due, now: float, quiet: float) -> None:
         """This reply did not come in time and may still come."""
@@ -71,19 +82,12 @@ class Trust:
             trust.tainted = False
             trust.silent = 0
 
-    def doubt(self, now: float, quiet: float) -> None:
-        """Bytes came that belong to nobody: whoever was asked lately may have sent them."""
+    def doubt(self, now: float, quiet: float, lane: int | None = None) -> None:
+        """Bytes came that belong to nobody: whoever was asked lately (on this lane) may have sent them."""
         for trust in self.nodes.values():
-            if now - trust.asked_at <= quiet and not trust.tainted:
+            if lane in (None, trust.lane) and now - trust.asked_at <= quiet and not trust.tainted:
                 trust.tainted = True
                 trust.quiet_until = now + quiet
-
-    def doubt_node(self, node: int, now: float, quiet: float) -> None:
-        """This node sent something that nobody asked for."""
-        trust = self.of(node)
-        if not trust.tainted:
-            trust.tainted = True
-            trust.quiet_until = now + quiet
 
     def late(self, lane: int, key: Key, length: int) -> bool:
         """Is a reply of this kind outstanding from anyone? It is then no longer."""

@@ -24,10 +24,10 @@ app = App(
     name="move",
     usage="Usage: motorbus move BUS#ID=POSITION... [OPTIONS]",
     help_epilogue="""Positions are in rad, or with a unit: 90deg, 0.25turn. Torque goes on by
-itself. A way of more than 180 degrees needs --yes. The goal must lie inside the
-limits of the device. Several devices of one bus begin in the same instant where
-their family can do that. Ctrl-C ends the waiting, not the motion: `motorbus
-stop` does.
+itself. A way of more than 180 degrees needs --yes. The goal must lie inside
+the limits of the device. Several devices of one bus begin in the same instant
+where their family can do that. Ctrl-C ends the waiting, not the motion:
+`motorbus stop` does.
 
 Examples:
 

@@ -83,16 +83,16 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         try:
             yield found
         except MotorbusError as error:
-            raise (_stopped(error) if found.turns.latched else error) from error
+            if not found.turns.latched or isinstance(error, Interrupted):
+                raise
+            raise _stopped(error) from error
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
 
 
-def _stopped(error: MotorbusError) -> MotorbusError:
+def _stopped(error: MotorbusError) -> Interrupted:
     """An emergency stop from elsewhere looks like a stall to who waits for an arrival."""
-    if isinstance(error, Interrupted):
-        return error
     return Interrupted(
         "an emergency stop ended this",
         cause=error.summary,

@@ -107,7 +107,10 @@ class Explanation(NamedTuple):
 
 
 class Receiver(Protocol):
-    """Turns what a link delivers into events. Never raises on any input, never holds more than 4 KiB."""
+    """Turns what a link delivers into events. Never raises on any input, never holds more than 4 KiB.
+
+    Every byte that is fed comes out in exactly one event.
+    """
 
     def feed(self, data: Data, /) -> list[Event]:
         """Take bytes (cut anywhere) or one CAN frame; give what is complete."""
@@ -116,8 +119,17 @@ class Receiver(Protocol):
         """Nothing more is coming: give what can be made of the rest, and the remainder as noise."""
 
 
+class RawMemory(Protocol):
+    """The raw value of every row by its name."""
+
+    def __getitem__(self, name: str, /) -> int: ...
+
+
 class SimulatedNode(Protocol):
-    """One simulated device, as a test or a control socket pokes it."""
+    """One simulated device, as a test or a control socket pokes it. `memory` is what it holds at this moment."""
+
+    @property
+    def memory(self) -> RawMemory: ...
 
     def unplug(self) -> None: ...
     def plug(self) -> None: ...
@@ -145,7 +157,13 @@ class Simulator(Protocol):
 
 
 class Device(Protocol):
-    """The verbs that faces may expect of a blocking device; a verb a device lacks is absent, never raises."""
+    """The verbs that faces may expect of a blocking device; a verb a device lacks is absent, never raises.
+
+    `read(*names)` gives values by name, `write(**values)` takes them. What moves also has `position`, `telemetry`
+    (a `State`), `enable_torque`, `disable_torque`, `stop` and `move(to, *, wait=True)`; `move` may take `velocity` and
+    `acceleration`. Persistent rows are written through a guarded sequence; where that opens a lock, the lock is a row
+    named `lock` with a choice called "closed", and it is closed again whatever happens.
+    """
 
     @property
     def node(self) -> int: ...
@@ -205,7 +223,10 @@ class Family(Protocol):
         """An exchange whose echo cannot be taken for its answer, sent when a bus is opened; None: cannot echo."""
 
     def explain(self, data: bytes) -> list[Explanation]:
-        """Every frame in these bytes, field by field, and why a bad one is bad."""
+        """Every frame in these bytes, field by field, and why a bad one is bad.
+
+        A CAN frame stands in a run of bytes as `CanFrame.flat()` says.
+        """
 
     def receiver(self) -> Receiver: ...
 
@@ -222,7 +243,10 @@ class Family(Protocol):
     def identify(self, node: int) -> Runnable[Identity]: ...
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
-        """Look for devices by unicast; () means every id, or the present rate. Reports `Found` and `Progress`."""
+        """Look for devices by unicast; () means every id, or the present rate, which is set again in the end.
+
+        Reports `Progress`, and `Found` as soon as one answers, perhaps before it was asked what it is.
+        """
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
         """SI operations by capability name for this model; empty when it has none."""

@@ -26,6 +26,13 @@ class CanFrame(NamedTuple):
     data: bytes
     extended: bool = False
 
+    def __str__(self) -> str:
+        return f"{self.id:0{8 if self.extended else 3}X}#{self.data.hex().upper()}"
+
+    def flat(self) -> bytes:
+        """How a frame stands in a run of bytes: identifier (4, big-endian, top bit for 29 bits), count, data."""
+        return (self.id | self.extended << 31).to_bytes(4, "big") + bytes((len(self.data),)) + self.data
+
 
 Data: TypeAlias = bytes | CanFrame
 Key: TypeAlias = Hashable
@@ -59,7 +66,11 @@ class Timeout(IntEnum):
 
 
 class Due(NamedTuple):
-    """One reply that an exchange calls for: from which node, recognised by which key, how many bytes exactly."""
+    """One reply that an exchange calls for: from which node, recognised by which key, how many bytes exactly.
+
+    A refusal is a reply too: where refusals are shorter, the family's `wire` pads them to this length, as CANopen
+    does on the bus.
+    """
 
     node: int
     key: Key
@@ -106,10 +117,15 @@ class Notice(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Bytes that belong to nobody, and why; `fault` is framing, checksum or foreign."""
+    """Bytes that belong to nobody, and why.
+
+    `fault` is framing or checksum, which cast doubt on whoever was asked lately, or foreign, which does not: a whole
+    frame of other traffic. `lane` confines the doubt to one lane; None means that anyone may have sent it.
+    """
 
     data: bytes
     fault: str
+    lane: int | None = None
 
 
 Event: TypeAlias = Reply | Notice | Noise
