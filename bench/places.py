@@ -15,8 +15,8 @@ PEERS = ROOT / ".peers"
 def surroundings(*peers: str) -> Mapping[str, str]:
     """Environment of a measured process: this tree, these peers and nothing that changes between machines.
 
-    Compiled modules are kept in the build folder, so that start-up is measured with them wherever they may
-    otherwise not be written.
+    Compiled modules and locks are kept in the build folder: start-up is measured with the former, and the latter
+    are nobody else's business.
     """
     kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG", "TMPDIR") if name in os.environ}
     folders = [ROOT, ROOT / "src", *(PEERS / name for name in peers)]
@@ -25,4 +25,5 @@ def surroundings(*peers: str) -> Mapping[str, str]:
         "PYTHONPATH": os.pathsep.join(map(str, folders)),
         "PYTHONPYCACHEPREFIX": str(BUILD / "pycache"),
         "PYTHONHASHSEED": "0",
+        "XDG_STATE_HOME": str(BUILD / "state"),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from bench.workloads import WORKLOADS
 
 OURS = "motorbus"
 MICRO = 1e6
+MOST_CALLS = 4
 processor = attrgetter("processor")
 wall = attrgetter("wall")
 
@@ -113,6 +115,26 @@ def tables(results: Results) -> list[Table]:
     return found
 
 
+def verdict(results: Results) -> str:
+    """Our system calls against what they may be: a writing, a look at what has come, a wait, a reading."""
+    if results.calls is None or not any(who == OURS for who, _ in results.calls):
+        return f"System calls of {OURS} were not measured."
+    exchanges = {name: 1 + bool(load.reads and load.writes) for name, load in WORKLOADS.items()}
+    found = {name: sum(results.calls[OURS, name].values()) / exchanges[name] for name in WORKLOADS}
+    reached = "reached" if all(round(calls, 1) <= MOST_CALLS for calls in found.values()) else "MISSED"
+    shown = ", ".join(f"{name} {calls:.1f}" for name, calls in found.items())
+    return f"System calls of {OURS} per exchange: {shown} (a cycle is two). At most {MOST_CALLS}: {reached}."
+
+
+def spoiled(results: Results) -> str:
+    """Who had to be measured again because an answer came too late, or was not the one expected."""
+    counts: Counter[str] = Counter()
+    for sample in results.wire + results.memory:
+        counts[sample.contender] += sample.repeats
+    shown = ", ".join(f"{name} {count} times" for name, count in counts.items() if count)
+    return f"Measured again after an answer that was late or lost: {shown or 'nobody'}."
+
+
 def as_text(table: Table) -> str:
     """For a terminal."""
     lines = [table.columns, *table.rows]
@@ -163,8 +185,9 @@ kernel waking two processes and does not separate good libraries; on a real line
 In sync-write one exchange in 32 is followed by a reading that waits for the responder; its time is not counted, its
 system calls are.
 
-{wire}
-## In process
+{verdict} {spoiled}
+
+{wire}## In process
 
 The same exchanges with the answers handed over in memory: what the library itself costs. Only libraries in Python
 can be measured so.
@@ -173,7 +196,7 @@ can be measured so.
 
 ## Start-up
 
-Wall time of a whole process less that of an empty one, with compiled modules at hand.
+Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
 {start}
 """
@@ -188,6 +211,8 @@ def page(results: Results) -> str:
         rounds=results.rounds,
         exchanges=results.exchanges,
         ours=OURS,
+        verdict=verdict(results),
+        spoiled=spoiled(results),
         wire=wire,
         memory=as_markdown(memory_table(results)),
         start=as_markdown(start_table(results)),

@@ -19,6 +19,7 @@ from bench.responder import responder
 from bench.workloads import WORKLOADS
 
 TIMEOUT = 120.0
+REPEATS = 3
 
 
 class Candidate(NamedTuple):
@@ -51,13 +52,14 @@ CANDIDATES = {
 
 
 class Sample(NamedTuple):
-    """One contender, one workload, one round: seconds per exchange."""
+    """One contender, one workload, one round: seconds per exchange, and how many attempts were spoiled before."""
 
     round: int
     contender: str
     workload: str
     processor: float
     wall: float
+    repeats: int = 0
 
 
 class Failed(Exception):
@@ -131,17 +133,18 @@ def rounds(
         shuffler.shuffle(pairs)
         for candidate, workload in pairs:
             progress(f"round {number + 1} of {times}: {candidate.name}, {workload}")
-            said = _with_one_repeat(run, candidate, workload, count, progress)
-            samples.append(Sample(number, candidate.name, workload, said["processor"], said["wall"]))
+            said, repeats = _patiently(run, candidate, workload, count, progress)
+            samples.append(Sample(number, candidate.name, workload, said["processor"], said["wall"], repeats))
     return samples
 
 
-def _with_one_repeat(
+def _patiently(
     run: Run, candidate: Candidate, workload: str, count: int, progress: Callable[[str], None]
-) -> dict[str, Any]:
-    """A busy machine can hold up a process for longer than a library waits; twice in a row is no accident."""
-    try:
-        return run(candidate, workload, count)
-    except Failed as failure:
-        progress(f"once more, because: {failure}\n")
-        return run(candidate, workload, count)
+) -> tuple[dict[str, Any], int]:
+    """A busy machine can hold up a process for longer than a library waits; again and again is no accident."""
+    for repeats in range(REPEATS):
+        try:
+            return run(candidate, workload, count), repeats
+        except Failed as failure:
+            progress(f"once more, because: {str(failure).splitlines()[-1]}\n")
+    return run(candidate, workload, count), REPEATS

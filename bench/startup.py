@@ -1,6 +1,6 @@
 """What it costs to start: `import motorbus`, `motorbus --help`, and the vendor's SDK for comparison.
 
-Wall time of a whole process, less that of an empty one of the same round; compiled modules are warm.
+Wall time of a whole process less that of an empty one, the best of a few of each; compiled modules are warm.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ import random
 import subprocess
 import sys
 from collections.abc import Callable
-from statistics import median
 from time import perf_counter
 from typing import NamedTuple
 
 from bench.figures import Spread, spread
 from bench.places import PEERS, ROOT, surroundings
 
+TAKES = 4
 HEAVY = (
     "asyncio", "can", "cyclopts", "matplotlib", "msgspec", "numpy", "rich", "serial", "serialx", "starlette", "uvicorn",
 )  # fmt: skip
@@ -63,6 +63,15 @@ def _launch(start: Start, *options: str) -> subprocess.CompletedProcess[str]:
 
 
 def _seconds(start: Start) -> float:
+    """How much longer than an empty process it takes: the best of a few of each, taken in turn."""
+    return _difference([(_lasted(EMPTY), _lasted(start)) for _ in range(TAKES)])
+
+
+def _difference(pairs: list[tuple[float, float]]) -> float:
+    return min(full for _, full in pairs) - min(empty for empty, _ in pairs)
+
+
+def _lasted(start: Start) -> float:
     began = perf_counter()
     _launch(start)
     return perf_counter() - began
@@ -85,9 +94,8 @@ def costs(times: int, progress: Callable[[str], None]) -> list[Cost]:
     shuffler = random.Random(2)
     for number in range(times):
         progress(f"start-up: round {number + 1} of {times}")
-        empty = median(_seconds(EMPTY) for _ in range(3))
         for start in shuffler.sample(starts, len(starts)):
-            samples[start].append(_seconds(start) - empty)
+            samples[start].append(_seconds(start))
     return [
         Cost(
             start.name,

@@ -113,7 +113,7 @@ def test_a_move_that_is_stopped_says_so(served: Simulated, run: Run) -> None:
         assert run("estop", served.bus).code == 0
         _, told = process.communicate(timeout=30)
     assert process.returncode == 10
-    assert "an emergency stop ended this" in told
+    assert "an emergency stop is latched" in told
 
 
 def test_a_bus_that_nobody_holds_is_stopped_from_here(served: Simulated, run: Run) -> None:

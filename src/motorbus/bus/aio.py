@@ -7,15 +7,15 @@ link with virtual time whoever awaits turns the crank. Policy is in `turns`, as 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from math import inf
 from threading import Thread
 from typing import Self, TypeVar
 
-from motorbus.bus.crank import crank, flush
+from motorbus.bus.crank import crank, push, take_in
 from motorbus.bus.face import BusFace
 from motorbus.bus.run import Notify, Run
 from motorbus.core.operation import Runnable
-from motorbus.errors import LinkError
 
 T = TypeVar("T")
 
@@ -67,10 +67,9 @@ class AsyncBus(BusFace):
             await asyncio.sleep(0)
             return
         self._crank()
-        try:
-            await asyncio.wait_for(news.wait(), NAP)
-        except TimeoutError:
-            return
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(NAP):
+                await news.wait()
         news.clear()
 
     def _watch(self) -> asyncio.AbstractEventLoop:
@@ -86,7 +85,8 @@ class AsyncBus(BusFace):
 
     def _crank(self) -> None:
         """Everything that can be done without waiting; then be back when something is due."""
-        crank(self.link, self.turns, -inf)
+        take_in(self.link, self.turns, -inf)
+        push(self.link, self.turns)
         if self._timer is not None:
             self._timer.cancel()
         due = self.turns.due()
@@ -95,17 +95,8 @@ class AsyncBus(BusFace):
 
     def _read(self) -> None:
         """For links without a descriptor: wait for bytes in a thread, take them in, tell the loop."""
-        while self._watching:
-            try:
-                arrived = self.link.read(self.link.now() + NAP)
-            except LinkError as error:
-                with self.turns.lock:
-                    self.turns.lost(error)
-                return
-            with self.turns.lock:
-                self.turns.feed(arrived, self.link.now())
-                if arrived:
-                    flush(self.link, self.turns)
+        while self._watching and take_in(self.link, self.turns, self.link.now() + NAP):
+            push(self.link, self.turns)
 
     async def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""

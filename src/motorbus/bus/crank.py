@@ -22,9 +22,31 @@ def crank(link: Link, turns: Turns, until: float) -> None:
             settled = turns.settled
             now = flush(link, turns)
             due = turns.due() if turns.settled == settled else now  # somebody may go on at once
-        arrived = link.read(min(until, due, now + IDLE))
+    except LinkError as error:
+        with turns.lock:
+            turns.lost(error)
+    else:
+        take_in(link, turns, min(until, due, now + IDLE))
+
+
+def take_in(link: Link, turns: Turns, until: float) -> bool:
+    """Wait for bytes at most `until` and hand them to turns; False when the link is lost."""
+    try:
+        arrived = link.read(until)
         with turns.lock:
             turns.feed(arrived, link.now())
+    except LinkError as error:
+        with turns.lock:
+            turns.lost(error)
+        return False
+    return True
+
+
+def push(link: Link, turns: Turns) -> None:
+    """Put onto the wire whatever may go now, without waiting for anything."""
+    try:
+        with turns.lock:
+            flush(link, turns)
     except LinkError as error:
         with turns.lock:
             turns.lost(error)

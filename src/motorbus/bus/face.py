@@ -45,6 +45,8 @@ class BusFace:
         )
         self.changed = Condition(self.turns.lock)
         self.stopper = Stopper(link, self.turns, stop_socket)
+        if stop_socket is not None:
+            self.stopper.start()
 
     def _armed(self, admit: Admit) -> Admit:
         def admitted(exchange: Exchange[Any]) -> None:

@@ -1,6 +1,7 @@
 """The emergency stop, which goes through whatever happens.
 
-Every bus has one sleeping stop thread from its first motion or torque command on. `estop()` wakes it by one byte
+Every bus has one sleeping stop thread, from its first motion or torque command on, and where another process can
+ask for a stop from the moment it is opened (decision record 0015). `estop()` wakes it by one byte
 through a socket pair, so a signal handler may do the same; it latches the turns, writes the stop frames and repeats
 them until every node has acknowledged, or five times. It needs neither the event loop nor the thread that pumps; it
 does need this process and its interpreter lock. Another process asks for it over a local socket beside the lock

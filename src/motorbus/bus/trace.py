@@ -52,8 +52,12 @@ class Feed(Generic[R]):
     def subscribe(self, limit: int = 1024) -> Subscription[R]:
         """A new queue of at most `limit` records."""
         subscription: Subscription[R] = Subscription(limit)
-        self.subscriptions = (*self.subscriptions, subscription)
+        self.add(subscription)
         return subscription
+
+    def add(self, subscription: Subscription[R]) -> None:
+        """Hand every record to this one too; a subclass may deal with each at once instead of keeping it."""
+        self.subscriptions = (*self.subscriptions, subscription)
 
     def unsubscribe(self, subscription: Subscription[R]) -> None:
         """No more records for this one."""

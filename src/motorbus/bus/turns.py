@@ -308,7 +308,7 @@ class Turns(Air):
         return min(moments)
 
     def latch(self, now: float) -> Stop:
-        """Emergency stop: drop the queue, let the rest of a reply pass, refuse motion until `reset`."""
+        """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""
         self.latched = self.stopping = True
         for queue in self._queues:
             for ticket in list(queue):
@@ -320,6 +320,9 @@ class Turns(Air):
             flight.deadline = min(flight.deadline, now + rest)
             flight.abandoned = True
             self._settle(flight, error=verdict.latched())
+        for timer in list(self._timers):
+            self._timers.remove(timer)
+            self._settle(timer, error=verdict.latched())
         return self.stop
 
     def stopped(self) -> None:

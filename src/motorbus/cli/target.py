@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.operation import Progress
-from motorbus.errors import DeviceError, Interrupted, MotorbusError, NoReply, RequestError
+from motorbus.errors import DeviceError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -77,28 +77,14 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         if LOG.isEnabledFor(logging.DEBUG):
-            found.trace.subscriptions = (*found.trace.subscriptions, _Told(0))
+            found.trace.add(_Told(0))
         for warning in found.link.warnings:
             output.note(f"note: {warning}")
         try:
             yield found
-        except MotorbusError as error:
-            if not found.turns.latched or isinstance(error, Interrupted):
-                raise
-            raise _stopped(error) from error
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
-
-
-def _stopped(error: MotorbusError) -> Interrupted:
-    """An emergency stop from elsewhere looks like a stall to who waits for an arrival."""
-    return Interrupted(
-        "an emergency stop ended this",
-        cause=error.summary,
-        advice="when it is safe, say it again",
-        node=error.node,
-    )
 
 
 class _Told(Subscription[TraceRecord]):

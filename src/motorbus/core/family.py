@@ -162,7 +162,9 @@ class Device(Protocol):
     `read(*names)` gives values by name, `write(**values)` takes them. What moves also has `position`, `telemetry`
     (a `State`), `enable_torque`, `disable_torque`, `stop` and `move(to, *, wait=True)`; `move` may take `velocity` and
     `acceleration`. Persistent rows are written through a guarded sequence; where that opens a lock, the lock is a row
-    named `lock` with a choice called "closed", and it is closed again whatever happens.
+    named `lock` with a choice called "closed", and it is closed again whatever happens. `table` is its register map
+    once that is known (None before), `value(row, raw)` and `raw(row, value)` convert with the factors of this very
+    device. Reading has rank POLL and effect NONE, so a dry run can tell it from what changes something.
     """
 
     @property

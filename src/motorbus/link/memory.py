@@ -95,8 +95,11 @@ class MemoryLink:
 
     def close(self) -> None:
         with self._changed:
+            while self._under_way:  # a real port sends what it was given before it closes
+                at, _, to, data = heappop(self._under_way)
+                if to is Side.DEVICE and not self._closed and self.now() < self._gone_at:
+                    self.simulator.receive(data, max(at, self.now()))
             self._closed = True
-            self._under_way.clear()
             self._changed.notify_all()
 
     # -- for tests ------------------------------------------------------------------------------------------
