@@ -73,9 +73,8 @@ def main() -> int:
         print(f"\n{error}", file=sys.stderr)
         return 1
     say("")
-    print(
-        "\n\n".join([*(report.as_text(table) for table in report.tables(results)), report.verdict(results)])
-    )
+    shown = [report.as_text(table) for table in report.tables(results)]
+    print("\n\n".join([*shown, report.verdict(results), report.spoiled(results)]))
     BUILD.mkdir(exist_ok=True)
     (BUILD / "bench.json").write_text(report.as_json(results), encoding="utf-8")
     for name in results.missing:

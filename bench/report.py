@@ -185,7 +185,8 @@ kernel waking two processes and does not separate good libraries; on a real line
 In sync-write one exchange in 32 is followed by a reading that waits for the responder; its time is not counted, its
 system calls are.
 
-{verdict} {spoiled}
+{verdict}
+{spoiled}
 
 {wire}## In process
 

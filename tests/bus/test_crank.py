@@ -48,7 +48,7 @@ def test_a_lost_link_fails_what_waits_and_does_not_raise() -> None:
     crank(bus.link, bus.turns, inf)
     assert isinstance(flight.error, LinkLost)
     again = Flight(position(1))
-    launch(bus.link, bus.turns, again, idle=True)
+    assert not launch(bus.link, bus.turns, again)
     assert isinstance(again.error, LinkLost)
 
 
@@ -56,6 +56,6 @@ def test_a_refused_exchange_sends_nothing() -> None:
     bus, responder = memory_bus()
     bus.turns.admit = None
     flight = Flight(Exchange(wire.action(), effect=Effect.MOTION))
-    launch(bus.link, bus.turns, flight, idle=True)
+    assert not launch(bus.link, bus.turns, flight)
     assert isinstance(flight.error, RequestError)
     assert responder.heard == []

@@ -9,7 +9,7 @@ from __future__ import annotations
 from motorbus.bus.ticket import Flight
 from motorbus.bus.turns import Turns
 from motorbus.core.operation import Tune
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import LinkError
 from motorbus.link.base import Link
 
 IDLE = 0.25  # s; the longest wait when nothing is awaited from the wire
@@ -73,21 +73,20 @@ def drain(link: Link, turns: Turns, now: float) -> None:
         turns.feed(stale, now)
 
 
-def launch(link: Link, turns: Turns, flight: Flight, *, idle: bool) -> None:
-    """The short path where it may be taken, the queue otherwise."""
+def launch(link: Link, turns: Turns, flight: Flight) -> bool:
+    """The short path: True when the request has left at once; otherwise it is queued, or already settled."""
     try:
         with turns.lock:
             now = link.now()
-            if idle and turns.idle:
+            if turns.idle:
                 drain(link, turns, now)
                 request = turns.short(flight, now)
                 if request is not None:
                     link.write(request)
-                    return
+                    return True
             turns.submit(flight, now)
     except LinkError as error:
         with turns.lock:
             turns.lost(error)
             flight.finish(error=error)
-    except MotorbusError as refusal:
-        flight.finish(error=refusal)
+    return False

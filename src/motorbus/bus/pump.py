@@ -10,7 +10,7 @@ from math import inf
 from threading import get_ident
 from typing import Any, Self, TypeVar
 
-from motorbus.bus.crank import crank, launch
+from motorbus.bus.crank import crank, launch, push, take_in
 from motorbus.bus.face import BusFace
 from motorbus.bus.run import Notify, Run
 from motorbus.bus.ticket import Flight
@@ -46,9 +46,12 @@ class Bus(BusFace):
 
     def _exchange(self, exchange: Exchange[T]) -> T:
         """The short path: one exchange needs no run."""
-        flight = Flight(exchange, None, self._wake)
+        flight = Flight(exchange)
         try:
-            launch(self.link, self.turns, flight, idle=self._pumper is None)
+            if self._launched(flight):
+                take_in(self.link, self.turns, flight.deadline)
+                self._hand_over()
+            flight.wake = self._wake
             while not flight.done:
                 self._turn()
         except BaseException:
@@ -59,19 +62,33 @@ class Bus(BusFace):
         answer: Any = flight.result()
         return answer if exchange.read is None else exchange.read(answer)
 
+    def _launched(self, flight: Flight) -> bool:
+        """Has it left at once, and is its answer to be waited for here?"""
+        with self.changed:
+            if self._pumper is None and launch(self.link, self.turns, flight):
+                self._pumper = get_ident() if not flight.done else None
+                return not flight.done
+            if self._pumper is not None:
+                self.turns.submit(flight, self.link.now())
+            return False
+
     def _turn(self) -> None:
         """Let time pass: pump, or wait for the thread that does."""
         with self.changed:
             if self._pumper not in (None, get_ident()):
+                push(self.link, self.turns)
                 self.changed.wait(NAP)
                 return
             self._pumper = get_ident()
         try:
             crank(self.link, self.turns, inf)
         finally:
-            with self.changed:
-                self._pumper = None
-                self.changed.notify_all()
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        with self.changed:
+            self._pumper = None
+            self.changed.notify_all()
 
     def _wake(self) -> None:
         with self.changed:

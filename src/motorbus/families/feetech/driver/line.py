@@ -45,7 +45,9 @@ def air_time(exchange: Exchange[Any], rate: int) -> float:
     if exchange.replies is ANY:
         replies = (wire.MAX_ID + 1) * wire.OVERHEAD
     else:
-        replies = sum(due.length for due in exchange.replies)
+        replies = 0
+        for _, _, length in exchange.replies:
+            replies += length
     return (len(exchange.request) + replies) * BITS / rate
 
 
@@ -53,9 +55,10 @@ def turnaround(exchange: Exchange[Any]) -> float:
     """s that servos may think: once about the request, and a return delay before each reply."""
     if exchange.replies is ANY:
         return COLLISION
-    pauses = RETURN_DELAY * len(exchange.replies)
-    thinking = {Timeout.REPLY: PROCESSING + pauses, Timeout.SCAN: SCAN, Timeout.STORE: STORE + pauses}
-    return thinking[exchange.timeout]
+    if exchange.timeout is Timeout.SCAN:
+        return SCAN
+    thinking = PROCESSING if exchange.timeout is Timeout.REPLY else STORE
+    return thinking + RETURN_DELAY * len(exchange.replies)
 
 
 def quiet_time(rate: int) -> float:
