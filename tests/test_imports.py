@@ -64,7 +64,7 @@ def test_the_version_is_the_one_that_is_installed() -> None:
 
 
 def test_logging_is_silent_until_asked_for() -> None:
-    code = "import logging, motorbus; logging.getLogger('motorbus').error('nobody asked')"
+    code = "import logging, motorbus.session; logging.getLogger('motorbus').error('nobody asked')"
     command = [sys.executable, "-c", code]
     assert subprocess.run(command, capture_output=True, text=True, timeout=60).stderr == ""
 

@@ -10,7 +10,6 @@ The names a user needs are here and are loaded when first used, so that `import 
 
 from __future__ import annotations
 
-import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -39,8 +38,6 @@ from motorbus.errors import (
 if TYPE_CHECKING:
     from motorbus.families import feetech
     from motorbus.session import open, open_async, simulate
-
-logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent until somebody asks
 
 __version__ = "0.1.0"
 

@@ -30,6 +30,9 @@ from motorbus.motion.safety import Gate
 from motorbus.simulation.named import Simulation, find
 
 LOG = logging.getLogger("motorbus.session")
+logging.getLogger("motorbus").addHandler(
+    logging.NullHandler()
+)  # silent until somebody asks; here, for nothing below logs
 HIGHEST_NODE = 0x7FFFFFFF
 
 Notify = Callable[[object], None]

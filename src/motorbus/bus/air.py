@@ -103,8 +103,11 @@ class Air:
 
     # -- what comes in --------------------------------------------------------------------------------------
 
-    def feed(self, arrived: list[Data], now: float) -> None:
-        """Take what the link delivered, settle what it answers, then what is overdue."""
+    def feed(self, arrived: list[Data], now: float, looked: float | None = None) -> None:
+        """Take what the link delivered, settle what it answers, then what was overdue when the link was looked at.
+
+        `looked` is when that look began (`now` when left out): what fell due during it gets another look.
+        """
         for data in arrived:
             if self.trace.subscriptions:
                 self.trace.put(TraceRecord(now, "rx", data))
@@ -116,7 +119,7 @@ class Air:
                 for event in self.receiver.feed(data):
                     self._take(event, now)
         self._land(now)
-        self.expire(now)
+        self.expire(now if looked is None else looked)
 
     def _take(self, event: Reply | Notice | Noise, now: float) -> None:
         if isinstance(event, Reply):

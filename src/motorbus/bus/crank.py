@@ -30,11 +30,16 @@ def crank(link: Link, turns: Turns, until: float) -> None:
 
 
 def take_in(link: Link, turns: Turns, until: float) -> bool:
-    """Wait for bytes at most `until` and hand them to turns; False when the link is lost."""
+    """Wait for bytes at most `until` and hand them to turns; False when the link is lost.
+
+    Only what was due before this look is overdue after it: a host that was held up looks once more before it calls
+    a node silent, for the reply may long have been in the buffer.
+    """
     try:
+        looked = link.now()
         arrived = link.read(until)
         with turns.lock:
-            turns.feed(arrived, link.now())
+            turns.feed(arrived, link.now(), looked)
     except LinkError as error:
         with turns.lock:
             turns.lost(error)
@@ -55,7 +60,6 @@ def push(link: Link, turns: Turns) -> None:
 def flush(link: Link, turns: Turns) -> float:
     """Put onto the wire whatever may go now; the caller holds the lock. Returns the time."""
     now = link.now()
-    turns.expire(now)
     if turns.waiting:
         drain(link, turns, now)
     while (out := turns.send(now)) is not None:
