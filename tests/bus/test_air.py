@@ -86,6 +86,25 @@ def test_in_a_group_only_the_node_that_erred_is_lost() -> None:
     assert flight.result().missing == (2,)
 
 
+def test_noise_behind_a_reply_of_a_group_casts_doubt_on_that_reply_alone() -> None:
+    """One byte too many can make a reply that looks whole out of a wrong one, and leave its last byte behind."""
+    script = Script()
+    flight = script.submit(positions(1, 2, 3))
+    script.sent()
+    script.feed(reply(1) + reply(2) + b"\x11" + reply(3))
+    assert flight.result().missing == (2,)
+    assert not script.turns.trust.of(3).tainted
+    assert script.turns.trust.of(2).tainted
+
+
+def test_noise_in_front_of_a_train_does_no_harm() -> None:
+    script = Script()
+    flight = script.submit(positions(1, 2))
+    script.sent()
+    script.feed(b"\x11" + reply(1) + reply(2))
+    assert flight.result().missing == ()
+
+
 def test_replies_of_a_group_may_come_in_any_order_and_any_cut() -> None:
     script = Script()
     flight = script.submit(positions(1, 2, 3))

@@ -177,9 +177,7 @@ class Air:
             return
         for lane, flight in self._flying.items():
             if noise.lane in (None, lane):
-                flight.surplus = flight.surplus or flight.complete
-                flight.noise.append((noise.fault, noise.data[:64]))
-                del flight.noise[:-16]
+                flight.hear_noise(noise.fault, noise.data)
         self.trust.doubt(now, self._quiet, noise.lane)
 
     def _echo_broke(self, now: float) -> None:
@@ -264,6 +262,8 @@ class Air:
             else:
                 if index not in flight.got:
                     self.trust.missed(flight.exchange.lane, due, now, self._quiet)
+                elif not self.trust.of(due.node).silent:
+                    self.trust.of(due.node).quiet_until = now + self._quiet
                 self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
 
     def _know(self, node: int, position: Answer | None) -> None:

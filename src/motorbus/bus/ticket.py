@@ -83,6 +83,7 @@ class Flight(Ticket):
         "echo_checked",
         "exchange",
         "got",
+        "last",
         "noise",
         "parent",
         "sent_at",
@@ -112,6 +113,7 @@ class Flight(Ticket):
         """Forget what the last try brought."""
         self.sent_at = 0.0
         self.got: dict[int, Reply] = {}
+        self.last: Reply | None = None
         self.noise: list[tuple[str, bytes]] = []
         self.spoiled = ""
         self.surplus = False
@@ -130,7 +132,7 @@ class Flight(Ticket):
         size = len(reply.data)
         for index, (_, key, length) in enumerate(dues):
             if key == reply.key and length == size and index not in self.got:
-                self.got[index] = reply
+                self.got[index] = self.last = reply
                 self.complete = len(self.got) == len(dues) or self._all_believed_here()
                 return True
         return False
@@ -141,6 +143,18 @@ class Flight(Ticket):
         return dues is not ANY and all(
             index in self.got or due.node in self.unbelieved for index, due in enumerate(dues)
         )
+
+    def hear_noise(self, fault: str, data: bytes) -> None:
+        """Bytes of nobody: in front of the first reply they do no harm, behind one they cast doubt on it.
+
+        A reply that lost its place by one byte may look whole and leave its last byte behind.
+        """
+        if self.complete:
+            self.surplus = True
+        elif self.last is not None:
+            self.disbelieve(self.last)
+        self.noise.append((fault, data[:64]))
+        del self.noise[:-16]
 
     def disbelieve(self, reply: Reply) -> None:
         """A node of this exchange sent something else: in a group it alone is lost, else the whole try."""
