@@ -112,6 +112,8 @@ def test_replies_of_a_group_may_come_in_any_order_and_any_cut() -> None:
     train = reply(3, 3) + reply(1, 1) + reply(2, 2)
     for index in range(len(train)):
         script.feed(train[index : index + 1], after=0.00001)
+    assert not flight.done, "what came in pieces gets the time of one more byte"
+    script.time_out()
     assert [r.data for r in flight.result().replies] == [reply(1, 1), reply(2, 2), reply(3, 3)]
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from motorbus.bus.pump import Bus
-from motorbus.core.operation import Answer, Due, Exchange
+from motorbus.core.operation import Answer, Data, Due, Exchange
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import FeetechBus
-from motorbus.link.base import Line, PerfectLine
+from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 
@@ -45,6 +45,23 @@ class Rig:
         for servo in self.servos.values():
             servo.raw_position = raw
         return raw
+
+
+class Bytewise:
+    """Hands over what another line delivers to the host byte by byte, as a slow wire does."""
+
+    def __init__(self, line: Line, gap: float = 1e-5) -> None:
+        self.line = line
+        self.gap = gap
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        return [piece for delivery in self.line.carry(sender, data, at) for piece in self._pieces(delivery)]
+
+    def _pieces(self, delivery: Delivery) -> list[Delivery]:
+        if delivery.to is Side.DEVICE or not isinstance(delivery.data, bytes):
+            return [delivery]
+        bytes_ = [delivery.data[index : index + 1] for index in range(len(delivery.data))]
+        return [Delivery(delivery.at + n * self.gap, delivery.to, byte) for n, byte in enumerate(bytes_)]
 
 
 def words(answer: Answer) -> list[int]:

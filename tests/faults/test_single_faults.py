@@ -14,7 +14,7 @@ import pytest
 from motorbus.errors import MotorbusError
 from motorbus.link.base import PerfectLine, Side
 from motorbus.simulation.faults import Fault, ScriptedLine
-from tests.faults.rig import KINDS, Rig
+from tests.faults.rig import KINDS, Bytewise, Rig
 
 
 def every_fault(length: int, values: range) -> Iterator[Fault]:
@@ -29,7 +29,7 @@ def every_fault(length: int, values: range) -> Iterator[Fault]:
             yield Fault(1, byte, "insert", value=value)
 
 
-def suffer(kind: str, faults: Iterator[Fault]) -> tuple[int, int]:
+def suffer(kind: str, faults: Iterator[Fault], *, bytewise: bool = False) -> tuple[int, int]:
     """Every fault in turn; returns how many, and how many exchanges succeeded in spite of it."""
     exchange, _ = KINDS[kind]
     rig = Rig()
@@ -38,7 +38,7 @@ def suffer(kind: str, faults: Iterator[Fault]) -> tuple[int, int]:
     for fault in faults:
         total += 1
         line = ScriptedLine([fault])
-        rig.put(line)
+        rig.put(Bytewise(line) if bytewise else line)
         try:
             exchange(rig)
             succeeded += 1
@@ -60,18 +60,20 @@ def retries(rig: Rig) -> int:
 EDGES = [0x00, 0x01, 0x02, 0x04, 0x08, 0x10, 0x20, 0x40, 0x80, 0x55, 0xAA, 0xFE, 0xFF]
 
 
+@pytest.mark.parametrize("bytewise", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_single_byte_faults_with_telling_values(kind: str) -> None:
+def test_single_byte_faults_with_telling_values(kind: str, bytewise: bool) -> None:
     values = list(EDGES)
     faults = (fault for fault in every_fault(KINDS[kind][1], range(256)) if fault.value in values)
-    total, succeeded = suffer(kind, faults)
+    total, succeeded = suffer(kind, faults, bytewise=bytewise)
     assert total > 100
     assert succeeded == total, "a repeatable exchange gets over any single fault"
 
 
+@pytest.mark.parametrize("bytewise", [False, True])
 @pytest.mark.parametrize("kind", ["ping", "read 2 bytes"])
-def test_every_single_byte_fault(kind: str) -> None:
-    total, succeeded = suffer(kind, every_fault(KINDS[kind][1], range(256)))
+def test_every_single_byte_fault(kind: str, bytewise: bool) -> None:
+    total, succeeded = suffer(kind, every_fault(KINDS[kind][1], range(256)), bytewise=bytewise)
     length = KINDS[kind][1]
     assert total == length * (2 + 255) + (length + 1) * 256
     assert succeeded == total
@@ -79,10 +81,12 @@ def test_every_single_byte_fault(kind: str) -> None:
 
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
+@pytest.mark.parametrize("bytewise", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_single_byte_fault_of_every_kind(kind: str) -> None:
-    total, succeeded = suffer(kind, every_fault(KINDS[kind][1], range(256)))
-    print(f"\n{kind}: {total} single-byte faults, 0 wrong values, {succeeded / total:.2%} succeeded")
+def test_every_single_byte_fault_of_every_kind(kind: str, bytewise: bool) -> None:
+    total, succeeded = suffer(kind, every_fault(KINDS[kind][1], range(256)), bytewise=bytewise)
+    how = "byte by byte" if bytewise else "in one piece"
+    print(f"\n{kind}, {how}: {total} single-byte faults, 0 wrong values, {succeeded / total:.2%} succeeded")
     assert succeeded == total
 
 

@@ -22,6 +22,7 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
     Timeout.REPLY: 0.02,
     Timeout.STORE: 0.02,
 }
+SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 EARLY = 0.9  # of the air time: a reply sooner than this on a paced link answers an older request
 
 
@@ -118,8 +119,27 @@ class Air:
             if data:
                 for event in self.receiver.feed(data):
                     self._take(event, now)
+            if isinstance(data, bytes):
+                self._let_settle(len(data), now)
         self._land(now)
         self.expire(now if looked is None else looked)
+
+    def _let_settle(self, size: int, now: float) -> None:
+        """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.
+
+        One that came whole needs none; what was left over would have come with it.
+        """
+        for flight in self._flying.values():
+            last = flight.last
+            if flight.complete and not flight.settling and last is not None and size < len(last.data):
+                flight.settling = True
+                flight.deadline = min(flight.deadline, now + SETTLE * self._byte_time(flight))
+
+    def _byte_time(self, flight: Flight) -> float:
+        exchange = flight.exchange
+        dues = () if exchange.replies is ANY else exchange.replies
+        size = len(exchange.request) + sum(due.length for due in dues)
+        return self.family.air_time(exchange, self.rate) / size
 
     def _take(self, event: Reply | Notice | Noise, now: float) -> None:
         if isinstance(event, Reply):
@@ -196,6 +216,8 @@ class Air:
     def _land(self, now: float) -> None:
         for lane, flight in list(self._flying.items()):
             if not flight.complete or flight.exchange.replies is ANY:
+                continue
+            if flight.settling and not flight.surplus and now < flight.deadline:
                 continue
             for event in self.receiver.flush():  # all replies are in, so what is held is surplus
                 self._take(event, now)

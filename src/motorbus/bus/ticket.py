@@ -87,6 +87,7 @@ class Flight(Ticket):
         "noise",
         "parent",
         "sent_at",
+        "settling",
         "spoiled",
         "surplus",
         "tries",
@@ -117,6 +118,7 @@ class Flight(Ticket):
         self.noise: list[tuple[str, bytes]] = []
         self.spoiled = ""
         self.surplus = False
+        self.settling = False
         self.complete = self.exchange.replies == ()
 
     @property
