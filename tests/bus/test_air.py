@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.core.operation import Answer, Due, Exchange
 from motorbus.errors import ChecksumError, NoReply
 from motorbus.families.feetech import wire
 from tests.bus.script import Script, ping, position, positions, reply
@@ -228,3 +229,45 @@ def test_silence_has_a_cause_and_an_advice() -> None:
     assert "expected: 6 bytes from node 3" in text
     assert "likely cause" in text
     assert "what to do" in text
+
+
+def in_turn(node: int, count: int = 2) -> Exchange[Answer]:
+    """A READ whose other form reads a byte more."""
+    other = 5 - count
+    return Exchange(
+        wire.read(node, 56, count),
+        (Due(node, node, 6 + count),),
+        repeatable=True,
+        other=lambda: in_turn(node, other),
+    )
+
+
+def test_a_second_copy_of_the_last_reply_is_not_the_next() -> None:
+    script = Script()
+    prepared = in_turn(1)
+    script.submit(prepared)
+    assert script.sent() == wire.read(1, 56, 2)
+    script.feed(reply(1, 1111))
+    flight = script.submit(prepared)
+    assert script.sent() == wire.read(1, 56, 3), "another length than the last"
+    script.feed(reply(1, 1111))
+    assert not flight.done, "the copy, a little late"
+    script.feed(wire.encode_status(1, 0, b"\x22\x22\x00"))
+    assert not flight.done, "this node is in doubt now"
+    script.clear(1)
+    script.sent()
+    last = script.turns._flying[0].exchange.replies
+    assert isinstance(last, tuple)
+    script.feed(wire.encode_status(1, 0, b"\x33\x33\x00"[: last[0].length - 6]))
+    assert flight.result().replies[0].data[5:7] == b"\x33\x33"
+
+
+def test_lengths_take_turns_only_where_the_last_reply_looked_alike() -> None:
+    script = Script()
+    lengths = []
+    for node in (1, 2, 1, 1, 2):
+        script.submit(in_turn(node))
+        request = script.sent()
+        lengths.append((node, request[6]))
+        script.feed(wire.encode_status(node, 0, bytes(request[6])))
+    assert lengths == [(1, 2), (2, 2), (1, 3), (1, 2), (2, 3)]

@@ -8,7 +8,8 @@ from typing import Any
 
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Answer, Data, Due, Exchange
-from motorbus.families.feetech import FAMILY, wire
+from motorbus.families.feetech import FAMILY, Servo, wire
+from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.simulator import FeetechBus
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
@@ -76,9 +77,10 @@ def ping(rig: Rig) -> None:
 
 
 def read_word(rig: Rig) -> None:
+    """The driver's own READ of the position, raw."""
     raw = rig.stir()
-    exchange: Exchange[Answer] = Exchange(wire.read(1, 56, 2), (Due(1, 1, 8),), repeatable=True)
-    assert words(rig.bus.run(exchange)) == [raw]
+    servo = Servo(rig.bus, 1)
+    assert rig.bus.run(read_block(servo, 56, 2, lambda data: int.from_bytes(data, "little"))) == raw
 
 
 def read_feedback(rig: Rig) -> None:

@@ -68,6 +68,8 @@ class Air:
 
     def _launch(self, flight: Flight, now: float) -> Data:
         exchange = flight.exchange
+        if exchange.other is not None and self.trust.alike(exchange):
+            exchange = flight.exchange = exchange.other()
         suspected = flight.spoiled == "echo" or flight.echo_checked
         echo_checked = suspected and self.echo.present is False
         flight.reset()

@@ -16,6 +16,7 @@ from motorbus.core.operation import ANY, Due, Exchange, Key
 
 FORGOTTEN_AFTER = 5.0  # s; no device of any family answers this late, so the memory of a request may end
 LONGEST_BACK_OFF = 1.0  # s between probes of a node that stays silent while a group is read
+GROUP_RUN = 8  # group replies of one length in a row; another length costs a byte for each node
 ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding replies
 
 
@@ -26,9 +27,11 @@ class NodeTrust:
         "asked_at",
         "attempt",
         "lane",
+        "length",
         "outstanding",
         "probe_at",
         "quiet_until",
+        "run",
         "silent",
         "tainted",
     )
@@ -36,6 +39,8 @@ class NodeTrust:
     def __init__(self) -> None:
         self.tainted = False
         self.lane = 0
+        self.length = 0
+        self.run = 0
         self.asked_at = 0.0
         self.quiet_until = 0.0
         self.probe_at = 0.0
@@ -76,11 +81,21 @@ class Trust:
     def believe(self, due: Due, barrier: bool) -> None:
         """This reply is accepted. Only a probe (`barrier`) vouches for a node with replies outstanding."""
         trust = self.nodes[due.node]
+        trust.run = trust.run + 1 if trust.length == due.length else 1
+        trust.length = due.length
         if barrier:
             trust.outstanding.clear()
         if not trust.outstanding:
             trust.tainted = False
             trust.silent = 0
+
+    def alike(self, exchange: Exchange[Any]) -> bool:
+        """Would the reply due look just like the last one? In a group that is let pass a few times, for its cost."""
+        dues = exchange.replies
+        if dues is ANY or not dues or dues[0].node not in self.nodes:
+            return False
+        trust = self.nodes[dues[0].node]
+        return trust.length == dues[0].length and trust.run >= (1 if len(dues) == 1 else GROUP_RUN)
 
     def doubt(self, now: float, quiet: float, lane: int | None = None) -> None:
         """Bytes came that belong to nobody: whoever was asked lately (on this lane) may have sent them."""

@@ -153,12 +153,15 @@ class Exchange(Generic[T_co]):
     `timeout`     how long the device may think
     `repeatable`  sending it twice does no more than sending it once
     `tells_position`  the replies begin with the present position, so stop can hold it
+    `other`       makes an exchange that says the same and has replies of another length. Where replies carry no
+                  number, sending the two in turn keeps a second copy of the last reply from being taken for the next
     """
 
     __slots__ = (
         "effect",
         "goals",
         "lane",
+        "other",
         "rank",
         "read",
         "repeatable",
@@ -181,6 +184,7 @@ class Exchange(Generic[T_co]):
         timeout: Timeout = Timeout.REPLY,
         repeatable: bool = False,
         tells_position: bool = False,
+        other: Callable[[], Exchange[T_co]] | None = None,
     ) -> None:
         self.request: Final = request
         self.replies: Final = replies
@@ -192,6 +196,7 @@ class Exchange(Generic[T_co]):
         self.timeout: Final = timeout
         self.repeatable: Final = repeatable
         self.tells_position: Final = tells_position
+        self.other: Final = other
 
     def __iter__(self) -> Generator[Step, Any, T_co]:
         value: T_co = yield self

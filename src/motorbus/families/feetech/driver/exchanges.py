@@ -19,6 +19,8 @@ T = TypeVar("T")
 
 PRESENT: Final = 56
 """Where feedback begins in every map: the present position."""
+LAST: Final = 255
+"""The highest address of a register."""
 ACKNOWLEDGED: Final = wire.OVERHEAD
 """Bytes of a status packet without parameters, which answers PING and every write."""
 DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
@@ -47,22 +49,34 @@ def read_block(
     rank: Rank = Rank.POLL,
     timeout: Timeout = Timeout.REPLY,
 ) -> Exchange[T]:
-    """READ `count` bytes from `address` on; the value is what `take` makes of them."""
+    """READ `count` bytes from `address` on; the value is what `take` makes of them.
+
+    Its other form reads one byte more and leaves it unused: the length is all in a reply that tells it from the last.
+    """
 
     def read(answer: Answer) -> T:
         frame = answer.replies[0].data
         node.heard(frame[4], answer.at)
-        return take(frame[5:-1])
+        return take(frame[5 : 5 + count])
 
-    return Exchange(
-        wire.read(node.node, address, count),
-        (Due(node.node, node.node, wire.OVERHEAD + count),),
-        read,
-        rank=rank,
-        timeout=timeout,
-        repeatable=True,
-        tells_position=address == PRESENT and count > 1,
-    )
+    def exchange(count: int, other: int) -> Exchange[T]:
+        return Exchange(
+            wire.read(node.node, address, count),
+            (Due(node.node, node.node, wire.OVERHEAD + count),),
+            read,
+            rank=rank,
+            timeout=timeout,
+            repeatable=True,
+            tells_position=address == PRESENT and count > 1,
+            other=lambda: exchange(other, count),
+        )
+
+    return exchange(count, another(address, count))
+
+
+def another(address: int, count: int) -> int:
+    """One byte more than `count`, or less where the table of a servo ends."""
+    return count + 1 if address + count <= LAST else count - 1
 
 
 def acknowledged(

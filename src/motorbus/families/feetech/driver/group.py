@@ -14,7 +14,7 @@ from motorbus.core.entry import Table, Value
 from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, read_block, unanswered
+from motorbus.families.feetech.driver.exchanges import PRESENT, Block, another, read_block, unanswered
 from motorbus.families.feetech.driver.identity import learn, unknown_map
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
@@ -101,7 +101,7 @@ def block_of_each(nodes: Sequence[Node], address: int, count: int) -> Exchange[d
     """SYNC READ one block of each; the value holds the bytes of those who answered."""
 
     def read(answer: Answer) -> dict[int, bytes]:
-        return dict(_heard(by_id, answer))
+        return {id: data[:count] for id, data in _heard(by_id, answer)}
 
     by_id = {node.node: node for node in nodes}
     return sync_exchange(nodes, address, count, read)
@@ -110,15 +110,23 @@ def block_of_each(nodes: Sequence[Node], address: int, count: int) -> Exchange[d
 def sync_exchange(
     nodes: Sequence[Node], address: int, count: int, read: Callable[[Answer], T]
 ) -> Exchange[T]:
-    """SYNC READ one block of each of these, in this order."""
-    size = wire.OVERHEAD + count
-    return Exchange(
-        wire.sync_read(address, count, [node.node for node in nodes]),
-        tuple(Due(node.node, node.node, size) for node in nodes),
-        read,
-        repeatable=True,
-        tells_position=address == PRESENT and count > 1,
-    )
+    """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`).
+
+    `read` must make do with either.
+    """
+    ids = [node.node for node in nodes]
+
+    def exchange(count: int, other: int) -> Exchange[T]:
+        return Exchange(
+            wire.sync_read(address, count, ids),
+            tuple(Due(id, id, wire.OVERHEAD + count) for id in ids),
+            read,
+            repeatable=True,
+            tells_position=address == PRESENT and count > 1,
+            other=lambda: exchange(other, count),
+        )
+
+    return exchange(count, another(address, count))
 
 
 def collected(

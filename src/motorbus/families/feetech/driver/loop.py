@@ -54,7 +54,7 @@ def _positions(nodes: Mapping[int, Node], rows: Mapping[int, Entry], answer: Ans
         frame = reply.data
         node, row = nodes[frame[2]], rows[frame[2]]
         node.heard(frame[4], answer.at)
-        found[node.node] = node.value(row, row.decode(frame[5:-1]))
+        found[node.node] = node.value(row, row.decode(frame[5 : 5 + row.size]))
     return found
 
 
