@@ -168,3 +168,9 @@ def test_the_blocking_and_the_async_bus_share_everything_but_waiting() -> None:
     assert type(blocking).__mro__[1] is type(awaiting).__mro__[1]
     exchange: Exchange[int] = position(1)
     assert blocking.run(exchange) == 1
+
+
+@pytest.mark.parametrize("name", ["pump.py", "aio.py"])
+def test_the_pumps_stay_small(name: str) -> None:
+    """Under 80 lines with everything in them: whoever waits for bytes has no business with policy."""
+    assert len((PACKAGE / "bus" / name).read_text().splitlines()) < 80

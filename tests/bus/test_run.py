@@ -186,7 +186,7 @@ def test_an_error_in_the_reader_is_raised_in_the_operation() -> None:
 
 def interrupted(bus: Bus, operation: Operation[None], after: int) -> None:
     """Run it and press Ctrl-C when the bus has been turned `after` times."""
-    turn, count = bus._turn, 0
+    turn, count = bus.relay.turn, 0
 
     def pressed() -> None:
         nonlocal count
@@ -195,11 +195,11 @@ def interrupted(bus: Bus, operation: Operation[None], after: int) -> None:
             raise KeyboardInterrupt
         turn()
 
-    bus._turn = pressed  # type: ignore[method-assign]
+    bus.relay.turn = pressed  # type: ignore[method-assign]
     try:
         bus.run(operation)
     finally:
-        bus._turn = turn  # type: ignore[method-assign]
+        bus.relay.turn = turn  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize("after", range(1, 5))

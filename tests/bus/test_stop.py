@@ -17,11 +17,11 @@ import pytest
 
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import ROUNDS, request_estop
-from motorbus.core.operation import Effect, Operation, Pause
+from motorbus.core.operation import Effect, Exchange, Operation, Pause
 from motorbus.errors import Interrupted, LinkError, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
-from tests.bus.responder import Responder, async_bus, memory_bus, position, positions, write
+from tests.bus.responder import Responder, async_bus, first_byte, memory_bus, position, positions, write
 from tests.bus.script import admit_all
 
 TORQUE = 40
@@ -68,6 +68,27 @@ def test_it_is_latched_until_reset_and_reading_goes_on() -> None:
     assert bus.run(position(1)) == 1
     bus.reset()
     bus.run(write(1, TORQUE, 1, Effect.TORQUE))
+
+
+def test_the_frames_are_made_with_the_last_positions() -> None:
+    bus, _ = memory_bus()
+    seen: list[dict[int, bool]] = []
+    stop = type(FAMILY).stop
+
+    class Watched(type(FAMILY)):  # type: ignore[misc]
+        def stop(self, nodes: Any) -> Any:
+            seen.append({node: answer is not None for node, answer in nodes.items()})
+            return stop(FAMILY, nodes)
+
+    bus.turns.family = Watched()
+    told: Exchange[int] = Exchange(
+        position(1).request, position(1).replies, first_byte, repeatable=True, tells_position=True
+    )
+    bus.run(told)
+    bus.run(position(2))
+    bus.run(told)
+    bus.estop()
+    assert seen[-1] == {1: True, 2: False}
 
 
 def test_a_second_stop_is_as_good_as_the_first() -> None:
@@ -195,6 +216,19 @@ def test_what_is_not_a_request_stops_nothing(tmp_path: Path, garbage: bytes) -> 
     assert torque_offs(responder) == []
     assert request_estop(path).acknowledged == (1,), "and the stop still works"
     bus.close()
+
+
+def test_clients_that_say_nothing_hold_up_nobody(tmp_path: Path) -> None:
+    path = tmp_path / "stop"
+    bus, responder = served(path)
+    with contextlib.ExitStack() as stack:
+        for _ in range(4):
+            mute = stack.enter_context(socket.socket(socket.AF_UNIX))
+            mute.connect(str(path))
+        assert request_estop(path).acknowledged == (1,), "the fifth is served although the others are mute"
+        assert bus.estop().acknowledged == (1,)
+        assert torque_offs(responder).count(254) == 2
+        bus.close()
 
 
 def test_where_nobody_serves_the_request_says_so(tmp_path: Path) -> None:

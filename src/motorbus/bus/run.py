@@ -148,17 +148,18 @@ class Run(Generic[T]):
         if isinstance(wish, Together):
             branch.children = [Branch(operation, branch) for operation in wish.operations]
         elif isinstance(wish, Alone):
-            branch.children = [Branch(_claimed(wish), branch, alone=True)]
+            child = Branch(wish.operation, branch, alone=True)
+            child.started = True
+            branch.children = [child]
+            self._await(child, Claim(child.owner, self.wake))
         elif isinstance(wish, Report):
             self._notify(branch, wish.event)
         else:
             self._await(branch, self._ticket(branch.owner, wish))
 
-    def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune | _Claiming) -> Ticket:
+    def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune) -> Ticket:
         if isinstance(wish, Exchange):
             return Flight(wish, owner, self.wake)
-        if isinstance(wish, _Claiming):
-            return Claim(owner, self.wake)
         if isinstance(wish, Tune):
             return Retune(wish, owner, self.wake)
         if isinstance(wish, Listen):
@@ -260,16 +261,6 @@ class Run(Generic[T]):
             raise self.root.error
         value: T = self.root.value
         return value
-
-
-class _Claiming:
-    """The wish to have the bus alone; only `_claimed` makes it."""
-
-
-def _claimed(alone: Alone[Any]) -> Operation[Any]:
-    inner = alone.operation
-    yield _Claiming()  # type: ignore[misc]  # an eighth step that no driver can say
-    return (yield from inner)
 
 
 def _alive(generator: Operation[Any]) -> bool:

@@ -28,6 +28,7 @@ from motorbus.link.base import Link
 
 ROUNDS = 5
 ROUND_TIME = 0.25  # s for all frames of one round, whatever the line does
+CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
 PATIENCE = 5.0  # s that a caller waits for the stop thread
 
 
@@ -128,17 +129,29 @@ class Stopper:
     def _serve(self) -> None:
         assert self._pair is not None
         wish = self._pair[0]
-        with DefaultSelector() as ready, _listening(self.socket_path) as listener:
+        with _listening(self.socket_path) as listener, DefaultSelector() as ready:
             ready.register(wish, EVENT_READ)
             if listener is not None:
                 ready.register(listener, EVENT_READ)
             self._ready.set()
             while not self._closed:
-                for key, _ in ready.select():
-                    if key.fileobj is wish:
-                        self._wished(wish)
-                    else:
-                        self._asked(listener)
+                self._look(ready, wish, listener)
+            for key in list(ready.get_map().values()):
+                if key.fileobj not in (wish, listener) and isinstance(key.fileobj, socket.socket):
+                    key.fileobj.close()
+
+    def _look(self, ready: DefaultSelector, wish: socket.socket, listener: socket.socket | None) -> None:
+        """Wait for a wish from this process first, then for clients; a mute one holds up nobody."""
+        ends = [key.fileobj for key, _ in ready.select()]
+        if wish in ends:
+            self._wished(wish)
+        for end in ends:
+            if end is listener and listener is not None:
+                with contextlib.suppress(OSError):
+                    ready.register(listener.accept()[0], EVENT_READ)
+            elif end is not wish and isinstance(end, socket.socket):
+                ready.unregister(end)
+                self._asked(end)
 
     def _wished(self, wish: socket.socket) -> None:
         wish.recv(4096)
@@ -150,15 +163,12 @@ class Stopper:
         self._done.set()
         return self.outcome
 
-    def _asked(self, listener: socket.socket | None) -> None:
-        assert listener is not None
-        with contextlib.suppress(OSError):
-            client, _ = listener.accept()
-            with client:
-                client.settimeout(1.0)
-                if client.recv(64).strip() == b"estop":
-                    outcome = self._stop_and_tell()
-                    client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
+    def _asked(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError), client:
+            client.settimeout(CLIENT_TIME)
+            if client.recv(64).strip() == b"estop":
+                outcome = self._stop_and_tell()
+                client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
 
     def close(self) -> None:
         """End the thread. Nothing is sent."""
@@ -201,7 +211,7 @@ def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
         except (FileNotFoundError, ConnectionRefusedError):
             raise PortNotFound(
                 "no motorbus process offers an emergency stop for this bus",
-                cause="none holds it, or the one that does has not yet commanded motion or torque",
+                cause="none holds it",
             ) from None
         except OSError as error:
             raise LinkError(f"the process that holds the bus did not answer: {error}") from error

@@ -10,6 +10,7 @@ anything else happens to it, a flight keeps its deadline, and what is half done 
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Callable
 from math import inf
@@ -310,6 +311,10 @@ class Turns(Air):
     def latch(self, now: float) -> Stop:
         """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""
         self.latched = self.stopping = True
+        with contextlib.suppress(
+            Exception
+        ):  # with the last positions; if that fails, the frames made before do
+            self.stop = self.family.stop(self.known)
         for queue in self._queues:
             for ticket in list(queue):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:

@@ -1,0 +1,78 @@
+"""Threads on one blocking bus: one pumps, the others wait and are woken, and whoever still waits takes over.
+
+`pumper` is the thread that pumps. An interrupt may fall between any two lines here, so a thread that finds its own
+number there has been interrupted, and `recover` gives back whatever it may still hold.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from threading import Condition, get_ident
+
+from motorbus.bus.crank import crank, launch, push, take_in
+from motorbus.bus.ticket import Flight
+from motorbus.bus.turns import Turns
+from motorbus.link.base import Link
+
+NAP = 0.05  # s; a waiting thread looks at its own ticket at least this often
+
+
+class Relay:
+    """Who pumps, and who is told when something has changed."""
+
+    def __init__(self, link: Link, turns: Turns, changed: Condition) -> None:
+        self.link = link
+        self.turns = turns
+        self.changed = changed
+        self.pumper: int | None = None
+
+    def start(self, flight: Flight) -> None:
+        """Send this exchange at once where the bus is idle, and take in what comes; queue it otherwise."""
+        if self._launched(flight):
+            take_in(self.link, self.turns, flight.deadline)
+            self._hand_over()
+        flight.wake = self.wake
+
+    def _launched(self, flight: Flight) -> bool:
+        """Has it left at once, and is its answer to be waited for here?"""
+        with self.changed:
+            if self.pumper is None and launch(self.link, self.turns, flight):
+                self.pumper = get_ident() if not flight.done else None
+                return not flight.done
+            if self.pumper is not None:
+                self.turns.submit(flight, self.link.now())
+            return False
+
+    def turn(self) -> None:
+        """Let time pass: pump, or wait for the thread that does."""
+        with self.changed:
+            if self.pumper not in (None, get_ident()):
+                push(self.link, self.turns)
+                self.changed.wait(NAP)
+                return
+            self.pumper = get_ident()
+        try:
+            crank(self.link, self.turns, inf)
+        finally:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        with self.changed:
+            self.pumper = None
+            self.changed.notify_all()
+
+    def wake(self) -> None:
+        """Something has been settled."""
+        with self.changed:
+            self.changed.notify_all()
+
+    def recover(self) -> None:
+        """After an interrupt: stop being the one that pumps, and let go of the lock as often as it is held."""
+        if self.pumper == get_ident():
+            self.pumper = None
+        try:
+            while True:
+                self.changed.notify_all()
+                self.turns.lock.release()
+        except RuntimeError:  # not held (any more): the usual case
+            pass

@@ -1,0 +1,57 @@
+"""How an event loop learns that a link has something: by its descriptor, or by a thread that waits for bytes."""
+
+from __future__ import annotations
+
+import asyncio
+from math import inf
+from threading import Thread
+
+from motorbus.bus.crank import push, take_in
+from motorbus.bus.turns import Turns
+from motorbus.link.base import Link
+
+LOOK = 0.05  # s; how long the reader thread of a link without descriptor waits at a time
+
+
+class Watch:
+    """Turns the crank whenever the loop sees that bytes have come or that something is due."""
+
+    def __init__(self, link: Link, turns: Turns) -> None:
+        self.link = link
+        self.turns = turns
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Watch the link on this loop; does nothing when it is watched."""
+        if self._loop is not None:
+            return
+        self._loop = loop
+        descriptor = self.link.fileno()
+        if descriptor is not None:
+            loop.add_reader(descriptor, self.crank)
+        else:
+            Thread(target=self._read, name="motorbus reader", daemon=True).start()
+
+    def crank(self) -> None:
+        """Everything that can be done without waiting; then be back when something is due."""
+        take_in(self.link, self.turns, -inf)
+        push(self.link, self.turns)
+        if self._timer is not None:
+            self._timer.cancel()
+        due = self.turns.due()
+        if self._loop is not None and due < inf:
+            self._timer = self._loop.call_later(max(0.0, due - self.link.now()), self.crank)
+
+    def _read(self) -> None:
+        while self._loop is not None and take_in(self.link, self.turns, self.link.now() + LOOK):
+            push(self.link, self.turns)
+
+    def close(self) -> None:
+        """Watch no longer."""
+        loop, self._loop = self._loop, None
+        descriptor = self.link.fileno()
+        if loop is not None and descriptor is not None:
+            loop.remove_reader(descriptor)
+        if self._timer is not None:
+            self._timer.cancel()
