@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from random import Random
+from typing import Any
 
 import pytest
 
@@ -111,7 +112,9 @@ def test_a_reply_that_comes_twice_is_believed_once(rounds: Callable[[int], int])
     rig = Rig(line)
     good = sum(try_(read_word, rig) for _ in range(total))
     assert line.fired > total / 100
-    print(f"\n{total} reads, {line.fired} replies with a copy behind, 0 stale values, {good / total:.3%} succeeded")
+    print(
+        f"\n{total} reads, {line.fired} replies with a copy behind, 0 stale values, {good / total:.3%} succeeded"
+    )
     assert good == total
 
 
@@ -260,6 +263,30 @@ def test_lost_replies_are_asked_for_again_and_lost_writes_are_not_called_done() 
     good = sum(try_(read_word, rig) + try_(write_byte, rig) for _ in range(500))
     assert rig.line.count("loss") > 50
     assert good > 600
+
+
+@pytest.mark.parametrize(
+    "fault", ["late", "loss", "duplicate", "corrupt", "lose_byte", "insert_byte", "double_byte"]
+)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_second_exchange_after_the_last_fault_is_right_at_its_first_try(fault: str, kind: str) -> None:
+    """Whatever the fault did, the exchange after the next one neither fails nor is tried again."""
+    exchange, _ = KINDS[kind]
+    rig = Rig()
+    fired = 0
+    for seed in range(60):
+        always: dict[str, Any] = {fault: 1.0}
+        noisy = NoisyLine(seed, **always)
+        rig.put(noisy)
+        try_(exchange, rig)
+        fired += len(noisy.fired)
+        rig.put(PerfectLine())
+        rig.link.advance(1.0)  # what is late has come
+        try_(exchange, rig)
+        before = sum(ledger.retries for ledger in rig.bus.statistics.nodes.values())
+        exchange(rig)
+        assert sum(ledger.retries for ledger in rig.bus.statistics.nodes.values()) == before
+    assert fired >= 60
 
 
 def test_a_call_on_a_dead_line_ends_and_says_so() -> None:
