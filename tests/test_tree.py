@@ -23,12 +23,7 @@ LONGEST_FUNCTION = 50
 ROOMS = ("wire", "table", "driver", "simulator")
 EMPTY_WORDS = re.compile(r"(Manager|Helper|Utils?|Handler)(?![a-z])")
 # file: why it may hold a test that does not always run
-MAY_SKIP = {
-    "tests/link/test_foreign.py": "who holds a port is told by Linux only",
-    "tests/link/test_serial.py": "exclusive opening and the latency timer are Linux's",
-    "tests/link/test_speed.py": "rates without a constant of their own are read back on Linux only",
-    "tests/link/test_tcp.py": "a machine may have no IPv6 loopback",
-}
+MAY_SKIP: dict[str, str] = {}
 
 Function: TypeAlias = "ast.FunctionDef | ast.AsyncFunctionDef"
 

@@ -1,6 +1,6 @@
-"""Everything that can be wrong with a request: one clear error, its own exit code, and nothing sent.
+"""Everything that can be wrong with a request: one clear error, its own exit code, and nothing changed.
 
-That nothing was sent is seen at the simulated devices themselves: they count what they hear.
+That nothing was changed is seen at the simulated devices: in what the bus hears, and in every register of a device.
 """
 
 from __future__ import annotations
@@ -12,11 +12,34 @@ from pathlib import Path
 import pytest
 
 from motorbus.cli.simulated import Simulated
+from motorbus.core.operation import Data
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 from tests.cli.test_estop import FOREIGN, WATCHING, program
 
 pytestmark = pytest.mark.usefixtures("state_folder")
+
+
+PING, READ, WRITE = 1, 2, 3
+
+
+def registers(arm: Simulation) -> dict[str, int]:
+    """Every register of servo 1."""
+    return {name: arm[1].memory[name] for name in arm.family.tables["sts"]}
+
+
+def listening(arm: Simulation, monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """From here on, every packet that the simulated bus hears."""
+    heard: list[bytes] = []
+    receive = arm.simulator.receive
+
+    def overheard(data: Data, at: float) -> None:
+        assert isinstance(data, bytes)
+        heard.append(data)
+        receive(data, at)
+
+    monkeypatch.setattr(arm.simulator, "receive", overheard)
+    return heard
 
 
 @pytest.mark.parametrize(
@@ -99,11 +122,21 @@ def test_a_wrong_rate_is_silence_with_advice(served: Simulated, run: Run) -> Non
     ids=lambda value: " ".join(value) if isinstance(value, list) else str(value),
 )
 def test_a_request_that_is_impossible_changes_nothing(
-    words: list[str], code: int, run: Run, arm: Simulation
+    words: list[str], code: int, run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = arm[1].status()
+    before = arm[1].status(), registers(arm)
+    heard = listening(arm, monkeypatch)
     ran = run(*(word.replace("BUS", arm.url) for word in words))
     assert (ran.code, ran.out) == (code, "")
     assert ran.err.startswith("error: ")
     assert ran.err.count("error: ") == 1
-    assert arm[1].status() == before
+    assert (arm[1].status(), registers(arm)) == before
+    assert {packet[4] for packet in heard} <= {PING, READ}
+
+
+def test_what_is_possible_is_heard(run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = registers(arm)
+    heard = listening(arm, monkeypatch)
+    assert run("write", f"{arm.url}#1", "torque_limit=50%").code == 0
+    assert {packet[4] for packet in heard} > {WRITE}
+    assert registers(arm) != before

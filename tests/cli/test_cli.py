@@ -191,12 +191,22 @@ def test_no_color_is_obeyed_by_the_help() -> None:
     assert "\x1b[" not in ended.stdout
 
 
+def _as_in_a_terminal() -> None:
+    """Whoever runs these tests in the background may ignore these signals, which a child would inherit."""
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_being_told_to_end_cleans_up(number: signal.Signals) -> None:
     code = "import sys; from motorbus.cli import main; print(main(sys.argv[1:]), file=sys.stderr)"
     words = ["monitor", "feetech:sim#1", "--rate", "50", "--json"]
     with subprocess.Popen(
-        [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", code, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=_as_in_a_terminal,
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline()

@@ -11,7 +11,8 @@ from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
 from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together
 from motorbus.errors import LimitExceeded
-from motorbus.families.feetech import Servo
+from motorbus.families.feetech import FAMILY, Servo
+from motorbus.families.feetech.driver import action_all
 from motorbus.simulation.named import Simulation
 
 
@@ -70,6 +71,16 @@ def test_an_error_reaches_the_operation(arm: Simulation) -> None:
 
     with motorbus.open(arm.url) as bus:
         assert DryBus(bus).run(careful(absent)) == "nobody"
+
+
+def test_what_was_withheld_from_one_hides_nothing_of_another(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        Servo(rehearsal, 1).enable_torque()
+        assert rehearsal.run(FAMILY.probe(1, 0)) is not True
+        assert rehearsal.run(FAMILY.probe(2, 0)) is True
+        rehearsal.run(action_all())  # which everyone hears
+        assert rehearsal.run(FAMILY.probe(2, 0)) is not True
 
 
 def test_frames_are_explained_without_their_framing(

@@ -32,3 +32,16 @@ def test_none_does(arm: Simulation) -> None:
 def test_a_verb_they_lack(arm: Simulation) -> None:
     with pytest.raises(RequestError, match="no tail wagging"):
         each("wag", "tail_wagging", (f"{arm.url}#1",), {}, Output())
+
+
+def test_a_dry_run_sends_nothing_to_anybody(arm: Simulation, capsys: pytest.CaptureFixture[str]) -> None:
+    before = [arm[node].status() for node in (1, 2)]
+    assert each("on", "enable_torque", (f"{arm.url}#1+2",), {}, Output(), dry_run=True) is Exit.OK
+    shown = capsys.readouterr().out
+    assert [shown.count(f"WRITE to servo {node}") for node in (1, 2)] == [2, 2]
+    assert [arm[node].status() for node in (1, 2)] == before
+
+
+def test_a_dry_run_tells_who_is_silent(arm: Simulation) -> None:
+    with pytest.raises(Partial, match="node 9"):
+        each("on", "enable_torque", (f"{arm.url}#1+9",), {}, Output(), dry_run=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -95,6 +96,14 @@ def test_a_program_whose_event_loop_hangs_is_stopped(served: Simulated, run: Run
     assert torque(served.bus) == [0, 0, 0]
 
 
+def test_who_was_named_but_is_unknown_to_the_owner_is_silent(served: Simulated, run: Run) -> None:
+    with program(HANGING, served.bus):
+        ran = run("estop", f"{served.bus}#3+9", "--json")
+    assert ran.code == 6
+    (stop,) = ran.document["buses"]
+    assert (stop["outcome"], stop["silent"]) == ("acknowledged by some", [9])
+
+
 def test_a_move_that_is_stopped_says_so(served: Simulated, run: Run) -> None:
     command = [
         sys.executable,
@@ -131,6 +140,34 @@ def test_devices_that_are_named_confirm_it(served: Simulated, run: Run) -> None:
     assert ran.code == 6
     (stop,) = ran.document["buses"]
     assert (stop["acknowledged"], stop["silent"], stop["by"]) == ([1], [9], "this process")
+
+
+@pytest.mark.parametrize(("devices", "silent"), [("", []), ("#8+9", [8, 9])], ids=["unnamed", "named"])
+def test_a_stop_that_nobody_acknowledged_promises_nothing(devices: str, silent: list[int], run: Run) -> None:
+    words = run("estop", f"feetech:sim,ids=2-6{devices}")
+    assert words.code == 5
+    assert "acknowledged by nobody" in words.out
+    assert "torque off" not in words.out
+    ran = run("estop", f"feetech:sim,ids=2-6{devices}", "--json")
+    assert ran.code == 5
+    (stop,) = ran.document["buses"]
+    assert (stop["outcome"], stop["acknowledged"], stop["promise"]) == ("acknowledged by nobody", [], "")
+    assert stop["silent"] == silent
+    assert json.loads(ran.err)["error"] == "NoReply"
+
+
+def test_who_can_acknowledge_is_said_where_nobody_was_named(run: Run) -> None:
+    ran = run("estop", "feetech:sim,ids=1-6")
+    assert ran.code == 0
+    assert "acknowledged by #1\n" in ran.out
+    assert "only devices that are named" in ran.out
+    assert "only devices" not in run("estop", "feetech:sim,ids=1-6#1-6").out
+
+
+def test_a_stop_that_some_acknowledged_says_so_to_programs(run: Run) -> None:
+    ran = run("estop", "feetech:sim,ids=1-2#1-3", "--json")
+    assert ran.code == 6
+    assert ran.document["buses"][0]["outcome"] == "acknowledged by some"
 
 
 def test_a_foreign_program_is_named(served: Simulated, run: Run) -> None:

@@ -57,6 +57,18 @@ def test_a_dry_sync_write_shows_one_frame(run: Run, arm: Simulation) -> None:
     assert goal(run, arm, 1) == 0
 
 
+def test_dry_runs_leave_nothing_waiting_and_start_nothing(run: Run, arm: Simulation) -> None:
+    ran = run("feetech", "reg-write", f"{arm.url}#1", "goal_position=90deg", "--dry-run", "--json")
+    assert [frame["data"] for frame in ran.document["withheld"]] == ["FF FF 01 05 04 2A 00 04 C7"]
+    assert run("feetech", "action", arm.url).code == 0
+    assert goal(run, arm, 1) == 0
+    assert run("feetech", "reg-write", f"{arm.url}#1", "goal_position=90deg").code == 0
+    for devices in (arm.url, f"{arm.url}#1"):
+        ran = run("feetech", "action", devices, "--dry-run", "--json")
+        assert "ACTION" in ran.document["withheld"][0]["meaning"]
+        assert goal(run, arm, 1) == 0
+
+
 @pytest.mark.parametrize(
     ("words", "code"),
     [

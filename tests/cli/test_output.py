@@ -81,6 +81,26 @@ def test_a_terminal_gets_a_title_that_says_simulated(monkeypatch: pytest.MonkeyP
     assert "\x1b[" in terminal.getvalue()
 
 
+def test_what_is_simulated_says_so_once_and_first(capsys: pytest.CaptureFixture[str]) -> None:
+    output = Output()
+    output.simulated = True
+    output.table("", ["a"], [[1]])
+    output.text("words")
+    output.table("Devices", ["a"], [[1]])
+    assert capsys.readouterr().out == "simulated\na\n1\nwords\nDevices (simulated)\na\n1\n"
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_what_says_it_by_itself_is_not_marked_again(
+    simulated: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = Output()
+    output.simulated = simulated
+    output.text("two simulated devices")
+    output.text("words")
+    assert capsys.readouterr().out == "two simulated devices\nwords\n"
+
+
 def test_no_color_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = watched(monkeypatch)
     monkeypatch.setenv("NO_COLOR", "1")

@@ -59,12 +59,12 @@ def test_an_angle_is_typed_with_or_without_unit(text: str, number: float) -> Non
     ("text", "raw"), [("2048raw", False), ("2048", True), ("0x800", True), ("2048raw", True)]
 )
 def test_a_raw_value_is_said_to_be_one(text: str, raw: bool) -> None:
-    assert quantity.typed(ANGLE, text, raw=raw) == (2048, True)
+    assert quantity.typed(ANGLE, text, raw=raw) == (2048, True, False)
 
 
 @pytest.mark.parametrize(("text", "number"), [("velocity", 1), ("Position", 0), ("3", 3), ("0x02", 2)])
 def test_a_plain_number_may_be_named(text: str, number: int) -> None:
-    assert quantity.typed(MODE, text) == (number, True)
+    assert quantity.typed(MODE, text) == (number, True, text.isalpha())
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+import motorbus
 from motorbus.cli import target
 from motorbus.errors import RequestError
 from motorbus.families.feetech import FAMILY
+from motorbus.simulation.named import Simulation
 
 
 def test_a_bus_and_its_nodes() -> None:
@@ -55,3 +57,14 @@ def test_a_verb_that_a_device_lacks_is_named() -> None:
 
     with pytest.raises(RequestError, match="feetech devices have no wag tail"):
         target.able(Box(), "wag_tail")
+
+
+def test_an_option_that_a_verb_lacks_is_refused(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        one = target.face(bus, 1)
+        target.takes(one, "move", ["velocity", "acceleration"])
+        target.takes(one, "write", ["anything"])
+        with pytest.raises(RequestError, match="has no colour"):
+            target.takes(one, "move", ["colour"])
+        with pytest.raises(RequestError, match="have no dance"):
+            target.takes(one, "dance", [])

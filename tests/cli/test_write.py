@@ -44,6 +44,13 @@ def test_a_raw_value_that_moves_needs_an_expert(words: list[str], run: Run, arm:
     assert held(run, arm, "goal_position") == 2100
 
 
+@pytest.mark.parametrize("choice", ["velocity", "VELOCITY"])
+def test_a_choice_by_its_name_is_no_raw_number(choice: str, run: Run, arm: Simulation) -> None:
+    assert "EEPROM" in run("write", f"{arm.url}#1", f"operating_mode={choice}").err
+    assert run("write", f"{arm.url}#1", f"operating_mode={choice}", "--yes").code == 0
+    assert held(run, arm, "operating_mode") == 1
+
+
 def test_eeprom_needs_agreement(run: Run, arm: Simulation) -> None:
     ran = run("write", f"{arm.url}#1", "max_temperature=65")
     assert ran.code == 8

@@ -7,10 +7,10 @@ what was "written", so that a guarded sequence is shown to its end.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.cli.exits import Unforeseeable
-from motorbus.core.operation import Alone, Effect, Exchange, Rank, Together
+from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Rank, Together
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
+
+_EVERYONE: Final = -1
+"""Among the nodes that something was withheld from: what nobody answers may have been for each of them."""
 
 
 class _AsWritten:
@@ -36,7 +39,10 @@ class _AsWritten:
 
 
 class DryBus:
-    """Stands where a bus stands: reads by it, and keeps what it withheld in `frames`, in order."""
+    """Stands where a bus stands: reads by it, and keeps what it withheld in `frames`, in order.
+
+    A CAN frame is kept as it stands in a run of bytes, see `CanFrame.flat()`.
+    """
 
     def __init__(self, bus: Bus) -> None:
         self.family = bus.family
@@ -44,6 +50,7 @@ class DryBus:
         self.frames: list[bytes] = []
         self._bus = bus
         self._gate = Gate()
+        self._written: set[int] = set()
 
     def run(self, operation: Runnable[T], report: object = None) -> T:
         """Carry out an operation, reading only. Raises as the operation does, LimitExceeded of the gate included."""
@@ -75,11 +82,21 @@ class DryBus:
 
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
-            return _AsWritten() if self.frames else self._bus.run(exchange)
+            return _AsWritten() if self._follows(exchange) else self._bus.run(exchange)
         self._gate(exchange)
-        assert isinstance(exchange.request, bytes)
-        self.frames.append(exchange.request)
+        self._written |= _answering(exchange) or {_EVERYONE}
+        request = exchange.request
+        self.frames.append(request.flat() if isinstance(request, CanFrame) else request)
         return None
+
+    def _follows(self, exchange: Exchange[Any]) -> bool:
+        """Does it ask somebody whom something was withheld from?"""
+        asked = _answering(exchange) | {_EVERYONE} if self._written else set()
+        return bool(asked & self._written)
+
+
+def _answering(exchange: Exchange[Any]) -> set[int]:
+    return set() if exchange.replies is ANY else {due.node for due in exchange.replies}
 
 
 def show(dry: DryBus, output: Output) -> None:

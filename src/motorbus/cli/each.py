@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
+from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.target import able, everyone, face, gathered, opened
 from motorbus.errors import LinkError, MotorbusError
@@ -16,21 +17,38 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
 
 
-def each(what: str, verb: str, devices: tuple[str, ...], options: Mapping[str, str], output: Output) -> Exit:
-    """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked."""
+def each(
+    what: str,
+    verb: str,
+    devices: tuple[str, ...],
+    options: Mapping[str, str],
+    output: Output,
+    *,
+    dry_run: bool = False,
+) -> Exit:
+    """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
+
+    A dry run shows what would be sent, and sends none of it.
+    """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
     for name, nodes in gathered(devices).items():
         with opened(name, options, output) as bus:
             visited = everyone(name, bus, nodes, output)
-            results += [{"bus": name, "id": node, **_tried(bus, node, verb, errors)} for node in visited]
+            rehearsal = DryBus(bus)
+            carrier = rehearsal if dry_run else bus
+            results += [{"bus": name, "id": node, **_tried(carrier, node, verb, errors)} for node in visited]
+            if dry_run:
+                show(rehearsal, output)
+    if dry_run:
+        return _verdict(errors, len(results))
     output.document(f"motorbus.{verb}/1", {"devices": results})
     shown = [(f"{one['bus']}#{one['id']}", one.get("error") or one.get("promise") or what) for one in results]
     output.table("", ["device", "result"], shown)
     return _verdict(errors, len(results))
 
 
-def _tried(bus: Bus, node: int, verb: str, errors: list[MotorbusError]) -> dict[str, Any]:
+def _tried(bus: Bus | DryBus, node: int, verb: str, errors: list[MotorbusError]) -> dict[str, Any]:
     try:
         promise = able(face(bus, node), verb)()
     except LinkError:

@@ -8,10 +8,11 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import Target, face, opened, target
-from motorbus.errors import MotorbusError, PortNotFound, RequestError
+from motorbus.cli.target import Target, opened, target
+from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
 
 app = App(
@@ -21,8 +22,10 @@ nothing holds them up then. `motorbus stop` decelerates and holds instead.
 
 A bus that another motorbus process holds is stopped by that process, even if
 its event loop hangs, and stays stopped until that process says reset(). A bus
-that nobody holds is opened and stopped from here; with ids (BUS#1-6) each
-device is asked to acknowledge. A port that a foreign program holds cannot be
+that nobody holds is opened and stopped from here; the stop reaches everyone,
+but only devices that are named (BUS#1-6), or known because they answered
+before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
+some did, 5 when nobody did. A port that a foreign program holds cannot be
 reached: the error names that program. Without BUS, every bus that a motorbus
 process of yours holds is stopped.
 
@@ -54,11 +57,15 @@ def estop(
     stops = [_stop(bus, options, output)] if bus else _stop_all()
     output.document("motorbus.estop/1", {"buses": stops})
     for one in stops:
-        output.text(f"{one['bus']}: {one['error'] or one['promise']}")
-        output.text(
-            f"  by {one['by']}; acknowledged: {_list(one['acknowledged'])}; silent: {_list(one['silent'])}"
-        )
+        output.text("\n  ".join(_lines(one)))
     return _verdict(stops)
+
+
+def _lines(one: dict[str, Any]) -> list[str]:
+    heard = f"stop sent; acknowledged by {_list(one['acknowledged'], 'nobody')}"
+    by = f"by {one['by']}; silent: {_list(one['silent'])}"
+    more = [one["promise"], by, one["note"]]
+    return [f"{one['bus']}: {one['error'] or heard}", *(line for line in more if line)]
 
 
 def _stop(bus: str, options: dict[str, str], output: Output) -> dict[str, Any]:
@@ -72,7 +79,10 @@ def _stop(bus: str, options: dict[str, str], output: Output) -> dict[str, Any]:
         outcome = _ask(port)
     except PortNotFound:
         return _stop_ourselves(wanted, options, output)
-    return _facts(wanted.bus, f"process {owner.pid} ({owner.program})" if owner else "its owner", outcome)
+    unheard = {*outcome.silent, *wanted.nodes} - {*outcome.acknowledged}
+    by = f"process {owner.pid} ({owner.program})" if owner else "its owner"
+    note = "" if wanted.nodes else "only devices that that process knows can acknowledge"
+    return _facts(wanted.bus, by, outcome._replace(silent=tuple(sorted(unheard))), note)
 
 
 def _ask(port: str) -> StopOutcome:
@@ -88,15 +98,25 @@ def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> 
         outcome = opening.estop()
         confirmed, silent = set(outcome.acknowledged), set(outcome.silent)
         for node in wanted.nodes:
-            try:
-                face(opening, node).disable_torque()
-                confirmed.add(node)
-            except MotorbusError:
-                silent.add(node)
+            (confirmed if node in confirmed or _confirms(opening, node) else silent).add(node)
     outcome = outcome._replace(
         acknowledged=tuple(sorted(confirmed)), silent=tuple(sorted(silent - confirmed))
     )
-    return _facts(wanted.bus, "this process", outcome)
+    note = "" if wanted.nodes else f"only devices that are named ({wanted.bus}#1-6) or known can acknowledge"
+    return _facts(wanted.bus, "this process", outcome, note)
+
+
+def _confirms(opening: Bus, node: int) -> bool:
+    """Send this node what its family stops it with; has it acknowledged?"""
+    answers = []
+    for exchange in opening.family.stop({node: None}).exchanges:
+        try:
+            opening.run(exchange)
+        except MotorbusError:
+            answers.append(False)
+        else:
+            answers += [True] if exchange.replies else []  # nobody answers what is said to everyone
+    return bool(answers) and all(answers)
 
 
 def _stop_all() -> list[dict[str, Any]]:
@@ -115,34 +135,39 @@ def _stop_all() -> list[dict[str, Any]]:
         try:
             stops.append(_facts(owner.port, by, _ask(owner.port)))
         except MotorbusError as error:
-            stops.append(
-                {"bus": owner.port, "by": by, "acknowledged": [], "silent": [], "error": error.summary}
-            )
+            heard = {"acknowledged": [], "silent": [], "promise": "", "note": ""}
+            stops.append({"bus": owner.port, "by": by, "outcome": "failed", **heard, "error": error.summary})
     return stops
 
 
-def _facts(bus: str, by: str, outcome: StopOutcome) -> dict[str, Any]:
+def _facts(bus: str, by: str, outcome: StopOutcome, note: str = "") -> dict[str, Any]:
+    """What came of one stop, as plain data. A promise is one of those who acknowledged; nobody, no promise."""
+    some = "some" if outcome.silent else "all known"
+    reached = some if outcome.acknowledged else "nobody"
     return {
         "bus": bus,
         "by": by,
+        "outcome": f"acknowledged by {reached}" if outcome.rounds else "failed",
         "acknowledged": list(outcome.acknowledged),
         "silent": list(outcome.silent),
-        "promise": outcome.promise,
+        "promise": outcome.promise if outcome.acknowledged else "",
+        "note": note,
         "error": "" if outcome.rounds else "no stop was sent",
     }
 
 
-def _list(nodes: list[int]) -> str:
-    return ", ".join(f"#{node}" for node in nodes) or "none"
+def _list(nodes: list[int], nothing: str = "none") -> str:
+    return ", ".join(f"#{node}" for node in nodes) or nothing
 
 
 def _verdict(stops: list[dict[str, Any]]) -> Exit:
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
     if failed and len(failed) == len(stops):
         raise MotorbusError("; ".join(failed))
-    silent = [
-        f"{one['bus']}: no acknowledgement from {_list(one['silent'])}" for one in stops if one["silent"]
-    ]
+    missing = [one for one in stops if not one["error"] and (one["silent"] or not one["acknowledged"])]
+    silent = [f"{one['bus']}: no acknowledgement from {_list(one['silent'], 'anybody')}" for one in missing]
+    if not any(one["acknowledged"] for one in stops):
+        raise NoReply("; ".join([*failed, *silent]), advice="cut the power by hand")
     if failed or silent:
         raise Partial("; ".join([*failed, *silent]), advice="cut the power by hand")
     return Exit.OK

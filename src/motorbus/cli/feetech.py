@@ -5,11 +5,13 @@ The only face that knows this family. Besides its commands it offers the common 
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, quantity, registers
+from motorbus.cli.consent import consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
@@ -32,6 +34,7 @@ NAME: Final = "feetech"
 app = App(name=NAME, help="What only feetech devices can do.", help_epilogue="")
 
 Names = Annotated[str, Parameter(name="NAME=VALUE")]
+Flag = Annotated[bool, Parameter(negative="")]
 Silent = Annotated[Output, Parameter(parse=False)]
 
 
@@ -143,6 +146,8 @@ def reg_write(
     device_: Annotated[str, Parameter(name="BUS#ID")],
     /,
     *assignments: Names,
+    yes: Flag = False,
+    dry_run: Flag = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -154,16 +159,25 @@ def reg_write(
         feetech:PORT#ID, as feetech:/dev/ttyACM0#3
     assignments
         Registers that follow each other, in RAM.
+    yes
+        Do not ask before a way of more than 180 degrees.
+    dry_run
+        Show the frames that would be sent, and send none of them.
     options
         Any option of the bus string, as a flag.
     """
     bus, _, (node,) = _ours(device(device_))
     with opened(bus, options, output) as opening:
-        one = face(opening, node)
+        rehearsal = dry.DryBus(opening)
+        one = face(rehearsal if dry_run else opening, node)
         values = _values(one, assignments)
+        entries = [table_of(one)[name] for name in values]
+        consent_to_ways(goals_among(one, entries, values), output, yes=yes or dry_run)
         one.reg_write(**values)
-        table = table_of(one)
-        rows = registers.facts(one, [table[name] for name in values], values)
+        if dry_run:
+            dry.show(rehearsal, output)
+            return Exit.OK
+        rows = registers.facts(one, entries, values)
     output.document("motorbus.feetech.reg-write/1", {"id": node, "registers": rows})
     registers.show(f"Waiting in #{node} for an action", rows, output)
     return Exit.OK
@@ -178,22 +192,36 @@ Examples:
     motorbus feetech action feetech:/dev/ttyACM0
     motorbus feetech action feetech:/dev/ttyACM0#1"""
 )
-def action(bus: Annotated[str, Parameter(name="BUS[#ID]")], /, *, output: Silent, **options: str) -> Exit:
+def action(
+    bus: Annotated[str, Parameter(name="BUS[#ID]")],
+    /,
+    *,
+    dry_run: Flag = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
     """Carry out what `reg-write` left.
 
     Parameters
     ----------
     bus
         feetech:PORT for everyone, or feetech:PORT#ID.
+    dry_run
+        Show the frames that would be sent, and send none of them.
     options
         Any option of the bus string, as a flag.
     """
     wanted = _ours(target(bus))
     with opened(wanted.bus, options, output) as opening:
+        rehearsal = dry.DryBus(opening)
+        carrier = rehearsal if dry_run else opening
         for node in wanted.nodes:
-            face(opening, node).action()
+            face(carrier, node).action()
         if not wanted.nodes:
-            opening.run(_action_all(opening))
+            carrier.run(_action_all(opening))
+        if dry_run:
+            dry.show(rehearsal, output)
+            return Exit.OK
     output.document("motorbus.feetech.action/1", {"ids": list(wanted.nodes) or "all"})
     output.text(f"action sent to {', '.join(f'#{node}' for node in wanted.nodes) or 'everyone'}")
     return Exit.OK
@@ -275,7 +303,8 @@ def sync_write(
     name: str,
     /,
     *assignments: Annotated[str, Parameter(name="ID=VALUE")],
-    dry_run: Annotated[bool, Parameter(negative="")] = False,
+    yes: Flag = False,
+    dry_run: Flag = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -289,6 +318,8 @@ def sync_write(
         A register in RAM, by name.
     assignments
         For each servo, what the register shall hold.
+    yes
+        Do not ask before a way of more than 180 degrees.
     dry_run
         Show the frames that would be sent, and send none of them.
     options
@@ -304,6 +335,8 @@ def sync_write(
         values: dict[driver.Node, dict[str, Any]] = {
             servo: {name: _value(servo, table_of(servo)[name], texts[node])} for node, servo in servos.items()
         }
+        ways = [goals_among(servo, [table_of(servo)[name]], held) for servo, held in values.items()]
+        consent_to_ways(list(chain.from_iterable(ways)), output, yes=yes or dry_run)
         carrier.run(driver.sync_write(values, rate=opening.rate))
     if dry_run:
         dry.show(rehearsal, output)

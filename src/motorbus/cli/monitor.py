@@ -137,10 +137,13 @@ def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
         return
     from rich.live import Live
 
-    if output.simulated:
-        output.text("simulated")
     with Live(console=output.console(), auto_refresh=False) as screen:
-        yield lambda sample: screen.update(_grid(sample, output), refresh=True)
+
+        def redraw(sample: Sample) -> None:
+            output.mark()  # the bus is open by now
+            screen.update(_grid(sample, output), refresh=True)
+
+        yield redraw
 
 
 def _lines(sample: Sample, output: Output) -> None:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, faces
+from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
-from motorbus.cli.target import able, face, opened, target
+from motorbus.cli.target import able, face, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.dry import DryBus
@@ -24,7 +24,8 @@ app = App(
     name="move",
     usage="Usage: motorbus move BUS#ID=POSITION... [OPTIONS]",
     help_epilogue="""Positions are in rad, or with a unit: 90deg, 0.25turn. Torque goes on by
-itself. A way of more than 180 degrees needs --yes. The goal must lie inside
+itself where devices do that, as FEETECH servos do; `motorbus torque on` first
+elsewhere. A way of more than 180 degrees needs --yes. The goal must lie inside
 the limits of the device. Several devices of one bus begin in the same instant
 where their family can do that. Ctrl-C ends the waiting, not the motion:
 `motorbus stop` does.
@@ -37,8 +38,6 @@ Examples:
     motorbus move feetech:/dev/ttyACM0#3=90deg --dry-run""",
 )
 
-FAR: Final = math.pi
-"""rad; a way that is longer needs consent."""
 
 Flag = Annotated[bool, Parameter(negative="")]
 Goals = dict[int, float]
@@ -78,7 +77,7 @@ def move(
     results = []
     for bus, wanted in _wanted(goals).items():
         with opened(bus, options, output) as opening:
-            _consent(opening, wanted, output, yes=yes or dry_run)
+            consent_to_ways(_ways(opening, wanted, bounds), output, yes=yes or dry_run)
             if dry_run:
                 rehearsal = dry.DryBus(opening)
                 _move(rehearsal, wanted, {**bounds, "wait": False})
@@ -119,18 +118,18 @@ def _nowhere(text: str) -> Any:
     )
 
 
-def _bounds(velocity: str, acceleration: str) -> dict[str, float | None]:
-    return {
-        "velocity": units.parse(velocity, "velocity") if velocity else None,
-        "acceleration": units.parse(acceleration, "acceleration") if acceleration else None,
-    }
+def _bounds(velocity: str, acceleration: str) -> dict[str, float]:
+    """Those that were given: a family whose devices know no acceleration must not be told of one."""
+    given = {"velocity": velocity, "acceleration": acceleration}
+    return {name: units.parse(text, name) for name, text in given.items() if text}
 
 
-def _consent(bus: Bus, goals: Goals, output: Output, *, yes: bool) -> None:
-    ways = {node: abs(goal - able(face(bus, node), "position")()) for node, goal in goals.items()}
-    far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways.items() if way > FAR]
-    if far:
-        output.consent(f"move {', '.join(far)}", yes=yes)
+def _ways(bus: Bus, goals: Goals, bounds: Iterable[str]) -> list[tuple[Any, float]]:
+    """Devices and their goals. Raises RequestError when one does not move, or not within such bounds."""
+    ones = {node: face(bus, node) for node in goals}
+    for one in ones.values():
+        takes(one, "move", bounds)
+    return [(ones[node], goal) for node, goal in goals.items()]
 
 
 def _move(bus: Bus | DryBus, goals: Goals, how: Mapping[str, Any]) -> None:

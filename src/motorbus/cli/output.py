@@ -29,6 +29,7 @@ class Output:
     def __init__(self, *, json: bool = False) -> None:
         self.json = json
         self.simulated = False
+        self._said = False
 
     @property
     def live(self) -> bool:
@@ -46,16 +47,26 @@ class Output:
         if self.json:
             return
         if title:
+            self._said = self.simulated
             self.console().print(self.marked(title), style="bold", markup=False, soft_wrap=True)
         self.draw(self.grid(columns, rows))
 
     def text(self, text: str) -> None:
         """A result that is prose."""
         if not self.json:
+            self._said = self._said or "simulated" in text
+            self.mark()
             self.console().print(text, markup=False, soft_wrap=True)
+
+    def mark(self) -> None:
+        """The first line of what is simulated says so, where nothing before it did."""
+        if self.simulated and not self._said and not self.json:
+            self._said = True
+            print("simulated", flush=True)
 
     def draw(self, table: Table) -> None:
         """Print a table; in a file or a pipe without the blanks that pad it."""
+        self.mark()
         shown = self.console()
         with shown.capture() as drawn:
             shown.print(table)

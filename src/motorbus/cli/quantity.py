@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 
 class Typed(NamedTuple):
-    """What was typed for a row: a number, and whether it is raw."""
+    """What was typed for a row: a number, whether it is raw, and whether it was a choice called by its name."""
 
     number: Value
     raw: bool
+    named: bool = False
 
 
 def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
@@ -29,7 +30,7 @@ def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
     """
     named = {name.casefold(): number for number, name in entry.choices.items()}
     if text.casefold() in named:
-        return Typed(named[text.casefold()], True)
+        return Typed(named[text.casefold()], True, True)
     said = units.raw(text)
     if said is not None or raw:
         return Typed(_whole(entry, text) if said is None else said, True)

@@ -26,6 +26,7 @@ Examples:
 @app.default
 def stop(
     *devices: Annotated[str, Parameter(name="BUS#ID")],
+    dry_run: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -35,7 +36,9 @@ def stop(
     ----------
     devices
         FAMILY:PORT for every device that answers, or FAMILY:PORT#ID for some.
+    dry_run
+        Show the frames that would be sent, and send none of them.
     options
         Any option of the bus string, as a flag.
     """
-    return each("stop", "stop", devices, options, output)
+    return each("stop", "stop", devices, options, output, dry_run=dry_run)

@@ -5,6 +5,7 @@ Whatever can be refused without the port is refused before the port is opened.
 
 from __future__ import annotations
 
+import inspect
 import logging
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -108,6 +109,20 @@ def able(one: Any, verb: str) -> Any:
         raise RequestError(
             f"{one.bus.family.name} devices have no {verb.replace('_', ' ')}", advice="nothing was sent"
         ) from None
+
+
+def takes(one: Any, verb: str, options: Iterable[str]) -> None:
+    """Raises RequestError when a verb of this device lacks one of these options."""
+    function = getattr(getattr(type(one), verb, None), "function", None) or able(one, verb)
+    known = inspect.signature(function).parameters
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known.values()):
+        return
+    for name in options:
+        if name not in known:
+            raise RequestError(
+                f"the {verb.replace('_', ' ')} of {one.bus.family.name} devices has no {name}",
+                advice="leave it out; nothing was sent",
+            )
 
 
 def table_of(one: Any) -> Table:

@@ -28,6 +28,7 @@ def torque(
     switch: Literal["on", "off"],
     /,
     *devices: Annotated[str, Parameter(name="BUS#ID")],
+    dry_run: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -39,8 +40,10 @@ def torque(
         on or off
     devices
         FAMILY:PORT for every device that answers, or FAMILY:PORT#ID for some.
+    dry_run
+        Show the frames that would be sent, and send none of them.
     options
         Any option of the bus string, as a flag.
     """
     verb = "enable_torque" if switch == "on" else "disable_torque"
-    return each(f"torque {switch}", verb, devices, options, output)
+    return each(f"torque {switch}", verb, devices, options, output, dry_run=dry_run)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, quantity, registers
+from motorbus.cli.consent import consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
 from motorbus.cli.target import check_names, device, face, opened, table_of
@@ -25,10 +26,11 @@ app = App(
     name="write",
     usage="Usage: motorbus write BUS#ID NAME=VALUE... [OPTIONS]",
     help_epilogue="""Values are in the unit of the register, or with one of their own: 90deg, 500ms,
-2048raw. Registers kept in EEPROM need --yes, and the device may go limp while
-they are written. With --raw every number is what stands on the wire; raw
-numbers for a register that moves the device need --expert too. --dry-run
-reads, shows each frame that would change something, and sends none of those.
+2048raw. Registers kept in EEPROM need --yes (the device may go limp while they
+are written), and so does a goal more than 180 degrees away. With --raw every
+number is what stands on the wire; raw numbers for a register that moves the
+device need --expert too. --dry-run reads, shows each frame that would change
+something, and sends none of those.
 
 Examples:
 
@@ -42,7 +44,7 @@ Flag = Annotated[bool, Parameter(negative="")]
 
 
 class Order(NamedTuple):
-    """One register, the value it shall have in the row's unit, and whether it was given raw."""
+    """One register, the value it shall have in the row's unit, and whether it was given as a raw number."""
 
     entry: Entry
     value: Value
@@ -74,7 +76,7 @@ def write(
     expert
         Allow raw values in registers that move the device.
     yes
-        Do not ask before writing to EEPROM.
+        Do not ask before writing to EEPROM, or before a way of more than 180 degrees.
     dry_run
         Show the frames that would be sent, and send none of them.
     options
@@ -91,7 +93,10 @@ def write(
             for name, text in wanted.items()
         ]
         _permit(orders, output, expert=expert, yes=yes or dry_run)
-        one.write(**{entry.name: value for entry, value, _ in orders})
+        values = {order.entry.name: order.value for order in orders}
+        ways = goals_among(one, [order.entry for order in orders], values)
+        consent_to_ways(ways, output, yes=yes or dry_run)
+        one.write(**values)
     if dry_run:
         dry.show(rehearsal, output)
     else:
@@ -117,7 +122,7 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
 def _order(one: Any, entry: Entry, typed: Typed) -> Order:
     value = quantity.to_value(one, entry, int(typed.number)) if typed.raw else typed.number
     entry.encode(quantity.to_raw(one, entry, value))  # raises when it is out of range
-    return Order(entry, value, typed.raw)
+    return Order(entry, value, typed.raw and not typed.named)
 
 
 def _permit(orders: Sequence[Order], output: Output, *, expert: bool, yes: bool) -> None:

@@ -1,0 +1,37 @@
+"""What needs somebody's agreement before it moves: one rule for every command that sends a goal, by whatever name."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from motorbus.cli.target import able
+from motorbus.core.operation import Effect
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from motorbus.cli.output import Output
+    from motorbus.core.entry import Entry, Value
+
+FAR: Final = math.pi
+"""rad; a way that is longer needs consent."""
+
+
+def consent_to_ways(goals: Sequence[tuple[Any, float]], output: Output, *, yes: bool) -> None:
+    """Ask before a device goes far from where it stands; goals in rad. Raises NeedsConsent when nobody agrees."""
+    if yes:
+        return
+    ways = [(one.node, abs(goal - able(one, "position")())) for one, goal in goals]
+    far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways if way > FAR]
+    if far:
+        output.consent(f"move {', '.join(far)}", yes=False)
+
+
+def goals_among(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[tuple[Any, float]]:
+    """What of these values, by register, are angles to which writing them sends the device, in rad."""
+    return [
+        (one, float(values[entry.name]))
+        for entry in entries
+        if entry.effect is Effect.MOTION and entry.unit == "rad"
+    ]

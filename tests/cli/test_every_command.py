@@ -1,0 +1,141 @@
+"""Every command on a simulated bus of every family: it does its work, and says that nothing of it was real.
+
+The template, which is out of tree, is found here as an installed family is: by its entry point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import motorbus
+from motorbus import families
+from motorbus.core.operation import CanFrame
+from tests.cli.conftest import Run
+from tests.conformance.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
+from tests.conformance.world import moves
+
+pytestmark = pytest.mark.usefixtures("installed")
+
+COMMON = [
+    "scan BUS",
+    "ping BUS#1+2",
+    "info BUS#1",
+    "info BUS#1 --registers",
+    "read BUS#1",
+    "read BUS#1 present_position",
+    "write BUS#1 LIMIT --yes",
+    "write BUS#1 LIMIT --dry-run",
+    "write BUS#1 goal_position=HERE",
+    "move BUS#1=HERE",
+    "move BUS#1+2=HERE --velocity 1.5",
+    "move BUS#1=HERE --no-wait --dry-run",
+    "torque on BUS#1",
+    "torque on BUS --dry-run",
+    "torque off BUS#1",
+    "torque off BUS#1 --dry-run",
+    "stop BUS#1",
+    "stop BUS#1 --dry-run",
+    "monitor BUS#1 --count 1",
+    "monitor BUS --count 2",
+    "estop BUS#1+2",
+]
+FEETECH = [
+    "ping BUS --broadcast",
+    "estop BUS",
+    "feetech reg-write BUS#1 goal_position=HERE",
+    "feetech reg-write BUS#1 goal_position=HERE --dry-run",
+    "feetech action BUS",
+    "feetech action BUS#1 --dry-run",
+    "feetech sync-read BUS#1+2 present_position",
+    "feetech sync-write BUS goal_position 1=HERE",
+    "feetech sync-write BUS goal_position 1=HERE --dry-run",
+]
+HERE = {"feetech": "3.0", "template": "0.2"}
+"""rad; inside the limits, and near to where a simulated device stands."""
+LIMIT = {"feetech": "max_temperature=65", "template": "max_position=3.0"}
+"""A row in EEPROM."""
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The template as `pip install` would leave it."""
+    folder = tmp_path / "motorbus_template-0.1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: motorbus-template\nVersion: 0.1.0\n")
+    lines = "".join(f"{point.name} = {point.value}\n" for point in template_entry_points())
+    (folder / "entry_points.txt").write_text(f"[{families.GROUP}]\n{lines}")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(TEMPLATE))
+
+
+def words(command: str, family: str, bus: str) -> list[str]:
+    return command.replace("BUS", bus).replace("HERE", HERE[family]).replace("LIMIT", LIMIT[family]).split()
+
+
+@contextmanager
+def standing(family: str) -> Iterator[str]:
+    """Two simulated devices under torque; their bus."""
+    turned = {"broadcast_ping": "in_turn"} if family == "feetech" else {}
+    with motorbus.simulate(family, ids="1-2", **turned) as simulation:
+        with motorbus.open(simulation.url) as bus:
+            for node in (1, 2):
+                bus.family.devices.blocking(bus, node).enable_torque()
+        yield simulation.url
+
+
+CASES = [(family, command) for family in HERE for command in COMMON]
+CASES += [("feetech", command) for command in FEETECH]
+
+
+def test_every_family_that_moves_has_a_place_to_go() -> None:
+    assert {name for name, family in FAMILIES.items() if moves(family)} == set(HERE)
+
+
+@pytest.mark.parametrize(("family", "command"), CASES, ids=lambda value: str(value))
+def test_it_works_and_says_that_it_is_simulated(family: str, command: str, run: Run) -> None:
+    with standing(family) as bus:
+        ran = run(*words(command, family, bus))
+    assert ran.code == 0, ran.err
+    assert "(simulated)" in ran.out or ran.out.startswith("simulated\n")
+    assert ran.out.splitlines().count("simulated") <= 1
+
+
+@pytest.mark.parametrize(("family", "command"), CASES, ids=lambda value: str(value))
+def test_it_says_so_to_programs_too(family: str, command: str, run: Run) -> None:
+    with standing(family) as bus:
+        ran = run(*words(command, family, bus), "--json")
+    assert ran.code == 0, ran.err
+    assert [record["simulated"] for record in ran.records] == [True] * len(ran.records)
+    assert ran.records
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_frames_are_explained(family: str, run: Run) -> None:
+    good = next(vector.data for vector in vectors(family) if vector.valid)
+    flat = good.flat() if isinstance(good, CanFrame) else good
+    ran = run("decode", "--family", family, flat.hex())
+    assert (ran.code, ran.err) == (0, "")
+    assert ": good" in ran.out
+
+
+def test_a_frame_on_can_is_withheld_and_shown(run: Run) -> None:
+    ran = run("write", "template:sim#1", "goal_position=0.2", "--dry-run", "--json")
+    (frame,) = ran.document["withheld"]
+    assert frame["data"].startswith("00 00 02 01 08 02 20 01")
+    assert "request to node 1" in frame["meaning"]
+
+
+def test_an_option_that_a_family_lacks_is_no_order(run: Run) -> None:
+    ran = run("move", "template:sim#1=0.2", "--acceleration", "5")
+    assert (ran.code, ran.out) == (2, "")
+    assert "has no acceleration" in ran.err
+
+
+def test_who_was_named_confirms_the_stop_of_its_own_family(run: Run) -> None:
+    (stop,) = run("estop", "template:sim,ids=1-3#1-3", "--json").document["buses"]
+    assert (stop["acknowledged"], stop["silent"]) == ([1, 2, 3], [])
+    assert "brakes" in stop["promise"]
