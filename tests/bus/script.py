@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from motorbus.bus.ticket import Flight
+from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
-from motorbus.core.operation import Answer, Data, Due, Exchange, Timeout, Tune
+from motorbus.core.operation import Answer, Data, Due, Exchange, Timeout
 from motorbus.families.feetech import FAMILY, wire
 
 READ_LENGTH = 8  # the status frame of a two-byte READ
@@ -65,7 +65,7 @@ class Script:
         self.turns.submit(flight, self.now)
         return flight
 
-    def send(self) -> Data | Tune | None:
+    def send(self) -> Data | Retune | None:
         return self.turns.send(self.now)
 
     def sent(self) -> bytes:

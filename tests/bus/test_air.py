@@ -271,3 +271,16 @@ def test_lengths_take_turns_only_where_the_last_reply_looked_alike() -> None:
         lengths.append((node, request[6]))
         script.feed(wire.encode_status(node, 0, bytes(request[6])))
     assert lengths == [(1, 2), (2, 2), (1, 3), (1, 2), (2, 3)]
+
+
+def test_the_echo_of_an_earlier_write_is_no_answer() -> None:
+    """A WRITE of one byte that nobody acknowledges has the length of the reply to a READ of two."""
+    script = Script()
+    unanswered: Exchange[Answer] = Exchange(wire.write(1, 41, b"\x07"))
+    script.submit(unanswered)
+    echo = script.sent()
+    flight = script.submit(position(1))
+    script.sent()
+    script.feed(echo)
+    assert not flight.done
+    assert script.turns.echo.present is None

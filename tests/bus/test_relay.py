@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import threading
+import time
+
+import pytest
 
 from motorbus.bus.ticket import Flight
+from motorbus.core.operation import Listen, Operation
+from motorbus.errors import NoReply
 from tests.bus.responder import memory_bus, position
 
 
@@ -51,3 +56,26 @@ def test_recovering_when_nothing_is_held_changes_nothing() -> None:
     assert bus.relay.pumper == -1, "another thread's"
     bus.relay.pumper = None
     assert bus.run(position(1)) == 1
+
+
+def test_a_thread_that_waits_for_something_far_away_holds_up_no_deadline() -> None:
+    bus, responder = memory_bus(virtual=False)
+    responder.dead = {2}
+
+    def listen() -> Operation[object]:
+        return (yield from Listen(lambda notice: False, 1.0))
+
+    thread = threading.Thread(target=lambda: bus.run(listen()))
+    thread.start()
+    begun = time.monotonic()
+    while time.monotonic() < begun + 5 and bus.relay.pumper is None:
+        time.sleep(0.001)
+    seconds = []
+    for _ in range(3):
+        before = bus.link.now()
+        with pytest.raises(NoReply):
+            bus.run(position(2))
+        seconds.append(bus.link.now() - before)
+    assert min(seconds) < 0.5, "not only when the listener wakes"
+    thread.join(20)
+    bus.close()

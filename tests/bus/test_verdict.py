@@ -50,6 +50,8 @@ def test_a_write_that_was_not_confirmed_is_unknown_and_shows_what_came() -> None
         b"\x01\x02", (Due(3, 3, 6),), effect=Effect.PERSISTENT, repeatable=True
     )
     flight = Flight(write)
+    assert isinstance(verdict.error(flight, "silence", 1), NoReply), "it never left"
+    flight.left = True
     flight.take(Reply(0, 3, reply(3)[:6]))
     found = verdict.error(flight, "surplus", 2)
     assert isinstance(found, OutcomeUnknown)

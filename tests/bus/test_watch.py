@@ -6,7 +6,10 @@ import asyncio
 import socket
 import threading
 
+import pytest
+
 from motorbus.bus.aio import AsyncBus
+from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.feetech import FAMILY
 from motorbus.link.tcp import TcpLink
 from tests.bus.responder import Responder, async_bus, position
@@ -57,3 +60,41 @@ def test_with_a_descriptor_the_loop_watches_it_and_there_is_no_thread() -> None:
         asyncio.run(main())
         thread.join(10)
     assert not thread.is_alive()
+
+
+def test_a_link_that_is_gone_does_not_keep_the_loop_busy() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        async def main() -> int:
+            link = TcpLink(f"socket://127.0.0.1:{server.getsockname()[1]}", rate=1_000_000)
+            looks = 0
+            async with AsyncBus(link, FAMILY, admit=admit_all) as bus:
+                take = bus.watch.crank
+
+                def counted() -> None:
+                    nonlocal looks
+                    looks += 1
+                    take()
+
+                bus.watch.crank = counted  # type: ignore[method-assign]
+                client, _ = server.accept()
+                client.close()
+                with pytest.raises(MotorbusError):
+                    await bus.run(position(1))
+                looks = 0
+                await asyncio.sleep(0.2)
+                return looks
+
+        assert asyncio.run(main()) <= 2
+
+
+def test_a_bus_that_is_closed_says_so_and_one_loop_may_follow_another() -> None:
+    async def ask(bus: AsyncBus) -> int:
+        return await bus.run(position(1))
+
+    bus, _ = async_bus(virtual=False)
+    assert asyncio.run(ask(bus)) == 1
+    assert asyncio.run(ask(bus)) == 1
+    asyncio.run(bus.close())
+    with pytest.raises(LinkLost):
+        asyncio.run(ask(bus))

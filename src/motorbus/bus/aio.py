@@ -35,7 +35,8 @@ class AsyncBus(BusFace):
         news, loop = asyncio.Event(), asyncio.get_running_loop()
 
         def wake() -> None:
-            loop.call_soon_threadsafe(news.set)
+            with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(news.set)
 
         run = Run(self.turns, operation, now=self.link.now, report=report or self.report, wake=wake)
         while True:

@@ -6,6 +6,7 @@ its exact length are due, nothing trails behind it, and its node may be believed
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 from motorbus.bus import verdict
@@ -43,6 +44,8 @@ class Air:
         self.known: dict[int, Answer | None] = {}
         self.stop = family.stop(self.known)
         self.settled = 0
+        self.known_rate = rate
+        self._recent: deque[Data] = deque(maxlen=8)
         self._flying: dict[int, Flight] = {}
         self._free_at = 0.0
         self._echo_exchange: Exchange[Any] | None = None
@@ -78,12 +81,16 @@ class Air:
         start = max(now, self._free_at)
         air = self.family.air_time(exchange, self.rate)
         flight.sent_at = now
+        flight.left = True
         flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
-        flight.deadline += MARGIN[exchange.timeout]
+        flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
         if exchange.replies == ():
             self._free_at = start + air
         else:
             self._flying[exchange.lane] = flight
+        if exchange.goals:
+            self._know_all([goal.node for goal in exchange.goals])
+        self._recent.append(exchange.request)
         if isinstance(exchange.request, bytes):
             self.echo.sent(exchange.request, flight.parent is not None or exchange is self._echo_exchange)
         self._count_sent(exchange)
@@ -157,7 +164,7 @@ class Air:
         flight = self._flying.get(reply.lane)
         if flight is None:
             self._nobodys(reply, now)
-        elif reply.data == flight.exchange.request and not flight.echo_checked:
+        elif reply.data in self._recent and not flight.echo_checked:
             self.echo.doubted()
             flight.spoiled = "echo"
             self.statistics.other["echo"] += 1
@@ -168,7 +175,8 @@ class Air:
 
     def _is_stale(self, flight: Flight, reply: Reply) -> bool:
         """Only flights that go to doubtful nodes without a probe can meet an older reply of their own kind."""
-        return flight.rank is Rank.STOP and self._late(reply)
+        unasked = flight.rank is Rank.STOP or flight.exchange.replies is ANY
+        return unasked and self._late(reply)
 
     def _late(self, reply: Reply) -> bool:
         if self.trust.late(reply.lane, reply.key, len(reply.data)):
@@ -280,7 +288,8 @@ class Air:
             return
         for index, due in enumerate(dues):
             if index in flight.got and due.node not in flight.unbelieved:
-                self.trust.believe(due, barrier=flight.parent is not None)
+                if flight.rank is not Rank.STOP:  # what a stop cut short may still answer
+                    self.trust.believe(due, barrier=flight.parent is not None)
                 self.statistics.of(due.node).answered(now - flight.sent_at)
                 self._know(due.node, answer if flight.exchange.tells_position else None)
             else:
@@ -290,7 +299,13 @@ class Air:
                     self.trust.of(due.node).quiet_until = now + self._quiet
                 self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
 
+    def _know_all(self, nodes: list[int]) -> None:
+        """Whoever has been ordered to move is to be stopped, whether it has ever answered or not."""
+        for node in nodes:
+            self._know(node, None)
+
     def _know(self, node: int, position: Answer | None) -> None:
+        self.known_rate = self.rate
         if node not in self.known:
             self.known[node] = position
             self.stop = self.family.stop(self.known)
@@ -302,7 +317,7 @@ class Air:
         dues = flight.exchange.replies
         assert dues is not ANY
         for index, due in enumerate(dues):
-            if index not in flight.got:
+            if index not in flight.got and flight.rank is not Rank.STOP:
                 self.trust.missed(lane, due, now, self._quiet)
             else:
                 self.trust.of(due.node).quiet_until = now + self._quiet

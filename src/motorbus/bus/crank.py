@@ -6,10 +6,9 @@ blocking pump, the async pump and the stop thread, so that none of them has poli
 
 from __future__ import annotations
 
-from motorbus.bus.ticket import Flight
+from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
-from motorbus.core.operation import Tune
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, MotorbusError
 from motorbus.link.base import Link
 
 IDLE = 0.25  # s; the longest wait when nothing is awaited from the wire
@@ -63,11 +62,21 @@ def flush(link: Link, turns: Turns) -> float:
     if turns.waiting:
         drain(link, turns, now)
     while (out := turns.send(now)) is not None:
-        if isinstance(out, Tune):
-            link.tune(out.rate)
+        if isinstance(out, Retune):
+            retune(link, turns, out)
         else:
             link.write(out)
     return now
+
+
+def retune(link: Link, turns: Turns, ticket: Retune) -> None:
+    """Change the rate; a link that cannot is no reason to give up anything else."""
+    try:
+        link.tune(ticket.tune.rate)
+    except MotorbusError as error:
+        turns.retuned(ticket, error)
+    else:
+        turns.retuned(ticket)
 
 
 def drain(link: Link, turns: Turns, now: float) -> None:

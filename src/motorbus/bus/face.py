@@ -84,9 +84,17 @@ class BusFace:
     def estop(self) -> StopOutcome:
         """Emergency stop: drop the queue, send the stop frames until acknowledged or five times, and latch.
 
-        Afterwards motion and torque are refused with Interrupted until `reset()`. May be called from any thread.
+        Afterwards motion and torque are refused with Interrupted until `reset()`. May be called from any thread,
+        but not from a signal handler (see `trigger_estop`). Raises LinkLost when the bus is closed.
         """
         return self.stopper.estop()
+
+    def trigger_estop(self) -> None:
+        """Ask the stop thread for an emergency stop and return at once; made for signal handlers.
+
+        Does nothing before the thread is there: on a simulated bus that is the first motion or torque command.
+        """
+        self.stopper.trigger()
 
     def reset(self) -> None:
         """Take the latch of an emergency stop off. Nothing is sent and nothing moves."""

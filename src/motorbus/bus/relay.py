@@ -14,6 +14,7 @@ from motorbus.bus.ticket import Flight
 from motorbus.bus.turns import Turns
 from motorbus.link.base import Link
 
+SHORT = 0.001  # s; the shortest nap
 NAP = 0.05  # s; a waiting thread looks at its own ticket at least this often
 
 
@@ -47,8 +48,9 @@ class Relay:
         """Let time pass: pump, or wait for the thread that does."""
         with self.changed:
             if self.pumper not in (None, get_ident()):
+                take_in(self.link, self.turns, -inf)  # the one who pumps may wait for something far away
                 push(self.link, self.turns)
-                self.changed.wait(NAP)
+                self.changed.wait(min(NAP, max(self.turns.due() - self.link.now(), SHORT)))
                 return
             self.pumper = get_ident()
         try:

@@ -19,15 +19,17 @@ from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
 from typing import NamedTuple
 
-from motorbus.bus.crank import crank
-from motorbus.bus.ticket import Flight
+from motorbus.bus.air import MARGIN
+from motorbus.bus.crank import crank, retune
+from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
-from motorbus.core.operation import ANY, Answer, Exchange
-from motorbus.errors import LinkError, PortNotFound
+from motorbus.core.operation import ANY, Answer, Exchange, Timeout, Tune
+from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
 
 ROUNDS = 5
-ROUND_TIME = 0.25  # s for all frames of one round, whatever the line does
+ROUND_TIME = 0.25  # s for all frames of one round, beyond what they need
+BREATH = 0.05  # s; the shortest round after which something is missing
 CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
 PATIENCE = 5.0  # s that a caller waits for the stop thread
 
@@ -72,9 +74,12 @@ class Stopper:
                 self._pair[1].send(b"!")
 
     def estop(self) -> StopOutcome:
-        """Stop, and wait for the outcome."""
+        """Stop, and wait for the outcome. Raises LinkLost when the bus is closed: nothing can be sent then."""
+        if self._closed:
+            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
         if self.link.virtual:
             return self.stop()
+        self.outcome = None
         self.start()
         self._done.clear()
         self.trigger()
@@ -87,10 +92,11 @@ class Stopper:
         """Latch and send the stop frames; runs in the stop thread, or in the caller's where time is virtual."""
         with self.turns.lock:
             frames = self.turns.latch(self.link.now())
+        self._back_to_known_rate()
         pending = list(frames.exchanges)
         acknowledged: list[int] = []
         rounds = 0
-        while pending and rounds < ROUNDS:
+        while rounds < ROUNDS and (not acknowledged or any(exchange.replies for exchange in pending)):
             rounds += 1
             pending = self._round(pending, acknowledged)
         with self.turns.lock:
@@ -98,30 +104,41 @@ class Stopper:
         silent = tuple(node for node in self.turns.known if node not in acknowledged)
         return StopOutcome(tuple(acknowledged), silent, rounds, frames.promise)
 
+    def _back_to_known_rate(self) -> None:
+        """A scan may be trying another rate; whoever is to stop was last heard at its own."""
+        with self.turns.lock:
+            wanted = self.turns.known_rate
+            if wanted != self.turns.rate:
+                retune(self.link, self.turns, Retune(Tune(wanted), None, None))
+
     def _round(self, exchanges: list[Exchange[Answer]], acknowledged: list[int]) -> list[Exchange[Answer]]:
-        """Send each once; returns those whose acknowledgement is missing."""
+        """Send each once; returns those whose acknowledgement is missing, and those that nobody acknowledges."""
         flights = [Flight(exchange) for exchange in exchanges]
-        limit = self.link.now() + ROUND_TIME + sum(self._air(exchange) for exchange in exchanges)
+        begun = self.link.now()
+        limit = begun + ROUND_TIME + sum(self._time(exchange) for exchange in exchanges)
         with self.turns.lock:
             for flight in flights:
                 self.turns.submit(flight, self.link.now())
         while not all(flight.done for flight in flights) and self.link.now() < limit:
             crank(self.link, self.turns, limit)
-        return [flight.exchange for flight in flights if not self._settled(flight, acknowledged)]
+        left = [flight.exchange for flight in flights if not self._settled(flight, acknowledged)]
+        while any(exchange.replies for exchange in left) and self.link.now() < begun + BREATH:
+            crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
+        return left
 
-    def _air(self, exchange: Exchange[Answer]) -> float:
+    def _time(self, exchange: Exchange[Answer]) -> float:
         turns = self.turns
-        return turns.family.air_time(exchange, turns.rate) + turns.family.turnaround(exchange) + turns.latency
+        air = turns.family.air_time(exchange, turns.rate) + turns.family.turnaround(exchange)
+        return air + turns.latency + MARGIN[Timeout.SCAN]
 
     def _settled(self, flight: Flight, acknowledged: list[int]) -> bool:
         with self.turns.lock:
             if not flight.done:
                 self.turns.abandon(flight)
-        if flight.error is not None:
-            return False
         dues = flight.exchange.replies
-        if dues is not ANY:
-            acknowledged += [due.node for due in dues if due.node not in acknowledged]
+        if flight.error is not None or not dues or dues is ANY:
+            return False
+        acknowledged += [due.node for due in dues if due.node not in acknowledged]
         return True
 
     # -- the thread -----------------------------------------------------------------------------------------
@@ -135,7 +152,8 @@ class Stopper:
                 ready.register(listener, EVENT_READ)
             self._ready.set()
             while not self._closed:
-                self._look(ready, wish, listener)
+                with contextlib.suppress(Exception):  # whatever goes wrong, the next wish must be heard
+                    self._look(ready, wish, listener)
             for key in list(ready.get_map().values()):
                 if key.fileobj not in (wish, listener) and isinstance(key.fileobj, socket.socket):
                     key.fileobj.close()
@@ -187,10 +205,14 @@ def _listening(path: Path | None) -> Iterator[socket.socket | None]:
         yield None
         return
     with socket.socket(socket.AF_UNIX) as listener:
-        path.unlink(missing_ok=True)
-        listener.bind(str(path))
-        path.chmod(0o600)  # before `listen`, until which nobody can connect
-        listener.listen(4)
+        try:
+            path.unlink(missing_ok=True)
+            listener.bind(str(path))
+            path.chmod(0o600)  # before `listen`, until which nobody can connect
+            listener.listen(4)
+        except OSError:  # a full disk must not take the stop away from this process
+            yield None
+            return
         try:
             yield listener
         finally:
@@ -215,6 +237,8 @@ def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
             ) from None
         except OSError as error:
             raise LinkError(f"the process that holds the bus did not answer: {error}") from error
+    if not reply.endswith(b"\n"):
+        raise LinkError("the process that holds the bus ended without answering", received=reply)
     outcome = json.loads(reply)
     return StopOutcome(
         tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]

@@ -84,6 +84,7 @@ class Flight(Ticket):
         "exchange",
         "got",
         "last",
+        "left",
         "noise",
         "parent",
         "sent_at",
@@ -106,6 +107,7 @@ class Flight(Ticket):
         self.parent = parent
         self.tries = 0
         self.abandoned = False
+        self.left = False
         self.echo_checked = False
         self.unbelieved: tuple[int, ...] = ()
         self.reset()

@@ -16,6 +16,7 @@ from motorbus.core.operation import ANY, Due, Exchange, Key
 
 FORGOTTEN_AFTER = 5.0  # s; no device of any family answers this late, so the memory of a request may end
 LONGEST_BACK_OFF = 1.0  # s between probes of a node that stays silent while a group is read
+OUTSTANDING = 256  # kinds of reply remembered for a node that answers nothing
 GROUP_RUN = 8  # group replies of one length in a row; another length costs a byte for each node
 ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding replies
 
@@ -76,6 +77,8 @@ class Trust:
         """This reply did not come in time and may still come."""
         trust = self.of(due.node)
         trust.outstanding[lane, due.key, due.length] = now
+        if len(trust.outstanding) > OUTSTANDING:
+            del trust.outstanding[next(iter(trust.outstanding))]
         trust.quiet_until = now + quiet
 
     def believe(self, due: Due, barrier: bool) -> None:

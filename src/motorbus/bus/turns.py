@@ -29,7 +29,6 @@ from motorbus.core.operation import (
     Notice,
     Rank,
     Timeout,
-    Tune,
 )
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
@@ -65,6 +64,9 @@ class Turns(Air):
         self._claims: deque[Claim] = deque()
         self._holder: object = None
         self._held = 0
+        self._courtesy = (
+            0  # exchanges that waited while somebody had the bus alone; they go before the next claim
+        )
         self._look_at = inf
 
     # -- what is wanted -------------------------------------------------------------------------------------
@@ -105,11 +107,12 @@ class Turns(Air):
             self._held -= 1
             if self._held <= 0:
                 self._holder, self._held = None, 0
+                self._courtesy = sum(map(len, self._queues))
         self._grant_claim()
 
     def _grant_claim(self) -> None:
         for claim in list(self._claims):
-            if self._holder is None and not self._flying:
+            if self._holder is None and not self._flying and not (self._courtesy and self.waiting):
                 self._holder = claim.owner
             if self._holder is claim.owner:
                 self._held += 1
@@ -128,7 +131,7 @@ class Turns(Air):
 
     # -- what goes out --------------------------------------------------------------------------------------
 
-    def send(self, now: float) -> Data | Tune | None:
+    def send(self, now: float) -> Data | Retune | None:
         """What the pump must do next: write this data, change the rate, or (None) wait."""
         self._look_at = inf
         if len(self._flying) >= self.family.window:
@@ -163,7 +166,9 @@ class Turns(Air):
             return None
         return self._launch(flight, now)
 
-    def _try(self, ticket: Flight | Retune, queue: deque[Flight | Retune], now: float) -> Data | Tune | None:
+    def _try(
+        self, ticket: Flight | Retune, queue: deque[Flight | Retune], now: float
+    ) -> Data | Retune | None:
         if ticket.done:
             queue.remove(ticket)
             return None
@@ -184,27 +189,35 @@ class Turns(Air):
             return None
         request = self._launch(ticket, now)
         queue.remove(ticket)
+        self._courtesy = max(0, self._courtesy - 1)
         return request
 
     def _may_go(self, ticket: Flight | Retune) -> bool:
         urgent = isinstance(ticket, Flight) and ticket.rank is Rank.STOP
         if self.stopping and not urgent:
             return False
-        if not urgent and (self._holder is not ticket.owner if self._holder else bool(self._claims)):
+        if not urgent and self._holder is not None and self._holder is not ticket.owner:
+            return False
+        if not urgent and self._holder is None and self._claims and not self._courtesy:
             return False
         if isinstance(ticket, Retune):
             return not self._flying
         return ticket.exchange.lane not in self._flying
 
-    def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Tune | None:
-        before, wanted = self.rate, ticket.tune.rate
+    def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Retune | None:
         queue.remove(ticket)
-        self._settle(ticket, before)
-        if wanted in (0, before):
+        if ticket.tune.rate in (0, self.rate):
+            self._settle(ticket, self.rate)
             return None
-        self.rate = wanted
-        self.receiver = self.family.receiver()
-        return ticket.tune
+        return ticket
+
+    def retuned(self, ticket: Retune, error: MotorbusError | None = None) -> None:
+        """The pump has changed the rate of the link, or the link has refused."""
+        before = self.rate
+        if error is None:
+            self.rate = ticket.tune.rate
+            self.receiver = self.family.receiver()
+        self._settle(ticket, before, error)
 
     def _admitted(self, exchange: Exchange[Any]) -> None:
         if exchange.effect not in GATED or exchange.rank is Rank.STOP:
@@ -263,9 +276,19 @@ class Turns(Air):
 
     def _heard(self, notice: Notice) -> None:
         for ticket in list(self._timers):
-            if isinstance(ticket, Listener) and not ticket.done and ticket.listen.match(notice):
-                self._timers.remove(ticket)
-                self._settle(ticket, notice)
+            if isinstance(ticket, Listener) and not ticket.done:
+                self._tell(ticket, notice)
+
+    def _tell(self, listener: Listener, notice: Notice) -> None:
+        try:
+            if not listener.listen.match(notice):
+                return
+        except Exception as error:  # the listener's own, and nobody else's
+            self._timers.remove(listener)
+            self._settle(listener, error=error)
+        else:
+            self._timers.remove(listener)
+            self._settle(listener, notice)
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
         if flight.parent is not None:
@@ -340,6 +363,9 @@ class Turns(Air):
 
     def lost(self, error: LinkError) -> None:
         """The link is gone: everything awaited fails with this error."""
+        for flight in self._flying.values():
+            for due in () if flight.exchange.replies is ANY else flight.exchange.replies:
+                self.statistics.of(due.node).errors["lost"] += 1
         waiting: list[Ticket] = [*self._flying.values(), *self._timers, *self._claims]
         for queue in self._queues:
             waiting += queue

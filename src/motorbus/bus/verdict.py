@@ -74,7 +74,7 @@ def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
         r.data for r in flight.got.values()
     )
     changes = exchange.effect is not Effect.NONE or not exchange.repeatable
-    made = OutcomeUnknown if changes and dues else ERRORS[kind]
+    made = OutcomeUnknown if changes and dues and flight.left else ERRORS[kind]
     who = f"node {node}" if node is not None else "the bus"
     again = f" ({tries} tries)" if tries > 1 else ""
     what = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from math import inf
 from threading import Thread
 
@@ -24,18 +25,22 @@ class Watch:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Watch the link on this loop; does nothing when it is watched."""
-        if self._loop is not None:
+        if self._loop is loop:
             return
+        self.close()  # the loop before this one is gone
         self._loop = loop
         descriptor = self.link.fileno()
         if descriptor is not None:
-            loop.add_reader(descriptor, self.crank)
+            with contextlib.suppress(ValueError):  # closed: the next look says so
+                loop.add_reader(descriptor, self.crank)
         else:
             Thread(target=self._read, name="motorbus reader", daemon=True).start()
 
     def crank(self) -> None:
         """Everything that can be done without waiting; then be back when something is due."""
-        take_in(self.link, self.turns, -inf)
+        if not take_in(self.link, self.turns, -inf):
+            self.close()  # a dead descriptor would be ready for ever
+            return
         push(self.link, self.turns)
         if self._timer is not None:
             self._timer.cancel()
@@ -51,7 +56,8 @@ class Watch:
         """Watch no longer."""
         loop, self._loop = self._loop, None
         descriptor = self.link.fileno()
-        if loop is not None and descriptor is not None:
-            loop.remove_reader(descriptor)
+        if loop is not None and descriptor is not None and not loop.is_closed():
+            with contextlib.suppress(ValueError, OSError):
+                loop.remove_reader(descriptor)
         if self._timer is not None:
             self._timer.cancel()
