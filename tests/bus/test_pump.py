@@ -140,6 +140,35 @@ def test_an_interrupt_at_any_line_leaves_the_bus_usable(make: Any) -> None:
     assert at > 100, "the whole path was walked"
 
 
+class InterruptTwice(Interrupt):
+    """A second interrupt, some lines after the first."""
+
+    def __init__(self, at: int, later: int) -> None:
+        super().__init__(at)
+        self.later = later
+
+    def __call__(self, frame: FrameType, event: str, argument: object) -> Any:
+        again = super().__call__(frame, event, argument)
+        if event == "line" and again is not None and self.count == self.at + self.later:
+            raise KeyboardInterrupt
+        return again
+
+
+@pytest.mark.parametrize("later", [1, 2, 3, 5, 8, 13, 21, 34, 55, 89])
+def test_a_second_interrupt_shortens_the_clean_up_and_never_skips_it(later: int) -> None:
+    for at in range(1, 600, 7):
+        bus, responder = memory_bus()
+        before = sys.gettrace()
+        sys.settrace(InterruptTwice(at, later))
+        try:
+            bus.run(guarded(1, 9))
+        except KeyboardInterrupt:
+            pass
+        finally:
+            sys.settrace(before)
+        check_usable(bus, responder, at)
+
+
 def test_a_dead_node_among_threads_fails_only_its_own() -> None:
     bus, responder = memory_bus(virtual=False)
     responder.dead = {7}

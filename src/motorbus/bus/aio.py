@@ -1,7 +1,6 @@
-"""The async pump: carries out operations on an event loop.
+"""The async pump: carries out operations on an event loop. Policy is in `turns`, as for the blocking pump.
 
-Over a link with virtual time whoever awaits turns the crank. Policy is in `turns`, as for the blocking pump, and
-`watch` learns from the link when there is something to do.
+Over a link with virtual time whoever awaits turns the crank; elsewhere `watch` learns when there is something to do.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from motorbus.bus.watch import Watch
 from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
-
 NAP = 0.05  # s; a waiting task looks at its own tickets at least this often
 
 
@@ -39,8 +37,11 @@ class AsyncBus(BusFace):
                 loop.call_soon_threadsafe(news.set)
 
         run = Run(self.turns, operation, now=self.link.now, report=report or self.report, wake=wake)
+        caught: BaseException | None = None
         while True:
             try:
+                if caught is not None:
+                    run.interrupt(caught)
                 while not run.advance():
                     await self._turn(news)
                 break
@@ -50,11 +51,10 @@ class AsyncBus(BusFace):
                     crank(self.link, self.turns, inf)
                 raise
             except BaseException as interruption:
-                run.interrupt(interruption)
+                caught = interruption
         return run.result()
 
     async def _turn(self, news: asyncio.Event) -> None:
-        """Let time pass for the other tasks, until there is news."""
         if self.link.virtual:
             crank(self.link, self.turns, inf)
             await asyncio.sleep(0)

@@ -34,14 +34,17 @@ class Bus(BusFace):
             return self._exchange(operation)
         relay = self.relay
         run = Run(self.turns, operation, now=self.link.now, report=report or self.report, wake=relay.wake)
+        caught: BaseException | None = None
         while True:
             try:
+                if caught is not None:
+                    relay.recover()
+                    run.interrupt(caught)
                 while not run.advance():
                     relay.turn()
                 break
-            except BaseException as interruption:
-                relay.recover()
-                run.interrupt(interruption)
+            except BaseException as interruption:  # dealt with above, where a second one is caught too
+                caught = interruption
         return run.result()
 
     def _exchange(self, exchange: Exchange[T]) -> T:

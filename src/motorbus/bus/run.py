@@ -84,6 +84,7 @@ class Run(Generic[T]):
         self.report = report
         self.wake = wake
         self.interruption: BaseException | None = None
+        self.thrown = False
         self.deadline = inf
         self.root = Branch(operation, None)
 
@@ -221,8 +222,9 @@ class Run(Generic[T]):
             self.deadline = self.now() + CLEAN_UP
         else:
             self.deadline = min(self.deadline, self.now() + HURRY)
-            return
-        self._throw(self.root, interruption)
+        if not self.thrown:  # or a second interruption fell into the throwing of the first
+            self._throw(self.root, self.interruption)
+            self.thrown = True
 
     def _throw(self, branch: Branch, interruption: BaseException) -> None:
         if branch.finished:
