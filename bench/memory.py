@@ -26,28 +26,36 @@ def packet(node: int, code: int, parameters: bytes = b"") -> bytes:
     return b"\xff\xff" + body + bytes((~sum(body) & 255,))
 
 
-def _readings(nodes: tuple[int, ...]) -> Iterator[bytes]:
-    return cycle(
-        [
-            b"".join(packet(node, 0, position(node, turn).to_bytes(2, "little")) for node in nodes)
-            for turn in range(COUNTS)
-        ]
-    )
+def _trains(nodes: tuple[int, ...], count: int) -> list[bytes]:
+    """The answers of all these, `count` bytes each, one train for every turn of the readings."""
+    return [
+        b"".join(
+            packet(node, 0, position(node, turn).to_bytes(2, "little").ljust(count, b"\0")) for node in nodes
+        )
+        for turn in range(COUNTS)
+    ]
 
 
 class Wire:
-    """Gives the answer to a request at once; nothing for a request that nobody answers."""
+    """Gives the answer to a request at once; nothing for a request that nobody answers.
+
+    A library may read a byte more than it needs; the readings go on in either form.
+    """
 
     def __init__(self) -> None:
-        self._ready = {
-            packet(1, READ, bytes((POSITION, 2))): _readings(IDS[:1]),
-            packet(254, SYNC_READ, bytes((POSITION, 2, *IDS))): _readings(IDS),
-        }
+        one, all_ = cycle(range(COUNTS)), cycle(range(COUNTS))
+        self._ready: dict[bytes, tuple[Iterator[int], list[bytes]]] = {}
+        for count in (2, 3):
+            self._ready[packet(1, READ, bytes((POSITION, count)))] = one, _trains(IDS[:1], count)
+            self._ready[packet(254, SYNC_READ, bytes((POSITION, count, *IDS)))] = all_, _trains(IDS, count)
 
     def answer(self, request: bytes) -> bytes:
         """The bytes that come back."""
         ready = self._ready.get(request)
-        return next(ready) if ready is not None else self._seldom(request)
+        if ready is None:
+            return self._seldom(request)
+        turns, trains = ready
+        return trains[next(turns)]
 
     def _seldom(self, request: bytes) -> bytes:
         node, code = request[2], request[4]
