@@ -46,7 +46,7 @@ class MemoryLink:
         arrived, self.arrived = self.arrived, []
         return arrived
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         self.rate = rate
 
     def fileno(self) -> int | None:

@@ -34,6 +34,8 @@ logging.getLogger("motorbus").addHandler(
     logging.NullHandler()
 )  # silent until somebody asks; here, for nothing below logs
 HIGHEST_NODE = 0x7FFFFFFF
+ADAPTER = "can://"
+"""Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
 
 Notify = Callable[[object], None]
 
@@ -100,7 +102,10 @@ def _bad_ids(text: str, why: str) -> RequestError:
 
 
 class Opening(NamedTuple):
-    """Everything needed to open a bus, found out and checked beforehand."""
+    """Everything needed to open a bus, found out and checked beforehand.
+
+    `family` as this bus speaks it; `rate` in bit/s, 0 when nobody said; `options` for the simulator or the link.
+    """
 
     family: Family
     port: str
@@ -114,16 +119,18 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     family = families.load(spot.family)
     merged: dict[str, object] = {**spot.options, **options}
     word = "baud" if family.link.kind == "bytes" else "bitrate"
-    rate = _number(word, merged.pop(word, family.link.rate))
+    rate = _number(word, merged.pop(word)) if word in merged else 0
+    settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
     known = {"ids", "model", *(option.name for option in family.link.options)} if simulated else set()
-    unknown = sorted(set(merged) - known)
-    if unknown:
+    rest = {name: value for name, value in merged.items() if name in known or name not in settings}
+    unknown = sorted(set(rest) - known)
+    if unknown and not spot.port.startswith(ADAPTER):
+        allowed = {word, *known, *(option.name for option in family.link.settings)}
         raise RequestError(
-            f"{address!r}: unknown option {unknown[0]!r}",
-            expected=f"one of {', '.join(sorted({word} | known))}",
+            f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
         )
-    return Opening(family, spot.port, rate, merged)
+    return Opening(family.configured(**settings), spot.port, rate, rest)
 
 
 def _number(name: str, value: object) -> int:
@@ -198,14 +205,17 @@ def simulate(
 
 
 def _link(opening: Opening) -> Link:
+    family, rate = opening.family, opening.rate or opening.family.link.rate
     if opening.port == "sim":
         ids = parse_ids(str(opening.options.pop("ids", "1")))
         model = str(opening.options.pop("model", ""))
-        simulator = opening.family.simulator(ids, model, **opening.options)
-        return MemoryLink(simulator, rate=opening.rate, virtual=False, name=f"{opening.family.name}:sim")
+        simulator = family.simulator(ids, model, **opening.options)
+        return MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
     if opening.port.startswith("sim:"):
-        return find(opening.port.removeprefix("sim:"), opening.family.name).link(opening.rate)
-    return open_link(opening.port, rate=opening.rate, kind=opening.family.link.kind)
+        return find(opening.port.removeprefix("sim:"), family.name).link(rate)
+    return open_link(
+        opening.port, rate=opening.rate, usual=family.link.rate, kind=family.link.kind, options=opening.options
+    )
 
 
 def _stop_socket(opening: Opening, link: Link) -> Path | None:

@@ -117,7 +117,7 @@ def test_the_quiet_time_is_no_shorter_than_a_reply(family: Family) -> None:
 
 
 def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(family: Family) -> None:
-    assert family.window >= 1
+    assert family.link.window >= 1
     with world(family) as there:
         for node in IDS:
             assert there.device(node).ping() is True
@@ -127,7 +127,7 @@ def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(family: Fam
         for record in watched:
             flying += 1 if record.direction == "tx" else -1
             most = max(most, flying)
-    assert most == min(family.window, len({family.lane(node) for node in IDS}))
+    assert most == min(family.link.window, len({family.lane(node) for node in IDS}))
 
 
 def probes(family: Family) -> Operation[list[bool]]:

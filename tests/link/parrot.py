@@ -35,7 +35,7 @@ class Parrot:
     def due(self) -> float | None:
         return min((when for when, _ in self.coming), default=None)
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         self.rate = rate
 
 

@@ -134,7 +134,7 @@ class Turns(Air):
     def send(self, now: float) -> Data | Retune | None:
         """What the pump must do next: write this data, change the rate, or (None) wait."""
         self._look_at = inf
-        if len(self._flying) >= self.family.window:
+        if len(self._flying) >= self.family.link.window:
             return None
         if self.paced and now < self._free_at:
             self._look_at = self._free_at
@@ -144,7 +144,7 @@ class Turns(Air):
                 out = self._try(ticket, queue, now)
                 if out is not None:
                     return out
-                if len(self._flying) >= self.family.window:
+                if len(self._flying) >= self.family.link.window:
                     return None
         return None
 

@@ -26,12 +26,21 @@ class Option(NamedTuple):
 
 
 class LinkNeeds(NamedTuple):
-    """What a family asks of its link: `bytes` or `frames`, the usual rate (bit/s), rates worth scanning, options."""
+    """What a family asks of its link.
+
+    `kind`      bytes or frames
+    `rate`      the usual rate (bit/s), and `rates` those worth scanning
+    `options`   of its simulator: what `sim,name=value` takes
+    `settings`  of a bus, simulated or not: what `Family.configured` takes
+    `window`    how many lanes may be in flight at once
+    """
 
     kind: str
     rate: int
     rates: tuple[int, ...] = ()
     options: tuple[Option, ...] = ()
+    settings: tuple[Option, ...] = ()
+    window: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +198,7 @@ class Devices(NamedTuple):
 
 
 class Family(Protocol):
-    """What motorbus knows of a family: eighteen members, no state."""
+    """What motorbus knows of a family: eighteen members, no state (but see `configured`)."""
 
     @property
     def name(self) -> str:
@@ -202,9 +211,10 @@ class Family(Protocol):
     def tables(self) -> Mapping[str, Table]:
         """Every register map by its name."""
 
-    @property
-    def window(self) -> int:
-        """How many lanes may be in flight at once."""
+    def configured(self, **settings: object) -> Family:
+        """This family as one bus speaks it, by its `link.settings`; one per open bus, and it may keep what that bus
+        has taught it. Without settings of its own a family gives itself. Raises RequestError for impossible ones.
+        """
 
     @property
     def devices(self) -> Devices: ...

@@ -19,8 +19,14 @@ T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
 
+ERROR_FLAG: Final = 1 << 29
+"""Set in the identifier of what is no data frame but the adapter's report of a bus error, as SocketCAN does it."""
+REMOTE_FLAG: Final = 1 << 30
+"""Set in the identifier of a remote frame."""
+
+
 class CanFrame(NamedTuple):
-    """One classic CAN data frame: identifier, 0 to 8 data bytes, 29-bit identifier or not."""
+    """One classic CAN frame: identifier (with the flags above), 0 to 8 data bytes, 29-bit identifier or not."""
 
     id: int
     data: bytes
@@ -84,6 +90,13 @@ class Any_(Enum):  # noqa: N801 - typing.Any is taken
 
 
 ANY: Final = Any_.ANY
+
+
+EVERY_LANE: Final = -1
+"""The lane of an exchange that addresses everyone on a bus where each node has a lane of its own.
+
+Its replies are `ANY`; it takes each reply that nobody else awaits, whatever lane that comes on.
+"""
 
 
 class Goal(NamedTuple):
@@ -264,12 +277,18 @@ class Listen:
 
 
 class Tune:
-    """Set the rate of the link, in bit/s, once nothing is in flight; gives the rate it had. 0 only asks."""
+    """Set the rate of the link, in bit/s, once nothing is in flight; gives the rate it had. 0 only asks.
 
-    __slots__ = ("rate",)
+    With `listen_only` the link from then on sends nothing, not even the acknowledge bit of CAN, until it is tuned
+    again: so a bus of unknown rate can be listened to without disturbing it. A serial link is silent anyway while
+    nothing is sent.
+    """
 
-    def __init__(self, rate: int) -> None:
+    __slots__ = ("listen_only", "rate")
+
+    def __init__(self, rate: int, listen_only: bool = False) -> None:
         self.rate: Final = rate
+        self.listen_only: Final = listen_only
 
     def __iter__(self) -> Generator[Step, Any, int]:
         before: int = yield self

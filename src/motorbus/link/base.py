@@ -43,8 +43,11 @@ class Link(Protocol):
         `until` in the past asks without waiting. Raises LinkLost when the port is gone.
         """
 
-    def tune(self, rate: int) -> None:
-        """Change the rate in bit/s. Raises LinkError when the adapter cannot."""
+    def tune(self, rate: int, listen_only: bool = False) -> None:
+        """Change the rate in bit/s, and send nothing from now on if `listen_only`; a serial line is silent anyway.
+
+        Raises LinkError when the adapter cannot do the one or the other.
+        """
 
     def fileno(self) -> int | None:
         """A descriptor that turns readable when something has arrived, or None when there is none."""

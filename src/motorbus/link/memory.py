@@ -77,6 +77,8 @@ class MemoryLink:
         with self._changed:
             now = self.now()
             self._check(now)
+            if self.listen_only:
+                raise LinkError(f"{self.name} only listens: nothing was sent")
             if len(self._under_way) >= BACKLOG:
                 raise LinkError(f"{self.name}: {BACKLOG} requests are under way and nobody reads")
             self._send(Side.HOST, data, now)
@@ -86,8 +88,9 @@ class MemoryLink:
         with self._changed:
             return self._read_virtual(until) if self.virtual else self._read_real(until)
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         self.rate = rate
+        self.listen_only = listen_only
         self.simulator.tune(rate)
 
     def fileno(self) -> int | None:

@@ -143,7 +143,7 @@ class SerialLink:
             raise lost(self.name, "it hung up")
         return [data]
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         time.sleep(max(0.0, self._clear_at - time.monotonic()))  # what is still going out keeps its rate
         if self._serial is None:
             raise lost(self.name, "it is closed")
@@ -225,7 +225,7 @@ class PolledLink:
             except _failures() as error:
                 raise lost(self.name, error) from error
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         with self._turn:
             self._check()
             _retune(self.name, self._serial, rate)

@@ -98,7 +98,7 @@ class TcpLink:
             raise lost(self.name, "the other end closed it")
         return [data]
 
-    def tune(self, rate: int) -> None:
+    def tune(self, rate: int, listen_only: bool = False) -> None:
         if rate != self.rate:
             raise LinkError(
                 f"{self.name}: a raw socket cannot change the rate to {rate} bit/s",

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from motorbus.errors import RequestError
 from motorbus.link.base import Link
 
 SCHEMES = ("socket://HOST:PORT", "rfc2217://HOST:PORT")
 
 
-def open_link(port: str, *, rate: int, kind: str = "bytes") -> Link:
-    """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port` or `rfc2217://host:port`.
+def open_link(
+    port: str,
+    *,
+    rate: int = 0,
+    usual: int = 0,
+    kind: str = "bytes",
+    options: Mapping[str, object] | None = None,
+) -> Link:
+    """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://…` or `can://INTERFACE/CHANNEL`.
 
-    `rate` in bit/s, `kind` what the family wants: bytes or frames. Raises RequestError for what is no port,
+    `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
+    wants: bytes or frames; `options` are for the CAN adapter. Raises RequestError for what is no port,
     PortNotFound, PortBusy (naming its owner) or LinkError.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
+    if scheme == "can" and kind == "frames":
+        from motorbus.link.can import CanLink
+
+        return CanLink(port, rate=rate, usual=usual, options=options or {})
+    rate = rate or usual
     _check(port, scheme, rate, kind)
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
@@ -26,11 +41,13 @@ def open_link(port: str, *, rate: int, kind: str = "bytes") -> Link:
 
 
 def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:
-    if kind == "frames" or scheme == "can":
+    if (kind == "frames") != (scheme == "can"):
         raise RequestError(
-            f"{port!r}: this version has no CAN adapters",
-            cause="they come together with the first CAN family, KST",
-            advice="a simulated bus needs none: write sim in place of the port",
+            f"{port!r}: these devices speak {'CAN' if kind == 'frames' else 'on a serial line'}",
+            expected="can://INTERFACE/CHANNEL, as can://slcan/dev/ttyACM0 or can://socketcan/can0"
+            if kind == "frames"
+            else f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",
+            advice="a simulated bus needs no port: write sim in its place",
         )
     if scheme not in (None, "socket", "rfc2217"):
         raise RequestError(

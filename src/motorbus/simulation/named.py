@@ -48,6 +48,10 @@ class Simulation:
         self.family = family
         self.clock = clock
         self.pace = False
+        named = {option.name for option in family.link.settings}
+        self.settings = {option: value for option, value in options.items() if option in named}
+        taken = {option.name for option in family.link.options}
+        options = {option: value for option, value in options.items() if option in taken or option not in named}
         self.simulator: Simulator = family.simulator(ids, model, **options)
         self._line: Line = PerfectLine()
         self._link: MemoryLink | None = None
@@ -57,8 +61,9 @@ class Simulation:
 
     @property
     def url(self) -> str:
-        """The address that `motorbus.open` takes."""
-        return f"{self.family.name}:sim:{self.name}"
+        """The address that `motorbus.open` takes, with the settings of the bus."""
+        settings = "".join(f",{name}={value}" for name, value in self.settings.items())
+        return f"{self.family.name}:sim:{self.name}{settings}"
 
     @property
     def line(self) -> Line:

@@ -20,7 +20,7 @@ def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
     family: Family = FAMILY
     assert families.load("feetech") is family
     assert motorbus.feetech is feetech
-    assert (family.name, family.window, family.lane(0), family.lane(253)) == ("feetech", 1, 0, 0)
+    assert (family.name, family.link.window, family.lane(0), family.lane(253)) == ("feetech", 1, 0, 0)
     assert family.devices == (Servo, AsyncServo)
     assert list(family.tables) == ["sts"]
 

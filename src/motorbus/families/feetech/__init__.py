@@ -84,7 +84,6 @@ class Feetech:
 
     name: Final = "feetech"
     tables: Final[Mapping[str, Table]] = TABLES
-    window: Final = 1
     devices: Final = Devices(Servo, AsyncServo)
 
     @cached_property
@@ -100,6 +99,9 @@ class Feetech:
             Option("model", str, "sts3215", "model of the simulated servos"),
         )
         return LinkNeeds("bytes", usual, tuple(BAUD_CODES.values()), (*options, *OPTIONS))
+
+    def configured(self, **settings: object) -> Feetech:
+        return self
 
     def lane(self, node: int) -> int:
         return 0
