@@ -36,7 +36,7 @@ from motorbus.errors import (
 )
 
 if TYPE_CHECKING:
-    from motorbus.families import feetech
+    from motorbus.families import feetech, kst
     from motorbus.session import open, open_async, simulate
 
 __version__ = "0.1.0"
@@ -62,6 +62,7 @@ __all__ = [
     "VerificationFailed",
     "WireError",
     "feetech",
+    "kst",
     "open",
     "open_async",
     "simulate",

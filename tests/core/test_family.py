@@ -15,7 +15,7 @@ def test_the_contract_has_at_most_eighteen_members() -> None:
 
 def test_every_member_says_what_it_means_or_has_a_type_that_does() -> None:
     documented = {name for name in members() if vars(Family)[name].__doc__}
-    assert members() - documented <= {"link", "window", "devices", "identify", "receiver"}
+    assert members() - documented <= {"link", "devices", "identify", "receiver"}
 
 
 def test_a_state_knows_what_it_does_not_know() -> None:
