@@ -35,6 +35,8 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
         {"families/feetech/offence.py": "import motorbus.cli"},
         {"plot.py": "import motorbus.cli.output"},
         {"attic.py": "import motorbus.errors"},
+        {"diagnose/offence.py": "import motorbus.cli.output"},
+        {"bus/offence.py": "import motorbus.diagnose.budget"},
     ],
     "families-import-core-and-errors": [
         {"families/feetech/offence.py": "from motorbus.link.base import PerfectLine"},

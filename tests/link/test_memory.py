@@ -6,6 +6,7 @@ from threading import Thread
 
 import pytest
 
+from motorbus.core.can_bits import bits
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Link
@@ -114,10 +115,32 @@ def test_replies_of_one_moment_queue_behind_each_other() -> None:
 def test_a_frame_takes_its_bits() -> None:
     parrot = Parrot()
     link = MemoryLink(parrot, rate=1_000_000, pace=True)
-    link.write(CanFrame(1, bytes(8)))
-    link.write(CanFrame(1, b"", extended=True))
+    frames = [CanFrame(0x625, bytes(8)), CanFrame(0x625, b"", extended=True)]
+    for frame in frames:
+        link.write(frame)
     drain(link)
-    assert [at for at, _ in parrot.heard] == pytest.approx([111e-6, 178e-6])
+    first, second = map(bits, frames)
+    assert [at for at, _ in parrot.heard] == pytest.approx([first * 1e-6, (first + second) * 1e-6])
+
+
+def test_frames_share_one_wire_in_both_directions() -> None:
+    parrot = Parrot(delay=0.0)
+    link = MemoryLink(parrot, rate=1_000_000, pace=True)
+    asked, answered = CanFrame(0x625, b"\x55"), CanFrame(0x5A5, b"\x55")
+    parrot.coming = [(0.0, answered)]
+    link.write(asked)
+    assert link.read(1.0) == [answered]
+    assert link.now() == pytest.approx((bits(asked) + bits(answered)) * 1e-6)
+
+
+def test_a_simulator_that_paces_by_itself_makes_a_paced_link() -> None:
+    parrot = Parrot()
+    parrot.paced = True  # type: ignore[attr-defined]
+    link = MemoryLink(parrot)
+    link.write(PING)
+    assert link.paced
+    link.read(1.0)
+    assert link.now() == DELAY, "and the link adds nothing"
 
 
 def test_without_pace_bytes_arrive_at_once() -> None:

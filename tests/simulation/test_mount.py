@@ -292,11 +292,6 @@ def test_an_echo_comes_before_the_answer(bench: Callable[..., Bench]) -> None:
 # What cannot be.
 
 
-def test_can_frames_need_what_is_not_there_yet() -> None:
-    with closing(TcpListener()) as listener, pytest.raises(RequestError, match="slcan|CAN"):
-        Mount(simulate((1,)), listener, kind="frames")
-
-
 def test_a_simulator_of_frames_is_found_out(bench: Callable[..., Bench]) -> None:
     class Frames(FeetechBus):
         def advance(self, to: float) -> list[tuple[float, Data]]:

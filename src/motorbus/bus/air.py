@@ -1,12 +1,12 @@
 """What is in the air: exchanges under way, what comes in for them, and when each is settled.
 
-Every deadline is fixed when the request leaves and no arriving byte extends it. A reply counts only if its key and
-its exact length are due, nothing trails behind it, and its node may be believed. Turns (the queue) builds on this.
+Every deadline is fixed when the request leaves and no arriving byte extends it. It allows for what flies on other
+lanes, which share the wire: those that flew before, and as many after it as the window lets fly. A reply counts only
+if its key and its exact length are due, nothing trails behind it, and its node may be believed. Turns builds on this.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 from motorbus.bus import verdict
@@ -15,8 +15,22 @@ from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.trust import Trust
+from motorbus.core.can_bits import bits, least
 from motorbus.core.family import Family
-from motorbus.core.operation import ANY, Answer, Data, Exchange, Noise, Notice, Rank, Reply, Timeout
+from motorbus.core.operation import (
+    ANY,
+    EVERY_LANE,
+    Answer,
+    CanFrame,
+    Data,
+    Effect,
+    Exchange,
+    Noise,
+    Notice,
+    Rank,
+    Reply,
+    Timeout,
+)
 
 MARGIN = {  # s; a busy host may run this late without a reply counting as missing
     Timeout.SCAN: 0.002,  # silence is the usual answer here, and a second pass follows
@@ -25,6 +39,8 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
 }
 SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 EARLY = 0.9  # of the air time: a reply sooner than this on a paced link answers an older request
+MOVING = (Effect.TORQUE, Effect.MOTION)
+FRESH = 0.02  # s; an older position is not where a moving device is: stop does not hold there
 
 
 class Air:
@@ -32,6 +48,7 @@ class Air:
 
     def __init__(self, family: Family, *, rate: int, latency: float, paced: bool) -> None:
         self.family = family
+        self.window = family.link.window
         self.rate = rate
         self.latency = latency
         self.paced = paced
@@ -45,10 +62,8 @@ class Air:
         self.stop = family.stop(self.known)
         self.settled = 0
         self.known_rate = rate
-        self._recent: deque[Data] = deque(maxlen=8)
         self._flying: dict[int, Flight] = {}
         self._free_at = 0.0
-        self._echo_exchange: Exchange[Any] | None = None
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
         """This try has failed; the queue decides whether there is another."""
@@ -79,10 +94,12 @@ class Air:
         flight.echo_checked = echo_checked
         self.trust.ask(exchange, now)
         start = max(now, self._free_at)
-        air = self.family.air_time(exchange, self.rate)
+        air = flight.air = self.family.air_time(exchange, self.rate)
         flight.sent_at = now
         flight.left = True
         flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
+        if self._flying:
+            self._share_wire(flight)
         flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
         if exchange.replies == ():
             self._free_at = start + air
@@ -90,9 +107,10 @@ class Air:
             self._flying[exchange.lane] = flight
         if exchange.goals:
             self._know_all([goal.node for goal in exchange.goals])
-        self._recent.append(exchange.request)
+        if exchange.effect and exchange.effect in MOVING and exchange.rank is not Rank.STOP:
+            self._unsettle(exchange)
         if isinstance(exchange.request, bytes):
-            self.echo.sent(exchange.request, flight.parent is not None or exchange is self._echo_exchange)
+            self.echo.sent(exchange.request, flight.parent is not None or exchange is self.echo.test)
         self._count_sent(exchange)
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", exchange.request))
@@ -100,9 +118,18 @@ class Air:
             self._settle(flight, flight.answer(now))
         return exchange.request
 
+    def _share_wire(self, flight: Flight) -> None:
+        """Lanes share one wire: whichever goes first, each may have to wait for all the others, once."""
+        for other in self._flying.values():
+            flight.deadline += other.air
+            if other.beside < self.window - 1 and not other.abandoned:
+                other.deadline += flight.air
+                other.beside += 1
+        flight.beside = len(self._flying)
+
     def expect_echo(self, exchange: Exchange[Any]) -> None:
         """This exchange, sent when the bus is opened, shows whether the adapter echoes."""
-        self._echo_exchange = exchange
+        self.echo.test = exchange
 
     def _count_sent(self, exchange: Exchange[Any]) -> None:
         if exchange.replies is ANY or not exchange.replies:
@@ -162,9 +189,11 @@ class Air:
 
     def _take_reply(self, reply: Reply, now: float) -> None:
         flight = self._flying.get(reply.lane)
+        if EVERY_LANE in self._flying and (flight is None or not flight.awaits(reply)):
+            flight = self._flying[EVERY_LANE]
         if flight is None:
             self._nobodys(reply, now)
-        elif reply.data in self._recent and not flight.echo_checked:
+        elif reply.data in self.echo.recent and not flight.echo_checked:
             self.echo.doubted()
             flight.spoiled = "echo"
             self.statistics.other["echo"] += 1
@@ -231,12 +260,19 @@ class Air:
                 continue
             for event in self.receiver.flush():  # all replies are in, so what is held is surplus
                 self._take(event, now)
-            if self.paced and now < flight.sent_at + EARLY * self.family.air_time(flight.exchange, self.rate):
+            if self.paced and now < flight.sent_at + EARLY * self._least_time(flight.exchange):
                 flight.spoiled = "early"
             if flight.spoiled or flight.surplus:
                 self._lost_try(lane, flight, now)
             else:
                 self._accepted(lane, flight, now)
+
+    def _least_time(self, exchange: Exchange[Any]) -> float:
+        """The least time in which an answer can be here; a family's air time of frames may count the most bits."""
+        request, dues = exchange.request, exchange.replies
+        if not isinstance(request, CanFrame) or dues is ANY:
+            return self.family.air_time(exchange, self.rate)
+        return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / self.rate
 
     def expire(self, now: float) -> None:
         """Settle everything whose moment has passed."""
@@ -278,7 +314,7 @@ class Air:
 
     def _echo_settled(self, flight: Flight) -> None:
         """A test of the echo has ended: nothing but its answer came, or nothing at all."""
-        test = flight.parent is not None or flight.exchange is self._echo_exchange
+        test = flight.parent is not None or flight.exchange is self.echo.test
         if test and self.echo.present is None and not flight.noise:
             self.echo.excluded()
 
@@ -308,9 +344,23 @@ class Air:
         self.known_rate = self.rate
         if node not in self.known:
             self.known[node] = position
-            self.stop = self.family.stop(self.known)
+            self.stop = self.family.stop(dict.fromkeys(self.known))
         elif position is not None:
             self.known[node] = position
+
+    def _unsettle(self, exchange: Exchange[Any]) -> None:
+        """This sets something moving, so where it was last seen is where it is not any more."""
+        dues = () if exchange.replies is ANY else exchange.replies
+        nodes = {due.node for due in dues} | {goal.node for goal in exchange.goals}
+        for node in nodes & set(self.known) if nodes else list(self.known):
+            self.known[node] = None
+
+    def fresh(self, now: float) -> dict[int, Answer | None]:
+        """Whom a stop must reach, each with its last position if that is fresh: see `FRESH`."""
+        return {
+            node: answer if answer is not None and now - answer.at < FRESH else None
+            for node, answer in self.known.items()
+        }
 
     def _lost_try(self, lane: int, flight: Flight, now: float) -> None:
         kind = verdict.fault(flight)

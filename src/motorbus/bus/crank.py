@@ -70,9 +70,9 @@ def flush(link: Link, turns: Turns) -> float:
 
 
 def retune(link: Link, turns: Turns, ticket: Retune) -> None:
-    """Change the rate; a link that cannot is no reason to give up anything else."""
+    """Change the rate, or begin or cease to listen only; a link that cannot is no reason to give up anything else."""
     try:
-        link.tune(ticket.tune.rate)
+        link.tune(ticket.tune.rate, ticket.tune.listen_only or turns.listen_only)
     except MotorbusError as error:
         turns.retuned(ticket, error)
     else:

@@ -7,18 +7,29 @@ then on exactly the bytes sent are taken off what comes in.
 
 from __future__ import annotations
 
+from collections import deque
+from typing import Any
+
+from motorbus.core.operation import Exchange
+
 
 class Echo:
-    """`present` is None while unknown. `strip` takes off what is expected back."""
+    """`present` is None while unknown. `strip` takes off what is expected back.
+
+    `recent` is what was sent lately, `test` the exchange that shows, when the bus is opened, whether there is an echo.
+    """
 
     def __init__(self) -> None:
         self.present: bool | None = None
         self.broken = False
+        self.recent: deque[bytes] = deque(maxlen=8)
+        self.test: Exchange[Any] | None = None
         self._expected = b""
         self._matched = b""
 
     def sent(self, data: bytes, testing: bool) -> None:
         """These bytes leave; `testing` when their answer can tell whether they come back."""
+        self.recent.append(data)
         if self.present or (self.present is None and testing):
             self._expected += data
 

@@ -41,6 +41,7 @@ class BusFace:
             rate=link.rate,
             latency=link.latency,
             paced=link.paced,
+            listen_only=bool(getattr(link, "listen_only", False)),
             admit=self._armed(admit) if admit is not None else None,
         )
         self.changed = Condition(self.turns.lock)

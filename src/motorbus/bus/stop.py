@@ -1,11 +1,12 @@
 """The emergency stop, which goes through whatever happens.
 
 Every bus has one sleeping stop thread, from its first motion or torque command on, and where another process can
-ask for a stop from the moment it is opened (decision record 0015). `estop()` wakes it by one byte
-through a socket pair, so a signal handler may do the same; it latches the turns, writes the stop frames and repeats
-them until every node has acknowledged, or five times. It needs neither the event loop nor the thread that pumps; it
-does need this process and its interpreter lock. Another process asks for it over a local socket beside the lock
-file. Over a link with virtual time there is no thread: the caller turns the crank.
+ask for a stop from the moment it is opened (decision record 0015). `estop()` wakes it by one byte through a socket
+pair, so a signal handler may do the same; it latches the turns, writes the stop frames and repeats them until every
+node has acknowledged, or five times. Where devices must be told a position to hold at, one whose position is not
+fresh is asked for it, and the frame that holds it there follows in the same round. The thread needs neither the event
+loop nor the thread that pumps; it does need this process and its interpreter lock. Another process asks for a stop
+over a local socket beside the lock file. Over a link with virtual time there is no thread: the caller turns the crank.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import json
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
@@ -22,7 +23,8 @@ from typing import NamedTuple
 from motorbus.bus.air import MARGIN
 from motorbus.bus.crank import crank, retune
 from motorbus.bus.ticket import Flight, Retune
-from motorbus.bus.turns import Turns
+from motorbus.bus.turns import GATED, Turns
+from motorbus.core.family import Stop
 from motorbus.core.operation import ANY, Answer, Exchange, Timeout, Tune
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
@@ -93,38 +95,79 @@ class Stopper:
         with self.turns.lock:
             frames = self.turns.latch(self.link.now())
         self._back_to_known_rate()
-        pending = list(frames.exchanges)
         acknowledged: list[int] = []
         rounds = 0
-        while rounds < ROUNDS and (not acknowledged or any(exchange.replies for exchange in pending)):
+        wanting = frames.exchanges
+        while rounds < ROUNDS and not self.turns.listening and (not acknowledged or _answered(wanting)):
             rounds += 1
-            pending = self._round(pending, acknowledged)
+            self._round(wanting, acknowledged)
+            wanting = self._wanting(wanting, acknowledged)
         with self.turns.lock:
             self.turns.stopped()
         silent = tuple(node for node in self.turns.known if node not in acknowledged)
-        return StopOutcome(tuple(acknowledged), silent, rounds, frames.promise)
+        promise = "nothing: the bus only listens" if self.turns.listening else frames.promise
+        return StopOutcome(tuple(acknowledged), silent, rounds, promise)
 
     def _back_to_known_rate(self) -> None:
-        """A scan may be trying another rate; whoever is to stop was last heard at its own."""
-        with self.turns.lock:
-            wanted = self.turns.known_rate
-            if wanted != self.turns.rate:
-                retune(self.link, self.turns, Retune(Tune(wanted), None, None))
+        """A scan may be trying another rate, or only listening; whoever is to stop was last heard at its own."""
+        turns = self.turns
+        with turns.lock:
+            if (turns.known_rate, turns.listen_only) != (turns.rate, turns.listening):
+                retune(self.link, turns, Retune(Tune(turns.known_rate), None, None))
 
-    def _round(self, exchanges: list[Exchange[Answer]], acknowledged: list[int]) -> list[Exchange[Answer]]:
-        """Send each once; returns those whose acknowledgement is missing, and those that nobody acknowledges."""
-        flights = [Flight(exchange) for exchange in exchanges]
-        begun = self.link.now()
-        limit = begun + ROUND_TIME + sum(self._time(exchange) for exchange in exchanges)
+    def _frames(self, nodes: Iterable[int]) -> tuple[Exchange[Answer], ...]:
+        """What stops these nodes as things are now."""
         with self.turns.lock:
-            for flight in flights:
-                self.turns.submit(flight, self.link.now())
+            fresh = self.turns.fresh(self.link.now())
+            stop: Stop = self.turns.family.stop({node: fresh[node] for node in nodes if node in fresh})
+        return stop.exchanges
+
+    def _wanting(
+        self, before: tuple[Exchange[Answer], ...], acknowledged: list[int]
+    ) -> tuple[Exchange[Answer], ...]:
+        """What the next round sends: the frames for those who have not acknowledged, and those for everyone."""
+        missing = [node for node in self.turns.known if node not in acknowledged]
+        if acknowledged and not missing:
+            return ()
+        try:
+            return self._frames(missing)
+        except Exception:  # the family's own; the frames it made before do
+            return tuple(
+                one for one in before if not one.replies or not set(_nodes(one)) <= set(acknowledged)
+            )
+
+    def _round(self, exchanges: Iterable[Exchange[Answer]], acknowledged: list[int]) -> None:
+        """Send each once, and whatever can be sent once a node has said where it is."""
+        begun = self.link.now()
+        flights: list[Flight] = []
+        limit = self._submit(exchanges, flights, begun + ROUND_TIME)
+        asking = {flight for flight in flights if flight.exchange.effect not in GATED}
         while not all(flight.done for flight in flights) and self.link.now() < limit:
             crank(self.link, self.turns, limit)
-        left = [flight.exchange for flight in flights if not self._settled(flight, acknowledged)]
-        while any(exchange.replies for exchange in left) and self.link.now() < begun + BREATH:
+            for flight in [flight for flight in asking if flight.done]:
+                asking.remove(flight)
+                limit = self._submit(self._following(flight), flights, limit)
+        missing = [flight for flight in flights if not self._settled(flight, acknowledged)]
+        while _answered(flight.exchange for flight in missing) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
-        return left
+
+    def _submit(self, exchanges: Iterable[Exchange[Answer]], flights: list[Flight], limit: float) -> float:
+        """Queue them; returns the limit of the round, later by the time they take."""
+        with self.turns.lock:
+            for exchange in exchanges:
+                flights.append(Flight(exchange))
+                limit += self._time(exchange)
+                self.turns.submit(flights[-1], self.link.now())
+        return limit
+
+    def _following(self, asked: Flight) -> list[Exchange[Answer]]:
+        """This node has said where it is: the frames that hold it there."""
+        nodes = _nodes(asked.exchange)
+        if asked.error is not None or not nodes:
+            return []
+        with contextlib.suppress(Exception):  # the family's own; the next round asks again
+            return [one for one in self._frames(nodes) if one.effect in GATED and _nodes(one)]
+        return []
 
     def _time(self, exchange: Exchange[Answer]) -> float:
         turns = self.turns
@@ -135,10 +178,11 @@ class Stopper:
         with self.turns.lock:
             if not flight.done:
                 self.turns.abandon(flight)
-        dues = flight.exchange.replies
-        if flight.error is not None or not dues or dues is ANY:
+        exchange = flight.exchange
+        if flight.error is not None or not _nodes(exchange):
             return False
-        acknowledged += [due.node for due in dues if due.node not in acknowledged]
+        if exchange.effect in GATED:  # what only asks stops nobody
+            acknowledged += [node for node in _nodes(exchange) if node not in acknowledged]
         return True
 
     # -- the thread -----------------------------------------------------------------------------------------
@@ -196,6 +240,16 @@ class Stopper:
             self._thread.join(PATIENCE)
         for end in self._pair or ():
             end.close()
+
+
+def _nodes(exchange: Exchange[Answer]) -> list[int]:
+    """Who acknowledges this."""
+    return [] if exchange.replies is ANY else [due.node for due in exchange.replies]
+
+
+def _answered(exchanges: Iterable[Exchange[Answer]]) -> bool:
+    """Is one of them acknowledged by somebody?"""
+    return any(exchange.replies for exchange in exchanges)
 
 
 @contextlib.contextmanager

@@ -79,6 +79,8 @@ class Flight(Ticket):
 
     __slots__ = (
         "abandoned",
+        "air",
+        "beside",
         "complete",
         "echo_checked",
         "exchange",
@@ -109,6 +111,8 @@ class Flight(Ticket):
         self.abandoned = False
         self.left = False
         self.echo_checked = False
+        self.air = 0.0
+        self.beside = 0
         self.unbelieved: tuple[int, ...] = ()
         self.reset()
 
@@ -126,6 +130,14 @@ class Flight(Ticket):
     @property
     def rank(self) -> Rank:
         return self.exchange.rank
+
+    def awaits(self, reply: Reply) -> bool:
+        """Is this one of the replies due that have not come yet?"""
+        dues = self.exchange.replies
+        return dues is ANY or any(
+            key == reply.key and length == len(reply.data) and index not in self.got
+            for index, (_, key, length) in enumerate(dues)
+        )
 
     def take(self, reply: Reply) -> bool:
         """Is this one of the replies due? Keeps it if so."""

@@ -21,29 +21,21 @@ from motorbus.bus import verdict
 from motorbus.bus.air import Air
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
-from motorbus.core.operation import (
-    ANY,
-    Data,
-    Effect,
-    Exchange,
-    Notice,
-    Rank,
-    Timeout,
-)
+from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Timeout
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 RETRIES = 2  # of a repeatable exchange, after the first try
 GATED = (Effect.MOTION, Effect.TORQUE)
-KEPT = (
-    Effect.PERSISTENT,
-    Effect.IDENTITY,
-)  # an emergency stop lets these follow it, so that locks get closed
+KEPT = (Effect.PERSISTENT, Effect.IDENTITY)  # a stop lets these follow it, so that locks get closed
 
 Admit = Callable[[Exchange[Any]], None]
 
 
 class Turns(Air):
-    """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link."""
+    """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link.
+
+    While the link is `listening` every exchange is refused; one that was opened `listen_only` never speaks.
+    """
 
     def __init__(
         self,
@@ -52,9 +44,11 @@ class Turns(Air):
         rate: int,
         latency: float = 0.0,
         paced: bool = False,
+        listen_only: bool = False,
         admit: Admit | None = None,
     ) -> None:
         super().__init__(family, rate=rate, latency=latency, paced=paced)
+        self.listen_only = self.listening = listen_only
         self.admit = admit
         self.lock = RLock()
         self.latched = False
@@ -64,9 +58,7 @@ class Turns(Air):
         self._claims: deque[Claim] = deque()
         self._holder: object = None
         self._held = 0
-        self._courtesy = (
-            0  # exchanges that waited while somebody had the bus alone; they go before the next claim
-        )
+        self._courtesy = 0  # exchanges that waited while somebody was alone; they go before the next claim
         self._look_at = inf
 
     # -- what is wanted -------------------------------------------------------------------------------------
@@ -134,7 +126,7 @@ class Turns(Air):
     def send(self, now: float) -> Data | Retune | None:
         """What the pump must do next: write this data, change the rate, or (None) wait."""
         self._look_at = inf
-        if len(self._flying) >= self.family.link.window:
+        if len(self._flying) >= self.window:
             return None
         if self.paced and now < self._free_at:
             self._look_at = self._free_at
@@ -144,14 +136,14 @@ class Turns(Air):
                 out = self._try(ticket, queue, now)
                 if out is not None:
                     return out
-                if len(self._flying) >= self.family.link.window:
+                if len(self._flying) >= self.window or self._awaits_silence(ticket):
                     return None
         return None
 
     def short(self, flight: Flight, now: float) -> Data | None:
         """The short path: launch at once when the bus is idle and the node is clean; None means queue it."""
         exchange = flight.exchange
-        if not self.idle or (self.paced and now < self._free_at):
+        if not self.idle or self.listening or (self.paced and now < self._free_at):
             return None
         if exchange.replies is not ANY:
             nodes = self.trust.nodes
@@ -176,6 +168,10 @@ class Turns(Air):
             return None
         if isinstance(ticket, Retune):
             return self._retune(ticket, queue)
+        if self.listening:
+            queue.remove(ticket)
+            self._settle(ticket, error=verdict.listening(ticket.exchange))
+            return None
         probe = self._probe(ticket, now)
         if probe is not None:
             return self._launch(probe, now)
@@ -193,20 +189,27 @@ class Turns(Air):
         return request
 
     def _may_go(self, ticket: Flight | Retune) -> bool:
+        if isinstance(ticket, Retune):
+            return self._has_turn(ticket) and not self._flying
+        return self._has_turn(ticket) and ticket.exchange.lane not in self._flying
+
+    def _awaits_silence(self, ticket: Flight | Retune) -> bool:
+        """A change of rate waits until nothing flies, so nothing behind it in its queue may take off before it."""
+        return isinstance(ticket, Retune) and not ticket.done and self._has_turn(ticket)
+
+    def _has_turn(self, ticket: Flight | Retune) -> bool:
+        """Nobody else has the bus alone or is about to have it."""
         urgent = isinstance(ticket, Flight) and ticket.rank is Rank.STOP
         if self.stopping and not urgent:
             return False
         if not urgent and self._holder is not None and self._holder is not ticket.owner:
             return False
-        if not urgent and self._holder is None and self._claims and not self._courtesy:
-            return False
-        if isinstance(ticket, Retune):
-            return not self._flying
-        return ticket.exchange.lane not in self._flying
+        return urgent or self._holder is not None or not self._claims or bool(self._courtesy)
 
     def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Retune | None:
         queue.remove(ticket)
-        if ticket.tune.rate in (0, self.rate):
+        tune, there = ticket.tune, (self.rate, self.listening)
+        if not tune.rate or (tune.rate, tune.listen_only or self.listen_only) == there:
             self._settle(ticket, self.rate)
             return None
         return ticket
@@ -216,6 +219,7 @@ class Turns(Air):
         before = self.rate
         if error is None:
             self.rate = ticket.tune.rate
+            self.listening = ticket.tune.listen_only or self.listen_only
             self.receiver = self.family.receiver()
         self._settle(ticket, before, error)
 
@@ -334,10 +338,8 @@ class Turns(Air):
     def latch(self, now: float) -> Stop:
         """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""
         self.latched = self.stopping = True
-        with contextlib.suppress(
-            Exception
-        ):  # with the last positions; if that fails, the frames made before do
-            self.stop = self.family.stop(self.known)
+        with contextlib.suppress(Exception):  # if it fails, the frames made before, without positions, do
+            self.stop = self.family.stop(self.fresh(now))
         for queue in self._queues:
             for ticket in list(queue):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:

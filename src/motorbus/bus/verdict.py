@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import ANY, Effect
+from motorbus.core.operation import ANY, Effect, Exchange
 from motorbus.errors import (
     ChecksumError,
     FramingError,
@@ -11,6 +13,7 @@ from motorbus.errors import (
     MotorbusError,
     NoReply,
     OutcomeUnknown,
+    RequestError,
     UnexpectedReply,
 )
 
@@ -101,6 +104,16 @@ def latched() -> Interrupted:
         "the bus is stopped: an emergency stop is latched",
         cause="estop() was called, here or by `motorbus estop` from another process",
         advice="when it is safe, call reset() on the bus, in the process that owns it",
+    )
+
+
+def listening(exchange: Exchange[Any]) -> RequestError:
+    """The error for an exchange while the link only listens."""
+    return RequestError(
+        "the bus only listens: nothing was sent",
+        sent=exchange.request,
+        cause="it was opened listen-only, or an operation listens for the bit rate",
+        advice="open the bus without listen-only to speak on it",
     )
 
 

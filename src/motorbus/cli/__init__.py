@@ -37,13 +37,14 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "read": "Read registers, or the telemetry, of a device.",
         "monitor": "Watch devices: position, velocity, load, current, voltage, temperature, alarms.",
         "decode": "Explain the bytes of frames, and why a bad one is bad.",
+        "budget": "Say what a control loop would load a bus with, and how fast it can be.",
     },
     Group("Act", sort_key=2): {
         "write": "Write registers of a device.",
         "move": "Move devices to positions, several of them together.",
         "torque": "Switch the power stage on or off.",
         "stop": "Decelerate and hold.",
-        "estop": "Emergency stop: cut the torque of a bus at once, from any shell.",
+        "estop": "Emergency stop: stop a bus at once, from any shell.",
     },
     Group("Without hardware", sort_key=3): {
         "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
@@ -85,6 +86,7 @@ _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#I
 
     feetech:/dev/ttyACM0               feetech:COM7,baud=500000
     feetech:socket://10.0.0.7:4000     feetech:sim,ids=1-6
+    kst:can://slcan/dev/ttyACM0        kst:can://socketcan/can0,bitrate=500000
 
 `motorbus COMMAND --help` shows examples. Exit codes: 0 ok, 1 failure, 2 usage,
 3 port not found, 4 port busy, 5 no reply, 6 partial, 7 device refused,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
 from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Rank, Together
 from motorbus.errors import MotorbusError
@@ -102,10 +103,10 @@ def _answering(exchange: Exchange[Any]) -> set[int]:
 def show(dry: DryBus, output: Output) -> None:
     """Print what was withheld, each frame explained."""
     explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.family.explain(frame)]
-    facts = [{"data": one.data.hex(" ").upper(), "meaning": meaning} for one, meaning in explained]
+    facts = [{**frames.facts(one.data, dry.family), "meaning": meaning} for one, meaning in explained]
     output.document("motorbus.dry-run/1", {"withheld": facts})
     for one, meaning in explained:
-        output.text(f"would send {one.data.hex(' ').upper()}\n           {meaning}")
+        output.text(f"would send {frames.shown(one.data, dry.family)}\n           {meaning}")
 
 
 def _meaning(one: Explanation) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.target import able, everyone, face, gathered, opened
+from motorbus.cli.target import able, everyone, face, gathered, offers, opened, target
 from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
@@ -28,11 +28,15 @@ def each(
 ) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
 
-    A dry run shows what would be sent, and sends none of it.
+    Where a family has no such verb nothing is opened: RequestError. A dry run shows what would be sent, and sends
+    none of it.
     """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
-    for name, nodes in gathered(devices).items():
+    wanted = gathered(devices)
+    for name in wanted:
+        offers(target(name).family, verb)
+    for name, nodes in wanted.items():
         with opened(name, options, output) as bus:
             visited = everyone(name, bus, nodes, output)
             rehearsal = DryBus(bus)

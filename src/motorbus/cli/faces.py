@@ -5,6 +5,9 @@ A family's face is the module of its name in this folder. Apart from its own com
     move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, all begun in the same instant
     Train(bus, nodes)                                          what a control loop of several nodes does each cycle
     ping_everyone(bus)                                         the nodes that answer one broadcast
+    budget_frames(family, node)                                what a loop says to a node ("read", "write"): for each
+                                                               frame of that exchange all that it may be
+    report_frames(family, node)                                all that a report of a node may be
 
 A family that lacks one of them is served by the common verbs, or the command says that it cannot be done.
 """

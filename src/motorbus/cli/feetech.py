@@ -1,4 +1,4 @@
-"""What only FEETECH servos can do: writes that wait for a trigger, and many servos in one packet.
+"""What only FEETECH servos can do: writes that wait for a trigger, many servos in one packet, back as shipped.
 
 The only face that knows this family. Besides its commands it offers the common ones what `faces.py` names.
 """
@@ -36,9 +36,6 @@ app = App(name=NAME, help="What only feetech devices can do.", help_epilogue="")
 Names = Annotated[str, Parameter(name="NAME=VALUE")]
 Flag = Annotated[bool, Parameter(negative="")]
 Silent = Annotated[Output, Parameter(parse=False)]
-
-
-# -- what common commands use --------------------------------------------------------------------------------
 
 
 class Train:
@@ -110,9 +107,6 @@ def ping_everyone(bus: Bus) -> list[int]:
         return sorted({reply.data[2] for reply in answer.replies})
 
     return bus.run(Exchange(request, ANY, read, rank=Rank.POLL))
-
-
-# -- commands ------------------------------------------------------------------------------------------------
 
 
 def _ours(found: Target) -> Target:
@@ -358,3 +352,47 @@ def _by_id(wanted: Target, assignments: Sequence[str]) -> dict[int, str]:
     for node in texts:
         wanted.family.devices.blocking(None, node)  # raises when it is no id
     return texts
+
+
+@app.command(
+    usage="Usage: motorbus feetech factory-restore BUS#ID [OPTIONS]",
+    help_epilogue="""Examples:
+
+    motorbus feetech factory-restore feetech:/dev/ttyACM0#3 --dry-run
+    motorbus feetech factory-restore feetech:/dev/ttyACM0#3 --yes""",
+)
+def factory_restore(
+    device_: Annotated[str, Parameter(name="BUS#ID")],
+    /,
+    *,
+    yes: Flag = False,
+    dry_run: Flag = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
+    """Set a servo back as shipped; it goes limp, and keeps its id as a rule.
+
+    Parameters
+    ----------
+    device_
+        feetech:PORT#ID, as feetech:/dev/ttyACM0#3
+    yes
+        Do not ask before everything in EEPROM is overwritten.
+    dry_run
+        Show the frames that would be sent, and send none of them.
+    options
+        Any option of the bus string, as a flag.
+    """
+    bus, _, (node,) = _ours(device(device_))
+    output.consent(f"overwrite all settings of #{node}, and let it go limp", yes=yes or dry_run)
+    with opened(bus, options, output) as opening:
+        rehearsal = dry.DryBus(opening)
+        found = face(rehearsal if dry_run else opening, node).factory_restore()
+    if dry_run:
+        dry.show(rehearsal, output)
+        return Exit.OK
+    output.document(
+        "motorbus.feetech.factory-restore/1", {"id": node, "found": found.node, "baud": found.rate}
+    )
+    output.text(f"#{node} is as shipped; it answers as #{found.node} at {found.rate} bit/s")
+    return Exit.OK

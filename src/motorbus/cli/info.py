@@ -9,14 +9,14 @@ from cyclopts import App, Parameter
 from motorbus.cli import registers as table_rows
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
-from motorbus.cli.target import device, face, opened, table_of
+from motorbus.cli.target import device, face, id_shown, opened, table_of
 from motorbus.core.entry import Storage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from motorbus.core.entry import Entry, Table
-    from motorbus.core.family import Identity
+    from motorbus.core.family import Family, Identity
 
 app = App(
     name="info",
@@ -50,13 +50,13 @@ def info(
     options
         Any option of the bus string, as a flag.
     """
-    bus, _, (node,) = device(device_)
+    bus, family, (node,) = device(device_)
     with opened(bus, options, output) as opening:
         one = face(opening, node)
         identity: Identity = one.identify()
         entries = _entries(table_of(one), everything=registers)
         values = one.read(*(entry.name for entry in entries))
-    _show(identity, table_rows.facts(one, entries, values), registers, output)
+    _show(identity, family, table_rows.facts(one, entries, values), registers, output)
     return Exit.OK
 
 
@@ -70,12 +70,15 @@ def _bounds(entry: Entry) -> bool:
     return entry.storage is Storage.EEPROM and bool({"min", "max", "limit"} & set(entry.name.split("_")))
 
 
-def _show(identity: Identity, rows: Sequence[dict[str, Any]], registers: bool, output: Output) -> None:
+def _show(
+    identity: Identity, family: Family, rows: Sequence[dict[str, Any]], registers: bool, output: Output
+) -> None:
     known = {"id": identity.node, "model": identity.model, "firmware": identity.firmware}
     named = {**known, "table": identity.table, **identity.details}
     title = "registers" if registers else "limits"
     output.document("motorbus.info/1", {**named, title: rows})
-    words = {**named, "table": identity.table or "unknown firmware: read only"}
+    table = identity.table or "unknown firmware: read only"
+    words = {**named, "id": id_shown(identity.node, family), "table": table}
     output.table(identity.model, ["", ""], words.items())
     if rows:
         output.text("")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
@@ -15,7 +15,7 @@ from motorbus.core.operation import Pause
 from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.core.family import State
@@ -25,7 +25,8 @@ app = App(
     name="monitor",
     usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
     help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
-that does not answer keeps its row and is asked again.
+that does not answer keeps its row and is asked again. What no device tells has
+no column.
 
 Examples:
 
@@ -132,8 +133,9 @@ def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit
 
 @contextmanager
 def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
+    told: set[str] = set()
     if not output.live:
-        yield lambda sample: _lines(sample, output)
+        yield lambda sample: _lines(sample, output, told)
         return
     from rich.live import Live
 
@@ -141,12 +143,12 @@ def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
 
         def redraw(sample: Sample) -> None:
             output.mark()  # the bus is open by now
-            screen.update(_grid(sample, output), refresh=True)
+            screen.update(_grid(sample, output, told), refresh=True)
 
         yield redraw
 
 
-def _lines(sample: Sample, output: Output) -> None:
+def _lines(sample: Sample, output: Output, told: set[str]) -> None:
     for (bus, node), state in sample.items():
         named: dict[str, object] = {"bus": bus, "id": node}
         if isinstance(state, MotorbusError):
@@ -154,32 +156,40 @@ def _lines(sample: Sample, output: Output) -> None:
         else:
             output.document("motorbus.monitor/1", {**named, **state_facts(state)})
     if not output.json:
-        output.draw(_grid(sample, output))
+        output.draw(_grid(sample, output, told))
 
 
-COLUMNS = (
-    ">id",
-    ">position (rad)",
-    ">velocity (rad/s)",
-    ">load (%)",
-    ">current (A)",
-    ">voltage (V)",
-    ">temperature (°C)",
-    "moving",
-    "alarm",
-)
-_DIGITS = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltage": 1, "temperature": 0}
+COLUMNS: Final = {
+    "position": ">position (rad)",
+    "velocity": ">velocity (rad/s)",
+    "load": ">load (%)",
+    "current": ">current (A)",
+    "voltage": ">voltage (V)",
+    "temperature": ">temperature (°C)",
+    "moving": "moving",
+}
+_DIGITS: Final = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltage": 1, "temperature": 0}
 
 
-def _grid(sample: Sample, output: Output) -> Any:
-    return output.grid(COLUMNS, [_row(node, state) for (_, node), state in sample.items()])
+def _grid(sample: Sample, output: Output, told: set[str]) -> Any:
+    """A column for each thing that a device has told so far; all of them while none has told anything."""
+    states = [state for state in sample.values() if not isinstance(state, MotorbusError)]
+    told |= {name for name in COLUMNS if any(getattr(state, name) is not None for state in states)}
+    names = [name for name in COLUMNS if name in told or not told]
+    columns = [">id", *(COLUMNS[name] for name in names), "alarm"]
+    return output.grid(columns, [_row(node, state, names) for (_, node), state in sample.items()])
 
 
-def _row(node: int, state: State | MotorbusError) -> tuple[object, ...]:
+def _row(node: int, state: State | MotorbusError, names: Sequence[str]) -> tuple[object, ...]:
     if isinstance(state, MotorbusError):
-        return (node, *("" for _ in _DIGITS), "", state.summary)
-    values = (_value(getattr(state, name), name) for name in _DIGITS)
-    return (node, *values, "yes" if state.moving else "", ", ".join(state.alarm))
+        return (node, *("" for _ in names), state.summary)
+    return (node, *(_told(state, name) for name in names), ", ".join(state.alarm))
+
+
+def _told(state: State, name: str) -> str:
+    if name == "moving":
+        return "yes" if state.moving else ""
+    return _value(getattr(state, name), name)
 
 
 def _value(value: float | None, name: str) -> str:

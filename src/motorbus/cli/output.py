@@ -136,6 +136,11 @@ class Bar:
         self._shown = shown
         self._task = task
 
+    @property
+    def shown(self) -> bool:
+        """Somebody watches it."""
+        return self._shown is not None
+
     def advance(self, done: float, total: float, what: str = "") -> None:
         """`done` of `total` units of work."""
         if self._shown is not None and self._task is not None:

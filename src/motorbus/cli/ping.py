@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import face, gathered, nobody, opened
+from motorbus.cli.target import face, gathered, nobody, opened, rate_word, target
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def ping(
     output.document("motorbus.ping/1", {"devices": answers})
     rows = [(a["id"], "yes" if a["answers"] else "NO", a["milliseconds"]) for a in answers]
     output.table("", [">id", "answers", ">ms"], rows)
-    return _verdict(answers)
+    return _verdict(answers, devices)
 
 
 def _wanted(devices: tuple[str, ...], broadcast: bool) -> dict[str, tuple[int, ...]]:
@@ -91,15 +91,16 @@ def _ask(opening: Bus, bus: str, node: int) -> dict[str, object]:
     return {"bus": bus, "id": node, "answers": answers, "milliseconds": took if answers else None}
 
 
-def _verdict(answers: list[dict[str, object]]) -> Exit:
+def _verdict(answers: list[dict[str, object]], devices: tuple[str, ...]) -> Exit:
     silent = [answer["id"] for answer in answers if not answer["answers"]]
     if not silent:
         return Exit.OK
     names = ", ".join(f"#{node}" for node in silent)
     if len(silent) == len(answers):
+        rate = rate_word(target(devices[0]).family)
         raise NoReply(
             f"no answer from {names}",
             cause="no power, a loose cable, another id or another rate",
-            advice="`motorbus scan BUS --baud all` looks for every id at every rate",
+            advice=f"`motorbus scan BUS --{rate} all` looks for every id at every rate",
         )
     raise Partial(f"no answer from {names}")

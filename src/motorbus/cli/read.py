@@ -84,7 +84,9 @@ def state_facts(state: State) -> dict[str, object]:
 
 def _telemetry(state: State, node: int, output: Output) -> None:
     output.document("motorbus.telemetry/1", {"id": node, **state_facts(state)})
-    rows = [(name, quantity.shown(getattr(state, name), unit)) for name, unit in UNITS.items()]
-    moving = "" if state.moving is None else ("yes" if state.moving else "no")
-    rows += [("moving", moving), ("alarm", ", ".join(state.alarm) or "none")]
+    told = {name: getattr(state, name) for name in UNITS if getattr(state, name) is not None}
+    rows = [(name, quantity.shown(value, UNITS[name])) for name, value in told.items()]
+    if state.moving is not None:
+        rows.append(("moving", "yes" if state.moving else "no"))
+    rows.append(("alarm", ", ".join(state.alarm) or "none"))
     output.table(f"#{node}", ["", "value"], rows)

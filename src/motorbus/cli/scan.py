@@ -8,25 +8,30 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
-from motorbus.cli.target import nobody, opened, target
+from motorbus.cli.target import id_shown, nobody, opened, rate_word, target
 from motorbus.core.family import Found
 from motorbus.core.operation import Progress
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from motorbus.cli.output import Bar
+    from motorbus.cli.target import Target
     from motorbus.core.family import Family
 
 app = App(
     name="scan",
-    help_epilogue="""Asks every id, one after the other, and writes nothing. Ends with exit code 5
-when nobody answers.
+    help_epilogue="""Asks, and writes nothing. A CAN bus whose rate is not known is listened to
+before anything is sent, where the adapter can. Ends with exit code 5 when
+nobody answers.
 
 Examples:
 
     motorbus scan feetech:/dev/ttyACM0
     motorbus scan feetech:/dev/ttyACM0 --ids 1-20 --baud 1000000,500000
     motorbus scan feetech:/dev/ttyACM0 --baud all
+    motorbus scan kst:can://slcan/dev/ttyACM0 --bitrate all
     motorbus scan feetech:sim,ids=1-6 --ids 1-9 --json""",
 )
 
@@ -38,6 +43,7 @@ def scan(
     *,
     ids: str = "",
     baud: str = "",
+    bitrate: str = "",
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -51,24 +57,40 @@ def scan(
         Which ids to ask, as 1-6 or 1,4,7; every id when left out.
     baud
         Which rates to try, as 1000000,500000, or `all`; the rate of the bus when left out.
+    bitrate
+        The same for a CAN bus, as 500000,1000000, or `all`.
     options
         Any option of the bus string, as a flag.
     """
     from motorbus import session
 
-    asked = session.parse_ids(ids) if ids else target(bus).nodes
+    wanted = target(bus)
+    asked = session.parse_ids(ids) if ids else wanted.nodes
+    tried = _tried({"baud": baud, "bitrate": bitrate}, wanted.family)
     early: list[Found] = []
     found: list[Found] | None = None
-    with opened(target(bus).bus, options, output) as opening:
-        operation = opening.family.scan(asked, rates(baud, opening.family) or (opening.rate,))
+    with opened(wanted.bus, options, output) as opening:
+        operation = opening.family.scan(asked, tried or (opening.rate,))
         try:
             with output.progress("scanning") as bar:
                 found = opening.run(operation, report=lambda event: listen(event, early, bar))
         finally:
-            _show(bus, early if found is None else found, output)
+            _show(wanted, early if found is None else found, output)
         if not found:
             raise nobody(bus)
     return Exit.OK
+
+
+def _tried(texts: Mapping[str, str], family: Family) -> tuple[int, ...]:
+    word = rate_word(family)
+    for name, text in texts.items():
+        if text and name != word:
+            raise RequestError(
+                f"--{name}: {family.name} buses have a {word}",
+                expected=f"--{word} {text}",
+                advice="nothing was sent",
+            )
+    return rates(texts[word], family)
 
 
 def rates(text: str, family: Family) -> tuple[int, ...]:
@@ -77,7 +99,9 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
         return family.link.rates
     words = text.replace("+", ",").split(",") if text else []
     if not all(word.strip().isdecimal() for word in words):
-        raise RequestError(f"--baud {text}: not a list of rates", expected="as 1000000,500000 or all")
+        raise RequestError(
+            f"--{rate_word(family)} {text}: not a list of rates", expected="as 1000000,500000 or all"
+        )
     return tuple(int(word) for word in words)
 
 
@@ -94,10 +118,12 @@ def _model(one: Found) -> str:
     return one.identity.model if one.identity else "?"
 
 
-def _show(bus: str, found: list[Found], output: Output) -> None:
-    output.document("motorbus.scan/1", {"bus": bus, "devices": [facts(one) for one in found]})
+def _show(wanted: Target, found: list[Found], output: Output) -> None:
+    word = rate_word(wanted.family)
+    output.document("motorbus.scan/1", {"bus": wanted.bus, "devices": [facts(one, word) for one in found]})
     if found:
-        output.table(f"Devices on {bus}", COLUMNS, [row(one) for one in found])
+        rows = [(id_shown(one.node, wanted.family), *row(one)[1:]) for one in found]
+        output.table(f"Devices on {wanted.bus}", COLUMNS, rows)
 
 
 COLUMNS = (">id", ">bit/s", "model", "firmware", "registers")
@@ -110,8 +136,8 @@ def row(one: Found) -> tuple[object, ...]:
     return (one.node, one.rate, _model(one), known.firmware if known else "", map_)
 
 
-def facts(one: Found) -> dict[str, object]:
-    """One device as plain data."""
+def facts(one: Found, rate: str = "baud") -> dict[str, object]:
+    """One device as plain data; `rate` is what its rate is called."""
     known = one.identity
     named = {"model": known.model, "firmware": known.firmware, "table": known.table} if known else {}
-    return {"id": one.node, "baud": one.rate, **named}
+    return {"id": one.node, rate: one.rate, **named}

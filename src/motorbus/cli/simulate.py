@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import signal
+import time
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import App, Parameter
 
@@ -15,34 +17,53 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
 from motorbus.link.pty import PtyMaster
+from motorbus.link.slcan import SlcanAdapter
+from motorbus.link.socketcand import SocketcandAdapter
+from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
-from motorbus.simulation.listener import TcpListener, parse_endpoint
-from motorbus.simulation.mount import Mount
+from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
+from motorbus.simulation.mount import Mount, Place
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from motorbus.core.family import Family
-    from motorbus.simulation.mount import Endpoint
 
 app = App(
     name="simulate",
     help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and
-removes its link and its control socket. Without --link and --tcp it says which
-pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
-login. The control socket takes one order a line: status, power-cycle [ID],
-unplug ID, plug ID, help.
+removes its link and its control socket. Told no way to the bus, it says which
+pseudo-terminal it has made. --tcp and --socketcand without a host bind
+127.0.0.1; there is no login. The control socket takes one order a line:
+status, power-cycle [ID], unplug ID, plug ID, help.
+
+A CAN bus is served by the slcan protocol on --link and --tcp, and may be served
+in several ways at once: what one program sends, the others see.
+
+Whatever --switches lists may be given as a flag: --profile kst-ext.
 
 Examples:
 
     motorbus simulate feetech --ids 1-6 --model sts3215 --link /tmp/arm
     motorbus simulate feetech --ids 1-6 --tcp 4000 --pace
     motorbus simulate feetech --link /tmp/arm --control /tmp/arm.control
-    motorbus simulate feetech --link /tmp/arm --switch broadcast_ping=in_turn
+    motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
+    motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
+    motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
     motorbus simulate feetech --switches""",
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
+_OWN = ("ids", "model", "link", "tcp", "socketcand", "can", "pace", "baud", "bitrate", "control", "switch")
+
+
+class Ways(NamedTuple):
+    """By which ways a bus is to be reached; "" and None: not by this one."""
+
+    link: Path | None = None
+    tcp: str = ""
+    socketcand: str = ""
+    can: str = ""
 
 
 @app.default
@@ -53,50 +74,103 @@ def simulate(
     ids: Annotated[str, Parameter(help="Their ids, as 1-6 or 1,4,7.")] = "1",
     model: Annotated[str, Parameter(help="Their model; the usual one of the family when left out.")] = "",
     link: Annotated[Path | None, Parameter(help="A symbolic link to make to the pseudo-terminal.")] = None,
-    tcp: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve a socket instead.")] = "",
-    pace: Annotated[Flag, Parameter(help="Bytes take their time, as on a wire.")] = False,
-    baud: Annotated[int, Parameter(help="The rate of the wire until a client sets one.")] = 0,
+    tcp: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve a socket.")] = "",
+    socketcand: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve socketcand (CAN).")] = "",
+    can: Annotated[str, Parameter(help="INTERFACE/CHANNEL of a CAN bus to join, as socketcan/vcan0.")] = "",
+    pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
+    baud: Annotated[int, Parameter(help="The rate of a serial line until a client sets one.")] = 0,
+    bitrate: Annotated[int, Parameter(help="The rate of a CAN bus until a client sets one.")] = 0,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
     switch: Annotated[
         tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
     ] = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
+    **flags: Annotated[str, Parameter(help="A switch of the family, as --NAME VALUE.")],
 ) -> Exit:
     """Serve simulated devices on a pseudo-terminal or a socket."""
     output.simulated = True
     found = families.load(family)
     if switches:
         return _list(found, output)
-    simulator = found.simulator(session.parse_ids(ids), model, **_switched(switch))
-    rate = baud or found.link.rate
+    options, settings = _sorted(found, {**_switched(switch), **flags})
+    simulator = found.simulator(session.parse_ids(ids), model, **options)
+    rate = _rate(found, baud, bitrate)
     simulator.tune(rate)
     with ExitStack() as stack:
         stop = stack.enter_context(_until_signalled())
-        endpoint, port = _endpoint(stack, link, tcp)
+        served = _served(stack, found, Ways(link, tcp, socketcand, can), bitrate)
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
-        kind, paced = found.link.kind, rate if pace else None
-        mount = Mount(simulator, endpoint, pace=paced, rate=rate, kind=kind, attendants=controls)
+        places = [place for place, _ in served]
+        mount = Mount(simulator, *places, pace=rate if pace else None, rate=rate, attendants=controls)
+        buses = [f"{family}:{port}{_appended(settings, port, bitrate)}" for _, port in served]
         nodes = sorted(simulator.nodes)
-        facts = {"bus": f"{family}:{port}", "family": family, "ids": nodes, "pid": os.getpid()}
+        facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
         output.document("motorbus.simulate/1", facts)
-        output.text(f"ready: {family}:{port}  (simulated: {len(nodes)} {family} devices, ids {ids})")
+        names = " and ".join(buses)
+        output.text(f"ready: {names}  (simulated: {len(nodes)} {family} devices, ids {ids})")
         mount.serve(stop)
     return Exit.OK
 
 
-def _endpoint(stack: ExitStack, link: Path | None, tcp: str) -> tuple[Endpoint, str]:
+def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[tuple[Place, str]]:
+    """Where clients come in, and what a host calls each."""
+    if family.link.kind == "frames":
+        return list(_frames(stack, ways, bitrate, family.link.rate))
+    return [_bytes(stack, ways)]
+
+
+def _bytes(stack: ExitStack, ways: Ways) -> tuple[Place, str]:
     """The open port, and what a host calls it."""
-    if tcp and link:
-        raise RequestError("a bus is served on --link or on --tcp, not on both")
-    if tcp:
-        listener = stack.enter_context(closing(TcpListener(*parse_endpoint(tcp))))
+    if ways.socketcand or ways.can:
+        raise RequestError("these devices speak on a serial line, not on CAN", expected="--link or --tcp")
+    if ways.tcp and ways.link:
+        raise RequestError("a serial line is served on --link or on --tcp, not on both")
+    if ways.tcp:
+        listener = stack.enter_context(closing(TcpListener(*parse_endpoint(ways.tcp))))
         return listener, listener.url
     terminal = stack.enter_context(closing(PtyMaster()))
-    if link is None:
+    if ways.link is None:
         return terminal, terminal.slave_name
-    terminal.symlink(link)
-    return terminal, str(link)
+    terminal.symlink(ways.link)
+    return terminal, str(ways.link)
+
+
+def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tuple[Place, str]]:
+    """Every way to the CAN bus, and what a host calls it."""
+    if ways.link or not any(ways):
+        terminal = stack.enter_context(closing(PtyMaster()))
+        if ways.link:
+            terminal.symlink(ways.link)
+        name = ways.link.absolute() if ways.link else terminal.slave_name
+        yield CanClient(terminal, SlcanAdapter()), f"can://slcan{name}"
+    if ways.tcp:
+        door = Door(TcpPort(*parse_endpoint(ways.tcp)), SlcanAdapter)
+        yield stack.enter_context(closing(door)), f"can://slcan/socket://{door.port.address}"
+    if ways.socketcand:
+        epoch = time.time() - time.monotonic()
+        door = Door(TcpPort(*parse_endpoint(ways.socketcand)), lambda: SocketcandAdapter(epoch=epoch))
+        yield stack.enter_context(closing(door)), f"can://socketcand/{door.port.address}/can0"
+    if ways.can:
+        from motorbus.simulation.served import join
+
+        yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
+
+
+def _rate(family: Family, baud: int, bitrate: int) -> int:
+    right, wrong = ("bitrate", "baud") if family.link.kind == "frames" else ("baud", "bitrate")
+    given = {"baud": baud, "bitrate": bitrate}
+    if given[wrong]:
+        raise RequestError(f"--{wrong} is not for {family.name} devices", expected=f"--{right}")
+    if given[right] < 0:
+        raise RequestError(f"--{right} {given[right]} is not a rate", expected="bit/s, more than 0")
+    return given[right] or family.link.rate
+
+
+def _appended(settings: Mapping[str, str], port: str, bitrate: int) -> str:
+    """The options that a host needs to open the bus as it is served here."""
+    options = {**settings, **({"bitrate": str(bitrate)} if bitrate and "://slcan/" in port else {})}
+    return "".join(f",{name}={value}" for name, value in options.items())
 
 
 def _switched(texts: Sequence[str]) -> dict[str, str]:
@@ -106,8 +180,33 @@ def _switched(texts: Sequence[str]) -> dict[str, str]:
     return dict(pairs)
 
 
+def _sorted(family: Family, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
+    """What the simulator takes, and what belongs into the address of the bus. Some do both."""
+    asked = {name.replace("-", "_"): value for name, value in given.items()}
+    options = {option.name for option in family.link.options}
+    settings = {option.name for option in family.link.settings}
+    for name in asked:
+        if name not in options | settings:
+            raise _unknown(name, family.name, options | settings)
+    return (
+        {name: value for name, value in asked.items() if name in options},
+        {name: value for name, value in asked.items() if name in settings},
+    )
+
+
+def _unknown(name: str, family: str, known: Iterable[str]) -> RequestError:
+    near = difflib.get_close_matches(name, [*known, *_OWN], n=3)
+    return RequestError(
+        f"{family} has no switch {name!r}",
+        expected=f"perhaps {' or '.join(near)}" if near else "",
+        advice=f"`motorbus simulate {family} --switches` lists them",
+    )
+
+
 def _list(family: Family, output: Output) -> Exit:
-    options = [(option.name, str(option.default), option.help) for option in family.link.options]
+    known = {option.name: option for option in family.link.options}
+    known |= {option.name: option for option in family.link.settings if option.name not in known}
+    options = [(option.name, str(option.default), option.help) for option in known.values()]
     facts = [dict(zip(("name", "default", "help"), option, strict=True)) for option in options]
     output.document("motorbus.switches/1", {"switches": facts})
     output.table(f"Switches of {family.name}", ["switch", "default", "what it does"], options)

@@ -74,7 +74,8 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
     """An open bus, closed at the end; says what the user ought to know about the port."""
     from motorbus import session
 
-    with session.open(bus, report=None, **options) as found:
+    said = {name.replace("-", "_"): value for name, value in options.items()}
+    with session.open(bus, report=None, **said) as found:
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         if LOG.isEnabledFor(logging.DEBUG):
@@ -106,9 +107,18 @@ def able(one: Any, verb: str) -> Any:
     try:
         return getattr(one, verb)
     except AttributeError:
-        raise RequestError(
-            f"{one.bus.family.name} devices have no {verb.replace('_', ' ')}", advice="nothing was sent"
-        ) from None
+        raise _lacks(one.bus.family, verb) from None
+
+
+def offers(family: Family, verb: str) -> None:
+    """Raises RequestError when the devices of this family lack a verb; needs no bus."""
+    if not hasattr(family.devices.blocking, verb):
+        raise _lacks(family, verb)
+
+
+def _lacks(family: Family, verb: str) -> RequestError:
+    what = "torque switch" if verb.endswith("able_torque") else verb.replace("_", " ")
+    return RequestError(f"{family.name} devices have no {what}", advice="nothing was sent")
 
 
 def takes(one: Any, verb: str, options: Iterable[str]) -> None:
@@ -167,5 +177,15 @@ def nobody(bus: str) -> NoReply:
     return NoReply(
         f"{bus}: no device answers",
         cause="no power, a loose cable, or devices set to another rate",
-        advice=f"`motorbus scan {bus} --baud all` looks for every id at every rate",
+        advice=f"`motorbus scan {bus} --{rate_word(target(bus).family)} all` looks for every id at every rate",
     )
+
+
+def rate_word(family: Family) -> str:
+    """What the rate of such a bus is called, in its options and in flags."""
+    return "baud" if family.link.kind == "bytes" else "bitrate"
+
+
+def id_shown(node: int, family: Family) -> str:
+    """An id as people of this family know it: on CAN in hexadecimal too, for so it stands in every identifier."""
+    return str(node) if family.link.kind == "bytes" else f"{node} (0x{node:02X})"

@@ -15,12 +15,12 @@ from random import Random
 from threading import Condition
 from typing import NamedTuple
 
+from motorbus.core.can_bits import bits
 from motorbus.core.family import Simulator
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 
-CAN_BITS = {False: 47, True: 67}  # of a frame without data, interframe space included, stuff bits not
 BACKLOG = 1 << 20  # requests nobody has read the answers of; more is a runaway writer
 
 
@@ -31,7 +31,8 @@ class MemoryLink:
     `line`           what lies between: nothing, or faults
     `virtual`        time passes only inside `read`; False uses the monotonic clock and really waits
     `pace`           data need their air time: a request reaches the simulator, and a reply the host, when its last
-                     byte has passed, each queued behind what was sent before it in that direction
+                     byte has passed, each queued behind what was sent before it: in that direction, or for CAN
+                     frames, whose wire all share, at all. A simulator that is `paced` does so by itself
     `bits_per_byte`  start and stop bits included
     `start`          what a virtual clock shows at first; for a simulator that has lived before
     """
@@ -55,7 +56,8 @@ class MemoryLink:
         self.simulator = simulator
         self.line: Line = line or PerfectLine()
         self.virtual = virtual
-        self.paced = pace
+        self.pace = pace
+        self.paced = pace or bool(getattr(simulator, "paced", False))
         self.name = name
         self.bits_per_byte = bits_per_byte
         self._now = start
@@ -191,15 +193,16 @@ class MemoryLink:
                 self.simulator.receive(data, at)
 
     def _send(self, sender: Side, data: Data, at: float) -> None:
-        if self.paced:
-            at = self._free[sender] = max(at, self._free[sender]) + self._air_time(data)
+        if self.pace:
+            wire = Side.HOST if isinstance(data, CanFrame) else sender
+            at = self._free[wire] = max(at, self._free[wire]) + self._air_time(data)
         for delivery in self.line.carry(sender, data, at):
             self._serial += 1  # equal moments arrive in the order they were sent
             heappush(self._under_way, (delivery.at, self._serial, delivery.to, delivery.data))
 
     def _air_time(self, data: Data) -> float:
         if isinstance(data, CanFrame):
-            return (CAN_BITS[data.extended] + 8 * len(data.data)) / self.rate
+            return bits(data) / self.rate
         return len(data) * self.bits_per_byte / self.rate
 
 

@@ -1,7 +1,8 @@
 """The simulator's end of a TCP port: the same bytes as on a serial line, one client after the other.
 
-A client that comes while another is served waits in the queue of the operating system until that one leaves; a bus
-has one host. There is no baud rate on a socket, so none is told.
+A client that comes while another is served waits in the queue of the operating system until that one leaves; a
+serial line has one host. (On CAN there may be several, see `clients.Door`.) There is no baud rate on a socket, so
+none is told.
 """
 
 from __future__ import annotations
@@ -29,11 +30,54 @@ def parse_endpoint(text: str) -> tuple[str, int]:
     return host.removeprefix("[").removesuffix("]") or LOCAL, int(port)
 
 
-class TcpListener:
-    """An open TCP port with at most one client. Raises PortBusy when it is taken, LinkError when it cannot be had."""
+class TcpClient:
+    """A client that has come by TCP. `gone` once it has left or broken off. What is small leaves at once."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.gone = False
+        self._connection = connection
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def fileno(self) -> int:
+        """Turns readable when it has sent something or left."""
+        return self._connection.fileno()
+
+    def read(self) -> bytes:
+        """What it has sent; b"" when nothing."""
+        try:
+            data = self._connection.recv(_CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        self.gone = self.gone or not data
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Send to it; returns how many bytes still had room."""
+        try:
+            return self._connection.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self.gone = True
+            return 0
+
+    def rate(self) -> int | None:
+        """A socket has no rate."""
+        return None
+
+    def close(self) -> None:
+        """Hang up; calling it again does nothing."""
+        self.gone = True
+        self._connection.close()
+
+
+class TcpPort:
+    """An open TCP port. Raises PortBusy when it is taken, LinkError when it cannot be had."""
 
     def __init__(self, host: str = LOCAL, port: int = 0) -> None:
-        self._client: socket.socket | None = None
         try:
             self._listener = _listen(host, port)
         except OSError as error:
@@ -43,40 +87,55 @@ class TcpListener:
         self.host, self.port = self._listener.getsockname()[:2]
 
     @property
+    def address(self) -> str:
+        """HOST:PORT."""
+        return f"{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
+
+    def fileno(self) -> int:
+        """Turns readable when a client has come."""
+        return self._listener.fileno()
+
+    def accept(self) -> TcpClient | None:
+        """The next client; None when there is none, or it has left again."""
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            return TcpClient(self._listener.accept()[0])
+        return None
+
+    def close(self) -> None:
+        """Give the port back; calling it again does nothing."""
+        self._listener.close()
+
+
+class TcpListener(TcpPort):
+    """An open TCP port with at most one client. Errors as of `TcpPort`."""
+
+    def __init__(self, host: str = LOCAL, port: int = 0) -> None:
+        self._client: TcpClient | None = None
+        super().__init__(host, port)
+
+    @property
     def url(self) -> str:
         """What a host opens."""
-        return f"socket://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
+        return f"socket://{self.address}"
 
     def fileno(self) -> int:
         """Turns readable when the client has sent something or left; without a client, when one has come."""
-        return (self._client or self._listener).fileno()
+        return self._client.fileno() if self._client else super().fileno()
 
     def read(self) -> bytes:
         """What the client has sent; b"" when nothing. Takes in the next client when there is none."""
         if self._client is None:
-            self._accept()
+            self._client = self.accept()
             return b""
-        try:
-            data = self._client.recv(_CHUNK)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            data = b""
-        if not data:
-            self._drop()
+        data = self._client.read()
+        self._drop_if_gone()
         return data
 
     def write(self, data: bytes) -> int:
         """Send to the client; returns how many bytes still had room. Without a client they are lost, as on a wire."""
-        if self._client is None:
-            return 0
-        try:
-            return self._client.send(data)
-        except BlockingIOError:
-            return 0
-        except OSError:
-            self._drop()
-            return 0
+        sent = self._client.write(data) if self._client else 0
+        self._drop_if_gone()
+        return sent
 
     def rate(self) -> int | None:
         """A socket has no rate."""
@@ -84,17 +143,13 @@ class TcpListener:
 
     def close(self) -> None:
         """Hang up and give the port back; calling it again does nothing."""
-        self._drop()
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with contextlib.suppress(BlockingIOError, ConnectionError):
-            self._client, _ = self._listener.accept()
-            self._client.setblocking(False)
-            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def _drop(self) -> None:
         if self._client is not None:
+            self._client.close()
+        self._client = None
+        super().close()
+
+    def _drop_if_gone(self) -> None:
+        if self._client is not None and self._client.gone:
             self._client.close()
             self._client = None
 

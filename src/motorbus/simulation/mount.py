@@ -1,9 +1,7 @@
-"""Serves a simulated bus on a real port, on the real clock, so that any program can open it.
+"""Serves a simulated bus on real ports, on the real clock, so that any program can open it.
 
-The loop waits for the host's bytes and for the next thing that happens by itself, in one `select`; it has no
-threads. Two ways of time: with `pace` every byte takes its time on the wire, and the half-duplex wire carries one
-thing at a time. Without it the wire is infinitely fast: air time and return delays, all that is over within a few
-milliseconds, are not waited for; what takes longer (an EEPROM write, a restart) is.
+The loop waits for what clients send and for the next thing that happens by itself, in one `select`; it has no
+threads. What happens when is the business of `course`, who the clients are that of `clients`.
 """
 
 from __future__ import annotations
@@ -11,37 +9,23 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from heapq import heappop, heappush
-from itertools import count
-from math import inf
 from select import select
-from typing import NamedTuple, Protocol
+from typing import Final, Protocol, TypeAlias
 
 from motorbus.core.family import Simulator
-from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
-from motorbus.link.base import Line, PerfectLine, Side
+from motorbus.link.base import Adapter, Line
+from motorbus.simulation.clients import CanClient, Door, Endpoint, Participant, SerialClient
+from motorbus.simulation.course import HASTE, Course
 
-HASTE = 0.004
-"""Without pace, what a device would do within so many seconds it does at once."""
-_BITS = 10
+__all__ = ["HASTE", "Attendant", "Endpoint", "Mount", "Place"]
+
 _LONGEST_WAIT = 1.0
+_SLICE: Final = 0.05
+"""s that a participant without a descriptor is waited for before the others are looked at."""
 
-
-class Endpoint(Protocol):
-    """A port that clients open: `link.pty.PtyMaster` or `listener.TcpListener`. Nothing of it blocks."""
-
-    def fileno(self) -> int:
-        """Turns readable when there is something to `read`."""
-
-    def read(self) -> bytes:
-        """What clients have sent; b"" when nothing."""
-
-    def write(self, data: bytes) -> int:
-        """Send to the client; what has no room is lost."""
-
-    def rate(self) -> int | None:
-        """Bit/s that the client has set; None: unknown."""
+Place: TypeAlias = Endpoint | Participant | Door
+"""Where clients come in: an `Endpoint` has one client, of bytes unless an adapter is given with it."""
 
 
 class Attendant(Protocol):
@@ -54,60 +38,51 @@ class Attendant(Protocol):
         """This one has turned readable."""
 
 
-class Event(NamedTuple):
-    """Data that reaches one side at a moment; `order` keeps equal moments in the order they came about."""
-
-    at: float
-    order: int
-    to: Side
-    data: Data
-
-
 class Mount:
-    """A simulator on an endpoint.
+    """A simulator where clients can reach it.
 
-    `line`        what lies between, faults included
-    `pace`        bit/s at which bytes take their time, unless the client's own rate is followed; None: no waiting
-    `rate`        bit/s that a terminal begins with; the client's own is followed then, and a device set to another
-                  one stays silent. None: every device hears every client
-    `kind`        what the simulator speaks; only "bytes" yet, else RequestError
+    `places`      one endpoint for bytes; or any number of CAN clients, doors and other participants of one CAN bus
+    `adapter`     what a single endpoint speaks when the simulator speaks CAN frames
+    `line`        what lies between clients and devices, faults included
+    `pace`        bit/s at which data take their time, unless a client sets another rate; None: no waiting
+    `rate`        bit/s of the bus until a client sets one. On a serial line the client's own is followed then, and a
+                  device set to another one stays silent; None: every device hears every client. On CAN the rate set
+                  last counts while its client has the bus open, and None leaves the simulator's own
     `attendants`  what else is served
-    `lost`        how many bytes found no room because the client does not read
+    `lost`        how many bytes, or CAN frames, found no room because a client does not read
     """
 
     def __init__(
         self,
         simulator: Simulator,
-        endpoint: Endpoint,
-        *,
+        *places: Place,
+        adapter: Adapter | None = None,
         line: Line | None = None,
         pace: int | None = None,
         rate: int | None = None,
         clock: Callable[[], float] = time.monotonic,
-        kind: str = "bytes",
         attendants: Sequence[Attendant] = (),
     ) -> None:
-        if kind != "bytes":
-            raise RequestError(
-                "a simulated CAN bus cannot be served on a port yet",
-                cause="it needs the slcan protocol, which comes with the KST family",
-            )
-        if pace is not None and pace <= 0:
-            raise RequestError(f"pace {pace} is not a rate", expected="bit/s, more than 0")
+        if adapter is not None and len(places) != 1:
+            raise RequestError("an adapter belongs to one endpoint", expected="a CanClient for each")
         self.simulator = simulator
-        self.endpoint = endpoint
-        self.line: Line = line or PerfectLine()
-        self.pace = pace
+        self.course = Course(simulator, line=line, pace=pace)
         self.attendants = tuple(attendants)
-        self.lost = 0
         self._clock = clock
-        self._follows = rate is not None
-        self._rate: int | None = None
-        self._events: list[Event] = []
-        self._order = count()
-        self._free_at = -inf
-        if rate is not None:
-            _preset(endpoint.fileno(), rate)
+        self._usual = rate
+        self._doors = [place for place in places if isinstance(place, Door)]
+        self._fixed = [_participant(place, adapter, rate) for place in places if not isinstance(place, Door)]
+        self._lost_before = 0
+
+    @property
+    def clients(self) -> list[Participant]:
+        """Whoever takes part now."""
+        return [*self._fixed, *(client for door in self._doors for client in door.clients)]
+
+    @property
+    def lost(self) -> int:
+        """Bytes, or CAN frames, that found no room."""
+        return self._lost_before + sum(client.lost for client in self.clients)
 
     def serve(self, stop: int) -> None:
         """Serve until this descriptor turns readable."""
@@ -116,67 +91,63 @@ class Mount:
 
     def step(self, stop: int | None = None, timeout: float = _LONGEST_WAIT) -> bool:
         """Wait for the next thing to do, at most so long (s), and do it. True when `stop` has turned readable."""
-        port = self.endpoint.fileno()
+        clients = [] if self.course.crowded else self.clients
+        readers = {one: client for client in clients if (one := client.fileno()) is not None}
         attended = {one: attendant for attendant in self.attendants for one in attendant.descriptors()}
-        waiting = [port, *attended, *(() if stop is None else (stop,))]
-        wait = min(timeout, max(0.0, self._next() - self._clock()))
-        ready, _, _ = select(waiting, (), (), wait)
-        now = self._clock()
-        self._happen(now)
-        if port in ready:
-            self._hear(self.endpoint.read(), now)
+        doors = {door.fileno(): door for door in self._doors}
+        wait = min(timeout, max(0.0, self.course.next() - self._clock()))
+        for client in clients:
+            if client.fileno() is None:
+                self._hear(client, min(wait, _SLICE))
+                wait = 0.0
+        waiting = [*readers, *attended, *doors, *(() if stop is None else (stop,))]
+        stuck = [one for client in self.clients if client.is_stuck() and (one := client.fileno()) is not None]
+        ready, _, _ = select(waiting, stuck, (), wait)
+        self._happen(self._clock())
         for descriptor in ready:
-            if descriptor in attended:
+            if descriptor in readers:
+                self._hear(readers[descriptor])
+            elif descriptor in doors:
+                doors[descriptor].admit()
+            elif descriptor in attended:
                 attended[descriptor].attend(descriptor)
-        self._happen(now)
+        self._happen(self._clock())
+        self._sweep()
         return stop in ready
 
-    def _hear(self, data: bytes, now: float) -> None:
-        """The host has sent this."""
-        if not data:
-            return
-        rate = self.endpoint.rate() if self._follows else None
-        if rate is not None and rate != self._rate:
-            self._rate = rate
-            self.simulator.tune(rate)
-        self._carry(Side.HOST, data, self._passed(data, now) if self.pace else now)
-
-    def _passed(self, data: bytes, at: float) -> float:
-        """When the last byte of this has passed the wire, which carries one thing at a time."""
-        self._free_at = max(at, self._free_at) + len(data) * _BITS / (self._rate or self.pace or 1)
-        return self._free_at
-
-    def _carry(self, sender: Side, data: Data, at: float) -> None:
-        for delivery in self.line.carry(sender, data, at):
-            heappush(self._events, Event(delivery.at, next(self._order), delivery.to, delivery.data))
-
-    def _next(self) -> float:
-        """The next moment at which something happens by itself."""
-        due = self.simulator.due()
-        spoken = inf if due is None else due if self.pace else due - HASTE
-        return min(spoken, self._events[0].at) if self._events else spoken
+    def _hear(self, client: Participant, patience: float = 0.0) -> None:
+        """This client has said something, or left."""
+        heard = client.read(self._clock(), patience)
+        now, rate = self._clock(), client.rate()
+        if rate is None:  # the rate is that of the others then, or of the bus
+            others = (other.rate() for other in self.clients)
+            self.course.tune(next((one for one in others if one is not None), self._usual))
+        self.course.tune(rate)
+        for data in heard:
+            self.course.hear(data, now, client, rate)
 
     def _happen(self, now: float) -> None:
-        """Everything up to this moment, in order; what the host gets of it leaves in one piece."""
-        out = bytearray()
-        while self._next() <= now:
-            if self._events and self._events[0].at <= now:
-                event = heappop(self._events)
-                if event.to is Side.DEVICE:
-                    self.simulator.receive(event.data, event.at)
-                else:
-                    out += _bytes(event.data)
-            else:
-                self._speak(now)
-        self.simulator.advance(now)
-        if out:
-            self.lost += len(out) - self.endpoint.write(bytes(out))
+        """Everything up to this moment, in order; what a client gets of it leaves in one piece."""
+        for event in self.course.happen(now):
+            for client in self.clients:
+                if client is not event.sender:
+                    client.tell(event.data, min(event.at, now))
+        for client in self.clients:
+            client.flush()
 
-    def _speak(self, now: float) -> None:
-        """The devices begin to send what is due next."""
-        due = self.simulator.due()
-        for when, data in self.simulator.advance(now if due is None else due):
-            self._carry(Side.DEVICE, data, self._passed(_bytes(data), when) if self.pace else now)
+    def _sweep(self) -> None:
+        for door in self._doors:
+            self._lost_before += sum(client.lost for client in door.sweep())
+
+
+def _participant(place: Endpoint | Participant, adapter: Adapter | None, rate: int | None) -> Participant:
+    if isinstance(place, Participant):
+        return place
+    if adapter is not None:
+        return CanClient(place, adapter)
+    if rate is not None:
+        _preset(place.fileno(), rate)
+    return SerialClient(place, follows=rate is not None)
 
 
 def _preset(descriptor: int, rate: int) -> None:
@@ -190,9 +161,3 @@ def _preset(descriptor: int, rate: int) -> None:
         settings = termios.tcgetattr(descriptor)
         settings[4] = settings[5] = code
         termios.tcsetattr(descriptor, termios.TCSANOW, settings)
-
-
-def _bytes(data: Data) -> bytes:
-    if isinstance(data, CanFrame):
-        raise RequestError("this simulator speaks CAN frames, which this port cannot carry")
-    return data

@@ -16,6 +16,7 @@ from motorbus.core.family import Family, Simulator
 from motorbus.errors import PortBusy, PortNotFound, RequestError
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
+from motorbus.simulation.served import LinkClient, Served, join
 
 _live: dict[tuple[str, str], Simulation] = {}
 _numbers = count(1)
@@ -51,10 +52,12 @@ class Simulation:
         named = {option.name for option in family.link.settings}
         self.settings = {option: value for option, value in options.items() if option in named}
         taken = {option.name for option in family.link.options}
-        options = {option: value for option, value in options.items() if option in taken or option not in named}
+        options = {
+            option: value for option, value in options.items() if option in taken or option not in named
+        }
         self.simulator: Simulator = family.simulator(ids, model, **options)
         self._line: Line = PerfectLine()
-        self._link: MemoryLink | None = None
+        self._link: MemoryLink | Served | None = None
         self._left_at = 0.0
         self._gate = Lock()
         self.name = _register(self, name)
@@ -91,12 +94,29 @@ class Simulation:
     def link(self, rate: int | None = None) -> MemoryLink:
         """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
         with self._gate, _lock:
-            if _live.get((self.family.name, self.name)) is not self:
-                raise _not_found(self.name, self.family.name)
-            if self._link is not None:
-                raise PortBusy(f"{self.url} is open already", advice="close the other bus first")
-            self._link = _OneAtATime(self, rate or self.family.link.rate, self._left_at)
-            return self._link
+            self._check_free()
+            link = _OneAtATime(self, rate or self.family.link.rate, self._left_at)
+            self._link = link
+            return link
+
+    def serve(self, port: str, rate: int | None = None, **options: object) -> Served:
+        """Put the devices on a CAN channel, such as `can://virtual/NAME` for python-can in this process.
+
+        They work there in real time, by a thread, until what is given back is closed; use it in a `with`. `rate` is
+        the bit rate of that bus, `options` are for its adapter. Raises RequestError for devices that do not speak CAN
+        and for what is no channel, PortBusy while the simulation is open elsewhere, LinkError for the channel.
+        """
+        if self.family.link.kind != "frames":
+            raise RequestError(f"{self.family.name} devices do not speak CAN")
+        said, rate = rate or 0, rate or self.family.link.rate
+        with self._gate, _lock:
+            self._check_free()
+            client = join(port, said, self.family.link.rate, **options)
+            start = self._left_at if self.clock == "virtual" else None
+            pace = rate if self.pace else None
+            served = _ServedOne(self, client, line=self._line, pace=pace, rate=rate, start=start)
+            self._link = served
+            return served
 
     def close(self) -> None:
         """Forget its name; a link that is open goes dead. Calling it again does nothing."""
@@ -115,7 +135,13 @@ class Simulation:
     ) -> None:
         self.close()
 
-    def _release(self, link: MemoryLink) -> None:
+    def _check_free(self) -> None:
+        if _live.get((self.family.name, self.name)) is not self:
+            raise _not_found(self.name, self.family.name)
+        if self._link is not None:
+            raise PortBusy(f"{self.url} is open already", advice="close the other bus first")
+
+    def _release(self, link: MemoryLink | Served) -> None:
         with self._gate:
             if self._link is link:
                 self._link, self._left_at = None, link.now()
@@ -174,3 +200,27 @@ class _OneAtATime(MemoryLink):
     def close(self) -> None:
         super().close()
         self._simulation._release(self)
+
+
+class _ServedOne(Served):
+    """A simulation at work elsewhere; closing it lets the next host in."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        client: LinkClient,
+        *,
+        line: Line,
+        pace: int | None,
+        rate: int,
+        start: float | None,
+    ) -> None:
+        self._simulation = simulation
+        simulation.simulator.tune(rate)
+        super().__init__(simulation.simulator, client, line=line, pace=pace, rate=rate, start=start)
+
+    def close(self) -> None:
+        try:
+            super().close()
+        finally:
+            self._simulation._release(self)

@@ -21,6 +21,7 @@ from motorbus.families.feetech.driver.loop import Positions, sync_read_positions
 from motorbus.families.feetech.driver.motion import Promise, enable_torque, move, stop
 from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.registers import action, action_all, read, read_raw, reg_write, write
+from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import scan
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
@@ -40,6 +41,7 @@ __all__ = [
     "disable_torque",
     "disable_torque_all",
     "enable_torque",
+    "factory_restore",
     "identify",
     "load",
     "move",

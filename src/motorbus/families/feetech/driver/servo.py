@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
-from motorbus.families.feetech.driver import feedback, identity, motion, registers, torque
+from motorbus.families.feetech.driver import feedback, identity, motion, registers, restoring, torque
 from motorbus.families.feetech.driver.node import Node
 
 
@@ -32,6 +32,7 @@ class ServoVerbs(Node):
     disable_torque = verb(torque.disable_torque)
     move = verb(motion.move)
     stop = verb(motion.stop)
+    factory_restore = verb(restoring.factory_restore)
 
 
 class Servo(ServoVerbs, Blocking):

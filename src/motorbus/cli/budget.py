@@ -1,0 +1,200 @@
+"""`motorbus budget`: what a control loop would cost on a bus, counted to the bit. Opens no port and sends nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import App, Parameter
+
+from motorbus.cli import faces
+from motorbus.cli.exits import Exit
+from motorbus.cli.output import Output
+from motorbus.cli.target import target
+from motorbus.core import units
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from motorbus.core.family import Family
+    from motorbus.diagnose.budget import Budget, Span, Traffic, Transfer
+
+app = App(
+    name="budget",
+    usage="Usage: motorbus budget BUS --ids IDS [OPTIONS]",
+    help_epilogue="""CAN buses only in this version. Counts every bit of every frame, stuff bits and
+the gap between frames included, over all positions: least, mean, most. The
+load is that of a loop which once a cycle sends each device its goal, takes the
+acknowledgement, and reads its position. --latency is what adapter and host need
+for one exchange, --turnaround what a device needs before it answers: they do
+not load the bus, but decide how many exchanges must be under way at once to
+fill it. Ends with exit code 8 when the bus cannot carry the loop.
+
+Examples:
+
+    motorbus budget kst:can://slcan/dev/ttyACM0 --ids 1-16 --rate 50
+    motorbus budget kst:can://socketcan/can0,bitrate=1000000 --ids 1-8
+    motorbus budget kst:sim --ids 1-4 --rate 200 --latency 1ms --json
+    motorbus budget kst:sim --ids 1-4 --loop read --reports 10ms""",
+)
+
+Loop = Literal["write-read", "write", "read"]
+
+
+@app.default
+def budget(
+    bus: str,
+    /,
+    *,
+    ids: str = "",
+    rate: float = 0.0,
+    loop: Loop = "write-read",
+    latency: str = "0",
+    turnaround: str = "0",
+    reports: str = "",
+    output: Annotated[Output, Parameter(parse=False)],
+    **options: str,
+) -> Exit:
+    """Say what a control loop would load a bus with, and how fast it can be.
+
+    Parameters
+    ----------
+    bus
+        FAMILY:PORT, as kst:can://slcan/dev/ttyACM0,bitrate=1000000; or BUS#IDS.
+    ids
+        Whose loop it is, as 1-16 or 1,4,7.
+    rate
+        Cycles per second that are wanted; only the limit is told when left out.
+    loop
+        What one cycle does with each device.
+    latency
+        What adapter and host need for one exchange, both ways together, as 1ms.
+    turnaround
+        What a device needs before it answers, as 0.1ms.
+    reports
+        Every device also reports its position by itself, so often, as 10ms.
+    options
+        Any option of the bus string, as a flag.
+    """
+    from motorbus import session
+    from motorbus.diagnose.budget import budget as count
+
+    wanted = target(bus)
+    nodes = _nodes(wanted.nodes, ids, wanted.family)
+    said = {name.replace("-", "_"): value for name, value in options.items()}
+    opening = session.prepare(wanted.bus, dict(said))
+    bitrate = opening.rate or opening.family.link.rate
+    times = {"latency": units.parse(latency, "time"), "turnaround": units.parse(turnaround, "time")}
+    besides = _reports(opening.family, nodes, units.parse(reports, "time")) if reports else []
+    cycle = _cycle(opening.family, nodes, loop)
+    found = count(cycle, bitrate, loop_rate=rate, besides=besides, **times)
+    _show(wanted.bus, nodes, found, output)
+    return Exit.OK if found.fits() else Exit.UNSAFE
+
+
+def _nodes(named: tuple[int, ...], ids: str, family: Family) -> tuple[int, ...]:
+    from motorbus import session
+
+    if family.link.kind != "frames":
+        raise RequestError(
+            f"{family.name}: a budget is made for CAN buses only in this version", advice="nothing was sent"
+        )
+    nodes = session.parse_ids(ids) if ids else named
+    if not nodes:
+        raise RequestError("whose loop is it?", expected="--ids 1-16, or BUS#1-16")
+    for node in nodes:
+        family.devices.blocking(None, node)  # raises when it is no id
+    return nodes
+
+
+def _offered(family: Family, what: str) -> Any:
+    found = faces.offer(family.name, what)
+    if found is None:
+        raise RequestError(
+            f"what a loop sends to {family.name} devices is not known", advice="nothing was sent"
+        )
+    return found
+
+
+def _cycle(family: Family, nodes: Sequence[int], loop: Loop) -> list[Transfer]:
+    from motorbus.diagnose.budget import Transfer
+
+    frames = _offered(family, "budget_frames")
+    names = loop.split("-")
+    return [
+        Transfer(node, found, f"{name} position")
+        for node in nodes
+        for name, found in frames(family, node).items()
+        if name in names
+    ]
+
+
+def _reports(family: Family, nodes: Sequence[int], interval: float) -> list[Traffic]:
+    from motorbus.diagnose.budget import Traffic
+
+    if not interval > 0:
+        raise RequestError("--reports must be a time above 0", expected="as 10ms")
+    frames = _offered(family, "report_frames")
+    return [Traffic(frames(family, node), 1 / interval, f"reports of {node}") for node in nodes]
+
+
+def _span(span: Span) -> dict[str, float]:
+    return {"least": span.least, "mean": span.mean, "most": span.most}
+
+
+def _facts(found: Budget) -> dict[str, Any]:
+    spans = {
+        name: _span(getattr(found, name)) for name in ("bits", "time", "besides", "load", "highest_rate")
+    }
+    names = ("bitrate", "unstuffed", "loop_rate", "sequential_rate", "in_flight", "latency", "turnaround")
+    costs = [{"id": one.node, "name": one.name, "bits": _span(one.bits)} for one in found.transfers]
+    return {
+        **{name: getattr(found, name) for name in names},
+        **spans,
+        "fits": found.fits(),
+        "transfers": costs,
+    }
+
+
+def _show(bus: str, nodes: Sequence[int], found: Budget, output: Output) -> None:
+    output.document("motorbus.budget/1", {"bus": bus, "ids": list(nodes), **_facts(found)})
+    rows = [_exchange(name, spans) for name, spans in _by_name(found).items()]
+    rows += [
+        ("one loop, bits", *_three(found.bits, "{:.0f}")),
+        ("one loop, ms", *_three(found.time, "{:.3f}", 1e3)),
+    ]
+    if found.besides.most:
+        rows.append(("reports, % of the bus", *_three(found.besides, "{:.1f}", 100)))
+    if found.loop_rate:
+        rows.append((f"load at {found.loop_rate:g} Hz, %", *_three(found.load, "{:.1f}", 100)))
+    highest = found.highest_rate
+    rows.append(("highest rate, Hz", f"{highest.most:.1f}", f"{highest.mean:.1f}", f"{highest.least:.1f}"))
+    title = f"{len(nodes)} devices at {found.bitrate} bit/s"
+    output.table(title, ["", ">least bits", ">mean", ">most bits"], rows)
+    output.text(
+        f"one exchange at a time: {found.sequential_rate:.1f} Hz; "
+        f"{found.in_flight:.1f} exchanges must be under way at once to fill the bus"
+    )
+    if not found.fits():
+        output.note(
+            f"the bus cannot carry {found.loop_rate:g} Hz; at most {highest.least:.1f} Hz can be promised"
+        )
+
+
+def _by_name(found: Budget) -> Mapping[str, list[Span]]:
+    spans: dict[str, list[Span]] = {}
+    for cost in found.transfers:
+        spans.setdefault(cost.name, []).append(cost.bits)
+    return spans
+
+
+def _exchange(name: str, spans: Sequence[Span]) -> tuple[str, ...]:
+    """One exchange of this name, over all devices: ids differ in their stuff bits."""
+    mean = sum(span.mean for span in spans) / len(spans)
+    least, most = min(span.least for span in spans), max(span.most for span in spans)
+    return (f"{name}, bits", f"{least:.0f}", f"{mean:.1f}", f"{most:.0f}")
+
+
+def _three(span: Span, form: str, factor: float = 1.0) -> tuple[str, str, str]:
+    least, mean, most = (form.format(factor * value) for value in (span.least, span.mean, span.most))
+    return least, mean, most

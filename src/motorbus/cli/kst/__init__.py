@@ -1,0 +1,24 @@
+"""What only KST CAN servos and their kin can do: the commands of their manual, one by one, and provisioning.
+
+The only face that knows this family. `app` has the commands, each file some of them; the rest is what common commands
+use, see `motorbus.cli.faces`.
+"""
+
+from __future__ import annotations
+
+from motorbus.cli.kst import identity, position, provision, settings, sheet
+from motorbus.cli.kst.offers import budget_frames, ping_everyone, report_frames, say
+from motorbus.cli.kst.servo import app
+
+__all__ = [
+    "app",
+    "budget_frames",
+    "identity",
+    "ping_everyone",
+    "position",
+    "provision",
+    "report_frames",
+    "say",
+    "settings",
+    "sheet",
+]

@@ -1,0 +1,56 @@
+"""What common commands use of this family; `motorbus.cli.faces` says what each is for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from motorbus.families.kst import driver, wire
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from motorbus.bus.pump import Bus
+    from motorbus.core.family import Family
+    from motorbus.core.operation import CanFrame
+
+
+def ping_everyone(bus: Bus) -> list[int]:
+    """The servos that answer one read by everyone; on CAN their answers do not collide."""
+    return sorted(bus.run(driver.broadcast_read("node_id", driver.dialect_of(bus.family))))
+
+
+def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
+    """`write`: a goal and its acknowledgement; `read`: the position; for each frame all that it may be."""
+    dialect = driver.dialect_of(family)
+    table, limit = dialect.profile.table, dialect.profile.limit
+    goal, present = table["goal_position"], table["present_position"]
+    extended, sized = dialect.extended(node), dialect.states_length(node)
+    to, at = (goal.address, goal.subindex or 0), (present.address, present.subindex or 0)
+    values = [goal.encode(raw) for raw in range(-limit, limit + 1)]
+    goals = [wire.encode_download(node, *to, data, sized=sized, extended=extended) for data in values]
+    told = [wire.encode_upload_reply(node, *at, data, extended=extended) for data in values]
+    return {
+        "write": (goals, [wire.encode_download_reply(node, *to, extended=extended)]),
+        "read": ([wire.encode_upload(node, *at, extended=extended)], told),
+    }
+
+
+def report_frames(family: Family, node: int) -> list[CanFrame]:
+    """A report of every position."""
+    dialect = driver.dialect_of(family)
+    profile, extended = dialect.profile, dialect.extended(node)
+    form = profile.report_forms[0] if profile.report_forms else "sdo"
+    return [
+        wire.encode_report(node, raw, form=form, extended=extended)
+        for raw in range(-profile.limit, profile.limit + 1)
+    ]
+
+
+def say(event: Any) -> str:
+    """What an event of a scan or of provisioning says, in words; "" for one that says nothing to people."""
+    if isinstance(event, driver.Suspicion):
+        where = f"#{event.node} " if event.node else ""
+        return f"{where}at {event.rate} bit/s: {event.what}"
+    if isinstance(event, driver.Skipped):
+        return f"nothing was sent at {event.rate} bit/s: {event.why}"
+    return ""

@@ -1,0 +1,66 @@
+"""What the commands of this family share: one servo, by its address, and a verb carried out or only shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Final, TypeVar
+
+from cyclopts import App, Parameter
+
+from motorbus.cli import dry
+from motorbus.cli.output import Output
+from motorbus.cli.target import Target, device, face, opened, target
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from motorbus.families.kst import Servo
+
+T = TypeVar("T")
+
+NAME: Final = "kst"
+
+app = App(name=NAME, help="What only kst devices can do.", help_epilogue="")
+
+Device = Annotated[str, Parameter(name="BUS#ID")]
+Flag = Annotated[bool, Parameter(negative="")]
+Silent = Annotated[Output, Parameter(parse=False)]
+
+
+def ours(found: Target) -> Target:
+    """The same target. Raises RequestError when it is on a bus of another family."""
+    if found.family.name != NAME:
+        raise RequestError(f"{found.bus} is no {NAME} bus", advice="nothing was sent")
+    return found
+
+
+def one_of_ours(text: str) -> Target:
+    """BUS#ID with exactly one servo of this family. Raises RequestError otherwise, id 0 (everyone) included."""
+    ours(target(text.partition("#")[0]))
+    return ours(device(text))
+
+
+def on_servo(
+    text: str,
+    options: Mapping[str, str],
+    output: Output,
+    do: Callable[[Servo], T],
+    *,
+    dry_run: bool = False,
+) -> tuple[int, T]:
+    """Open the bus of BUS#ID and let `do` have the servo; its id, and what came of it.
+
+    With `dry_run` what would change something is shown and not sent, and what comes back is worth nothing.
+    """
+    bus, _, (node,) = one_of_ours(text)
+    with opened(bus, options, output) as opening:
+        rehearsal = dry.DryBus(opening)
+        result = do(face(rehearsal if dry_run else opening, node))
+    if dry_run:
+        dry.show(rehearsal, output)
+    return node, result
+
+
+def named(node: int) -> str:
+    """#37 (0x25), as it is spoken of in prose."""
+    return f"#{node} (0x{node:02X})"

@@ -1,0 +1,142 @@
+"""Everyone at once: requests to node 0, which all carry out and each answers under its own id.
+
+The manual says that 0 is a broadcast and not which requests it allows. A public demo driver reads so; that writes are
+carried out follows from the manual, whether they are acknowledged is not known, so silence is no error here. With one
+exception: nobody gives all servos one id by mistake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from motorbus.core.entry import Entry, Value
+from motorbus.core.operation import (
+    ANY,
+    EVERY_LANE,
+    Alone,
+    Answer,
+    Effect,
+    Exchange,
+    Goal,
+    Operation,
+    Rank,
+    Timeout,
+)
+from motorbus.errors import RequestError
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.dialect import PLAIN, Dialect
+from motorbus.families.kst.driver.identity import code_of
+from motorbus.families.kst.driver.motion import counts
+from motorbus.families.kst.driver.node import Node, checked_id, checked_ids
+from motorbus.families.kst.table import SAVE
+
+
+def broadcast_read(name: str, dialect: Dialect = PLAIN) -> Operation[dict[int, Value]]:
+    """An object of everyone, in API units, by node; who refuses it, or is silent, is missing.
+
+    Raises RequestError for an object that is unknown or can only be written.
+    """
+    row = dialect.profile.table[name]
+    if not row.readable:
+        raise RequestError(f"{name} can only be written", advice="nothing was sent")
+    found: dict[int, Value] = {}
+    for extended in sorted(dialect.formats):
+        frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
+        answer = yield from Exchange[Answer](frame, ANY, lane=EVERY_LANE)
+        found |= _values(row, answer)
+    return found
+
+
+def _values(row: Entry, answer: Answer) -> dict[int, Value]:
+    found: dict[int, Value] = {}
+    for reply in answer.replies:
+        one = wire.decode_reply(reply.data)
+        if one is not None and one.kind == "upload" and _about(row, one) and len(one.data) >= row.size:
+            found[reply.lane] = row.to_value(row.decode(one.data[: row.size]))
+    return found
+
+
+def _about(row: Entry, reply: wire.SdoReply) -> bool:
+    return (reply.index, reply.subindex) == (row.address, row.subindex or 0)
+
+
+def broadcast_position(
+    to: float, nodes: Sequence[int], dialect: Dialect = PLAIN
+) -> Operation[tuple[int, ...]]:
+    """Send everyone on the bus to `to` rad; returns who acknowledged.
+
+    `nodes` are those that are there, for the gate and the emergency stop; everyone else on the bus moves as well.
+    Raises LimitExceeded when `to` is outside the range of the profile, RequestError for no nodes.
+    """
+    there = checked_ids(nodes)
+    if not there:
+        raise RequestError(
+            "who is on this bus? everyone will move, and what moves must be known to be stopped",
+            expected="the ids of all servos on it",
+            advice="scan() lists them; nothing was sent",
+        )
+    row = dialect.profile.table["goal_position"]
+    raw = counts(Node(there[0], dialect), to)
+    value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
+    goals = tuple(Goal(node, "position", value, low, high) for node in there)
+    return (yield from _written(dialect, row, raw, goals))
+
+
+def broadcast_save(dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
+    """Let everyone save; returns who acknowledged, which by the manual is nobody. The bus is then left alone until the
+    flash of all has been written."""
+    row = dialect.profile.table["store"]
+    return (yield from Alone(_written(dialect, row, SAVE, timeout=Timeout.STORE)))
+
+
+def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
+    """Give everyone another bit rate (bit/s), in force after a save and a restart; returns who acknowledged."""
+    return (yield from _written(dialect, dialect.profile.table["bit_rate_code"], code_of(rate)))
+
+
+def broadcast_node_id(
+    new: int, dialect: Dialect = PLAIN, *, force: bool = False
+) -> Operation[tuple[int, ...]]:
+    """Give everyone on the bus this id. Raises RequestError without `force`: with more than one servo there, they could
+    not be told apart any more."""
+    checked_id(new)
+    if not force:
+        raise RequestError(
+            f"a broadcast would give every servo on this bus the id {new}",
+            cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
+            advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
+        )
+    return (yield from _written(dialect, dialect.profile.table["node_id"], new))
+
+
+def _written(
+    dialect: Dialect,
+    row: Entry,
+    raw: int,
+    goals: tuple[Goal, ...] = (),
+    *,
+    timeout: Timeout = Timeout.REPLY,
+) -> Operation[tuple[int, ...]]:
+    acknowledged: list[int] = []
+    for extended in sorted(dialect.formats):
+        answer = yield from _write(dialect, row, row.encode(raw), goals, timeout, extended)
+        for reply in answer.replies:
+            one = wire.decode_reply(reply.data)
+            if one is not None and one.kind == "download" and _about(row, one):
+                acknowledged.append(reply.lane)
+    return tuple(dict.fromkeys(acknowledged))
+
+
+def _write(
+    dialect: Dialect, row: Entry, data: bytes, goals: tuple[Goal, ...], timeout: Timeout, extended: bool
+) -> Exchange[Answer]:
+    frame = wire.encode_download(
+        wire.EVERYONE,
+        row.address,
+        row.subindex or 0,
+        data,
+        sized=dialect.sized == "yes",
+        extended=extended,
+    )
+    rank = Rank.CONTROL if row.effect is Effect.MOTION else Rank.CONFIGURATION
+    return Exchange(frame, ANY, lane=EVERY_LANE, rank=rank, effect=row.effect, goals=goals, timeout=timeout)

@@ -1,0 +1,138 @@
+"""What newer firmware lets one set: reports, the mid point, travel limits, the sense of rotation.
+
+None of this is in the manual; a profile that lacks it refuses, and names those that have it. What is kept is read
+back, saved and read back again (`keeping.py`). Source of each object: its row in the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Alone, Operation, Rank
+from motorbus.errors import RequestError
+from motorbus.families.kst.driver.exchanges import decided, order, upload_row
+from motorbus.families.kst.driver.feedback import position_exchange
+from motorbus.families.kst.driver.keeping import keep, save, settled
+from motorbus.families.kst.driver.motion import start_exchange
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.refusals import lacking
+from motorbus.families.kst.table import REVERSED
+
+MID_POINT: Final[Mapping[str, int]] = {"xqpower": 1}
+"""What is written to set the mid point, by profile: 1 by the XQPOWER module, 0 by the public demo driver for KST."""
+
+
+def start_reports(node: Node, interval: float | None = None) -> Operation[None]:
+    """Let it report its position by itself, every `interval` seconds (None: as it is set); nobody answers that.
+
+    Where the profile has a start rule, this is the start that lets it move, too. Raises RequestError where the profile
+    has no reports or the interval is out of range.
+    """
+    row = _row(node, "report_interval", "reports")
+    _startable(node)
+    raw = None if interval is None else node.raw(row, interval)
+    if raw is not None:
+        row.encode(raw)
+    yield from decided(node)
+    if raw is not None:
+        yield from order(node, row, raw)
+    yield from start_exchange(node, True)
+
+
+def stop_reports(node: Node) -> Operation[None]:
+    """Let it report no more. Where the profile has a start rule, it then ignores positions until the next start."""
+    _row(node, "report_interval", "reports")
+    _startable(node)
+    yield from decided(node)
+    yield from start_exchange(node, False)
+
+
+def set_mid_point(node: Node) -> Operation[float]:
+    """Make the present position the zero, and save; returns the position (rad) that it tells afterwards, about 0.
+
+    No source tells what becomes of the old target, which now lies elsewhere: keep clear, and order a target next.
+    """
+    row = _row(node, "mid_point", "mid point")
+    yield from decided(node)
+    return (yield from Alone(_mid_point(node, row)))
+
+
+def _mid_point(node: Node, row: Entry) -> Operation[float]:
+    node.limits = None
+    yield from order(node, row, MID_POINT.get(node.profile.name, 0), rank=Rank.CONFIGURATION)
+    yield from save(node)
+    yield from settled(node)
+    return (yield from position_exchange(node))
+
+
+def travel_limits(node: Node) -> Operation[tuple[float, float]]:
+    """Lowest and highest position, rad, as the servo is set."""
+    low, high = _limits(node)
+    yield from decided(node)
+    raws = (yield from upload_row(node, low, int)), (yield from upload_row(node, high, int))
+    return float(low.to_value(raws[0])), float(high.to_value(raws[1]))
+
+
+def set_travel_limits(node: Node, low: float, high: float) -> Operation[None]:
+    """Keep it between `low` (at most 0) and `high` (at least 0), rad; read back, saved, and read back again.
+
+    While the sense of rotation is reversed, a change of one limit changes the other too: VerificationFailed tells so
+    unless they are symmetric; set_reversed(False) first, as a public flight-controller driver does. Raises
+    RequestError for limits that are impossible or leave no way at all.
+    """
+    orders = [(row, node.raw(row, value)) for row, value in zip(_limits(node), (low, high), strict=True)]
+    for row, raw in orders:
+        row.encode(raw)
+    if orders[0][1] == orders[1][1]:
+        raise RequestError(
+            f"node {node.node}: limits {low} and {high} rad leave no way to go",
+            advice="give a low limit below 0, or a high one above; nothing was sent",
+            node=node.node,
+        )
+    yield from keep(node, orders)
+
+
+def reversed_(node: Node) -> Operation[bool]:
+    """Whether its sense of rotation is reversed."""
+    row = _row(node, "function_enable", "reverse bit")
+    yield from decided(node)
+    return bool((yield from upload_row(node, row, int)) >> REVERSED & 1)
+
+
+def set_reversed(node: Node, on: bool) -> Operation[None]:
+    """Reverse its sense of rotation, or not; the other bits of that object, which nobody knows, stay as they are.
+
+    Read, changed, written, read back (three tries), saved and read back again. In the reversed state a change of one
+    travel limit changes the other too, and the write may be undone by a restart: read reversed() after one.
+    """
+    row = _row(node, "function_enable", "reverse bit")
+    yield from decided(node)
+    yield from Alone(_turned(node, row, on))
+
+
+def _turned(node: Node, row: Entry, on: bool) -> Operation[None]:
+    raw = yield from upload_row(node, row, int)
+    bit = 1 << REVERSED
+    yield from keep(node, [(row, raw | bit if on else raw & ~bit)])
+
+
+def _limits(node: Node) -> tuple[Entry, Entry]:
+    return _row(node, "negative_limit", "travel limits"), _row(node, "positive_limit", "travel limits")
+
+
+def _row(node: Node, name: str, what: str) -> Entry:
+    if name not in node.table:
+        raise lacking(node, what, name)
+    return node.table[name]
+
+
+def _startable(node: Node) -> None:
+    if node.dialect.nmt == "none":
+        raise RequestError(
+            f"node {node.node}: this bus has no form of start and stop",
+            expected="nmt=vendor or nmt=standard",
+            advice="leave nmt at `profile`; nothing was sent",
+            node=node.node,
+        )

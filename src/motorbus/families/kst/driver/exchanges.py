@@ -1,0 +1,321 @@
+"""The exchanges everything else is made of: read an object, write one, hand a long one over in segments.
+
+A reply is believed for its index and sub-index, on acknowledgements too; a refusal becomes a DeviceError in the
+manual's words. Requests say 0x22, as the manual does, which leaves the length of the data to the object; a node that
+refuses exactly this is written to in CiA 301's sized form from then on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+from motorbus.core.entry import Entry
+from motorbus.core.operation import (
+    ANY,
+    Alone,
+    Answer,
+    CanFrame,
+    Effect,
+    Exchange,
+    Goal,
+    Operation,
+    Rank,
+    Runnable,
+    Timeout,
+)
+from motorbus.errors import DeviceError, NoReply, UnexpectedReply
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.wire import ABORTS, SdoReply, abort_text
+
+T = TypeVar("T")
+
+NODE_ID: Final = 0x3000
+POSITION: Final = 0x6002
+GOAL: Final = 0x6003
+STORE: Final = 0x1010
+UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x0607_0013))
+"""Refusals that may mean "state the length"."""
+ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
+"""Refusals that mean "there is nothing to read here"."""
+LONGEST: Final = 256
+"""Bytes of a segmented value that are taken; a version text has a few dozen."""
+GIVE_UP: Final = 0x0800_0000
+"""What a client's abort says: general error."""
+
+
+def upload(
+    node: Node,
+    index: int,
+    subindex: int,
+    take: Callable[[SdoReply], T],
+    *,
+    rank: Rank = Rank.POLL,
+    timeout: Timeout = Timeout.REPLY,
+    tells_position: bool = False,
+) -> Exchange[T]:
+    """Read an object; the value is what `take` makes of the reply. A refusal raises DeviceError."""
+
+    def read(answer: Answer) -> T:
+        return take(told(node, answer, index, subindex))
+
+    return Exchange(
+        wire.encode_upload(node.node, index, subindex, extended=node.dialect.extended(node.node)),
+        (wire.upload_due(node.node, index, subindex),),
+        read,
+        lane=node.node,
+        rank=rank,
+        timeout=timeout,
+        repeatable=True,
+        tells_position=tells_position,
+    )
+
+
+def upload_row(
+    node: Node, row: Entry, take: Callable[[int], T], *, tells_position: bool = False
+) -> Exchange[T]:
+    """Read a row of the table; the value is what `take` makes of its raw value."""
+
+    def decode(reply: SdoReply) -> T:
+        return take(row.decode(sized(node, row, reply)))
+
+    return upload(node, row.address, row.subindex or 0, decode, tells_position=tells_position)
+
+
+def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:
+    """The bytes of this row in a reply. Raises UnexpectedReply when it has fewer, or announces segments."""
+    if reply.kind == "upload" and len(reply.data) >= row.size:
+        return reply.data[: row.size]
+    came = f"{reply.size} bytes in segments" if reply.kind == "upload-start" else f"{len(reply.data)} bytes"
+    raise UnexpectedReply(
+        f"node {node.node} tells {row.name} in {came}, and not in {row.size}",
+        received=reply.data,
+        expected=f"{row.size} bytes",
+        cause=f"its firmware is not of the profile {node.profile.name}",
+        advice="choose the profile of its maker, as in kst:PORT,profile=kst-ext",
+        node=node.node,
+    )
+
+
+def download(
+    node: Node,
+    row: Entry,
+    data: bytes,
+    *,
+    states_length: bool,
+    goals: tuple[Goal, ...] = (),
+    rank: Rank = Rank.CONTROL,
+) -> Exchange[None]:
+    """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more."""
+    index, subindex = row.address, row.subindex or 0
+
+    def read(answer: Answer) -> None:
+        told(node, answer, index, subindex)
+
+    return Exchange(
+        wire.encode_download(
+            node.node,
+            index,
+            subindex,
+            data,
+            sized=states_length,
+            extended=node.dialect.extended(node.node),
+        ),
+        (wire.download_due(node.node, index, subindex),),
+        read,
+        lane=node.node,
+        rank=rank,
+        effect=row.effect,
+        goals=goals,
+        repeatable=True,
+    )
+
+
+def order(
+    node: Node, row: Entry, raw: int, goals: tuple[Goal, ...] = (), *, rank: Rank = Rank.CONTROL
+) -> Operation[None]:
+    """Write a row. Raises DeviceError when the node refuses it, OutcomeUnknown when it never acknowledges."""
+    yield from decided(node)
+    data = row.encode(raw)
+    states_length = node.dialect.states_length(node.node)
+    try:
+        yield from download(node, row, data, states_length=states_length, goals=goals, rank=rank)
+    except DeviceError as refusal:
+        if states_length or node.dialect.sized != "auto" or meant(refusal.code) not in UNSIZED_REFUSED:
+            raise
+        yield from download(node, row, data, states_length=True, goals=goals, rank=rank)
+        node.dialect.learn_sized(node.node)
+
+
+def told(node: Node, answer: Answer, index: int, subindex: int) -> SdoReply:
+    """What the one reply of an answer says. Raises DeviceError for a refusal."""
+    node.at = answer.at
+    reply = wire.decode_reply(answer.replies[0].data)
+    if reply is None:
+        raise UnexpectedReply(
+            f"node {node.node} sent what is no reply", received=answer.replies[0].data, node=node.node
+        )
+    if reply.kind == "abort":
+        raise refused(node, reply, index, subindex)
+    return reply
+
+
+def refused(node: Node, reply: SdoReply, index: int, subindex: int) -> DeviceError:
+    """The error for an abort, which repeats index and sub-index of the request, or leaves them 0."""
+    row = node.table.at(index, subindex)
+    name = row.name if row else f"object 0x{index:04X}:{subindex}"
+    error = DeviceError(
+        f"node {node.node} refused {name}: {abort_text(reply.code)}",
+        code=reply.code,
+        register=row.name if row else "",
+        expected=f"an answer about 0x{index:04X}:{subindex}",
+        cause=_cause(node, meant(reply.code)),
+        node=node.node,
+    )
+    if (reply.index, reply.subindex) != (index, subindex):
+        error.add_note(
+            f"the refusal names 0x{reply.index:04X}:{reply.subindex}; it was taken for the answer, because the "
+            f"manual leaves open what it repeats"
+        )
+    return error
+
+
+def _cause(node: Node, code: int) -> str:
+    if code in ABSENT:
+        return f"this servo lacks what the profile {node.profile.name} has: older firmware, or another maker"
+    return ""
+
+
+def meant(code: int) -> int:
+    """The abort code, also when the node sent its bytes the wrong way round."""
+    swapped = int.from_bytes(code.to_bytes(4, "little"), "big")
+    return swapped if code not in ABORTS and swapped in ABORTS else code
+
+
+# --- which id format a node answers -------------------------------------------------------------------------
+
+
+def ready(node: Node, say: Callable[[Node], Runnable[T]]) -> Runnable[T]:
+    """What `say` says; preceded, where ids may have two formats, by finding out which one this node answers."""
+    return _after(node, say) if node.dialect.undecided(node.node) else say(node)
+
+
+def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> Operation[T]:
+    yield from decided(node)
+    return (yield from say(node))
+
+
+def decided(node: Node) -> Operation[None]:
+    """Find out, once, which id format this node answers: 11 bits are tried first. Raises NoReply for neither."""
+    if not node.dialect.undecided(node.node):
+        return
+    for extended in (False, True):
+        try:
+            yield from answers(node, extended)
+        except NoReply:
+            if extended:
+                raise
+        else:
+            node.dialect.learn_format(node.node, extended)
+            return
+
+
+def answers(node: Node, extended: bool) -> Exchange[None]:
+    """Ask for the node id in this format; a refusal is an answer, silence raises NoReply."""
+
+    def read(answer: Answer) -> None:
+        node.at = answer.at
+
+    return Exchange(
+        wire.encode_upload(node.node, NODE_ID, extended=extended),
+        (wire.upload_due(node.node, NODE_ID),),
+        read,
+        lane=node.node,
+        repeatable=True,
+    )
+
+
+# --- values longer than four bytes --------------------------------------------------------------------------
+
+
+def whole(node: Node, row: Entry) -> Operation[bytes]:
+    """All bytes of a value: four at most in the one reply that KST servos give, else segment by segment.
+
+    A transfer in segments is carried out with the bus to itself, for a second request would end it. Raises
+    DeviceError for a refusal, UnexpectedReply for segments out of order or without end.
+    """
+    yield from decided(node)
+    first = yield from _begin(node, row)
+    if first.kind == "upload":
+        return first.data
+    return (yield from Alone(_segments(node, row)))
+
+
+def _begin(node: Node, row: Entry) -> Exchange[SdoReply]:
+    return upload(node, row.address, row.subindex or 0, lambda reply: reply)
+
+
+def _segments(node: Node, row: Entry) -> Operation[bytes]:
+    first = yield from _begin(node, row)  # once more, for something else may have come in between
+    if first.kind == "upload":
+        return first.data
+    data, toggle, last = b"", 0, False
+    while not last:
+        segment = yield from _segment(node, toggle)
+        data += segment.data
+        toggle, last = 1 - toggle, segment.last
+        if len(data) > LONGEST:
+            yield from _give_up(node, row)
+            raise UnexpectedReply(
+                f"node {node.node} tells {row.name} in more than {LONGEST} bytes and does not end",
+                received=data[:32],
+                node=node.node,
+            )
+    if first.size is not None and len(data) != first.size:
+        raise UnexpectedReply(
+            f"node {node.node} announced {first.size} bytes of {row.name} and sent {len(data)}",
+            received=data,
+            node=node.node,
+        )
+    return data
+
+
+def _segment(node: Node, toggle: int) -> Exchange[SdoReply]:
+    def read(answer: Answer) -> SdoReply:
+        return told(node, answer, 0, 0)
+
+    return Exchange(
+        wire.encode_segment(node.node, toggle, extended=node.dialect.extended(node.node)),
+        (wire.segment_due(node.node, toggle),),
+        read,
+        lane=node.node,
+    )
+
+
+def _give_up(node: Node, row: Entry) -> Exchange[None]:
+    frame = wire.encode_abort(
+        node.node, row.address, row.subindex or 0, GIVE_UP, extended=node.dialect.extended(node.node)
+    )
+    return Exchange(frame, (), lambda _: None, lane=node.node)
+
+
+# --- replies that are counted, or may be missing ------------------------------------------------------------
+
+
+def listening(
+    node: Node,
+    frame: CanFrame,
+    take: Callable[[list[SdoReply], float], T],
+    *,
+    timeout: Timeout,
+    effect: Effect = Effect.NONE,
+    rank: Rank = Rank.CONFIGURATION,
+) -> Exchange[T]:
+    """Send a frame and take whatever comes from this node until the time is up; silence is an answer too."""
+
+    def read(answer: Answer) -> T:
+        replies = [wire.decode_reply(reply.data) for reply in answer.replies]
+        return take([reply for reply in replies if reply is not None], answer.at)
+
+    return Exchange(frame, ANY, read, lane=node.node, rank=rank, effect=effect, timeout=timeout)

@@ -1,0 +1,111 @@
+"""What a servo feels: its position, and with newer firmware its current and its temperature.
+
+The manual reads the status by the very frame that reads the position, and answers alike; four public drivers read it
+elsewhere. So by the profile `kst` a status is two bytes that nothing decodes, and a warning.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Entry
+from motorbus.core.family import State
+from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.families.kst import table
+from motorbus.families.kst.driver.exchanges import decided, ready, upload, upload_row
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.refusals import lacking
+from motorbus.families.kst.wire import SdoReply
+
+SAME_FRAME: Final = (
+    "the manual's command 7 is the same frame as its command 6, read position: this device may be returning the "
+    "position, low byte first"
+)
+
+
+class RawStatus(NamedTuple):
+    """The two status bytes of the manual's command 7, as they came; `warning` says why nothing decodes them."""
+
+    x1: int
+    x2: int
+    warning: str = SAME_FRAME
+
+
+class Status(NamedTuple):
+    """The status of a servo with newer firmware: supply current in A, temperature in °C."""
+
+    current: float
+    temperature: float
+
+
+def position(node: Node) -> Runnable[float]:
+    """Present position, rad."""
+    return ready(node, position_exchange)
+
+
+def position_exchange(node: Node) -> Exchange[float]:
+    """As `position`, of a servo whose id format is known: one exchange that can be kept and run again."""
+    row = node.table["present_position"]
+    return upload_row(node, row, lambda raw: float(row.to_value(raw)), tells_position=True)
+
+
+def status(node: Node) -> Runnable[RawStatus | Status]:
+    """By the profile `kst` the two raw bytes of command 7, with a warning; else current (A) and temperature (°C)."""
+    return ready(node, raw_status if node.profile.status_row is None else _status)
+
+
+def raw_status(node: Node) -> Exchange[RawStatus]:
+    """The manual's command 7, whatever the profile: the bytes may be a position."""
+    row = node.table["present_position"]
+
+    def take(reply: SdoReply) -> RawStatus:
+        return RawStatus(*(reply.data + bytes(2))[:2])
+
+    return upload(node, row.address, row.subindex or 0, take)
+
+
+def current(node: Node) -> Runnable[float]:
+    """Supply current, A. Raises RequestError where the profile has no status object."""
+    _status_row(node)
+    return ready(node, lambda same: _part(same, "current"))
+
+
+def temperature(node: Node) -> Runnable[float]:
+    """Temperature inside, °C. Raises RequestError where the profile has no status object."""
+    _status_row(node)
+    return ready(node, lambda same: _part(same, "temperature"))
+
+
+def telemetry(node: Node) -> Operation[State]:
+    """One sample: position (rad); current (A) and temperature (°C) where the profile has them; alarms heard lately.
+
+    Whether it moves, how fast, at what voltage and under what load is None: these servos do not tell.
+    """
+    yield from decided(node)
+    here = yield from position_exchange(node)
+    at = node.at
+    if node.profile.status_row is None:
+        return State(at=at, position=here, alarm=node.alarm)
+    felt = yield from _status(node)
+    return State(at=at, position=here, current=felt.current, temperature=felt.temperature, alarm=node.alarm)
+
+
+def _status(node: Node) -> Exchange[Status]:
+    def take(raw: int) -> Status:
+        return Status(table.current(node.profile, raw), float(table.temperature(node.profile, raw)))
+
+    return upload_row(node, _status_row(node), take)
+
+
+def _part(node: Node, name: str) -> Exchange[float]:
+    def take(raw: int) -> float:
+        status = Status(table.current(node.profile, raw), float(table.temperature(node.profile, raw)))
+        return float(getattr(status, name))
+
+    return upload_row(node, _status_row(node), take)
+
+
+def _status_row(node: Node) -> Entry:
+    if node.profile.status_row is None:
+        raise lacking(node, "current and temperature", "status")
+    return node.profile.status_row

@@ -1,0 +1,129 @@
+"""Writing what survives power-off: write, read back, save, wait for the flash, read back again.
+
+These servos have no lock; the danger is another one. A save is not answered (the manual), so nothing tells that it
+was heard; requests during the write to flash are lost or answered with passing values, so the node is left alone
+for a while; and some writes fail or are undone. Only what reads back is said to be written, and only what reads back
+after a restart is said to be saved: `provision` does that, for it alone waits for one.
+Source: KST CAN protocol manual, command 3; a public flight-controller driver for the wait, the reading back and its
+three tries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Alone, Effect, Exchange, Operation, Pause, Rank, Timeout
+from motorbus.errors import VerificationFailed
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.exchanges import STORE, decided, listening, order, refused, upload_row
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.table import SAVE
+from motorbus.families.kst.wire import SdoReply
+
+TRIES: Final = 3
+LISTEN: Final = 0.020
+"""s after a save in which an acknowledgement or a refusal may come; the manual says that none does."""
+
+
+def save(node: Node) -> Operation[None]:
+    """Keep node id, bit rate, travel limits and function bits over power-off; never the goal position.
+
+    No answer is expected; one that comes is taken, and a refusal raises DeviceError. The servo is left alone until its
+    flash has been written. That it has saved shows only after a restart.
+    """
+    yield from decided(node)
+    yield from save_exchange(node)
+
+
+def save_exchange(node: Node) -> Exchange[None]:
+    """The save alone; it holds the lane of this node for the listening time and the write to flash."""
+    row = node.table["store"]
+    data = row.encode(SAVE)
+
+    def take(replies: list[SdoReply], at: float) -> None:
+        node.at = at
+        for reply in replies:
+            if reply.kind == "abort" and reply.index in (STORE, 0):
+                raise refused(node, reply, row.address, row.subindex or 0)
+
+    frame = wire.encode_download(
+        node.node,
+        row.address,
+        row.subindex or 0,
+        data,
+        sized=node.dialect.states_length(node.node),
+        extended=node.dialect.extended(node.node),
+    )
+    return listening(node, frame, take, timeout=Timeout.STORE, effect=Effect.PERSISTENT)
+
+
+def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+    """Write these rows, read back, save, read back again; nobody else is on the bus meanwhile.
+
+    Raises VerificationFailed when a row reads back different after three tries, or after the save.
+    """
+    node.limits = None
+    try:
+        yield from Alone(_kept(node, orders))
+    finally:
+        node.limits = None
+
+
+def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+    for row, raw in orders:
+        yield from verified(node, row, raw)
+    yield from checked(node, orders)  # together, for one may have changed another
+    yield from save(node)
+    yield from settled(node)
+    yield from checked(node, orders)
+
+
+def settled(node: Node) -> Operation[None]:
+    """Wait on where this servo's make needs longer than the bus waits after a save anyway."""
+    rest = node.profile.mid_point_wait - node.profile.flash_wait
+    if rest > 0:
+        yield from Pause(rest)
+
+
+def verified(node: Node, row: Entry, raw: int) -> Operation[None]:
+    """Write a row and read it back, three times at most; what cannot be read is written once."""
+    for attempt in range(TRIES):
+        yield from order(node, row, raw, rank=Rank.CONFIGURATION)
+        if not row.readable:
+            return
+        try:
+            yield from checked(node, [(row, raw)])
+        except VerificationFailed:
+            if attempt == TRIES - 1:
+                raise
+        else:
+            return
+
+
+def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+    """Read these rows back. Raises VerificationFailed when one differs."""
+    for row, raw in orders:
+        if row.readable:
+            found = yield from upload_row(node, row, int)
+            if found != raw:
+                raise _differs(node, row, raw, found)
+
+
+def _differs(node: Node, row: Entry, raw: int, found: int) -> VerificationFailed:
+    cause = "the servo does not take this value, or a write failed, which is known of these servos"
+    if row.name.endswith("_limit"):
+        cause = (
+            "while the sense of rotation is reversed a change of one travel limit changes the other too: "
+            "set_reversed(False) first, or give symmetric limits"
+        )
+    return VerificationFailed(
+        f"node {node.node}: {row.name} reads back {found}, not {raw}",
+        sent=row.encode(raw),
+        received=row.encode(found) if row.low <= found <= row.high else b"",
+        expected=f"raw {raw}",
+        cause=cause,
+        advice="read it again, then write it again; until it reads back right do not rely on it",
+        node=node.node,
+    )

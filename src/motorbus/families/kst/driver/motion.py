@@ -1,0 +1,173 @@
+"""Moving and standing still.
+
+These servos know one thing: a target position, at which they go by themselves, at once and at their own speed. They
+have no torque switch, and standing still is a target too: the position of this moment. Some makes ignore every
+target until they were started. Source: KST CAN protocol manual, command 5; the start rule is from a public XQPOWER
+module.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Entry, changed
+from motorbus.core.operation import CanFrame, Effect, Exchange, Goal, Operation, Rank, Report
+from motorbus.errors import DeviceError, LimitExceeded, RequestError
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.arrival import Move, arrive
+from motorbus.families.kst.driver.exchanges import ABSENT, decided, meant, order, upload_row
+from motorbus.families.kst.driver.node import Node
+
+TOLERANCE: Final = 0.02
+"""rad, a little more than a degree: under load a servo stays off its target, by how much no source tells."""
+TOO_FAR: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032))
+"""Refusals of a position beyond the range."""
+
+
+class Promise(Enum):
+    """What an acknowledged stop promises, and no more than that."""
+
+    HOLD_REQUESTED = (
+        "target := last fresh position: requested of each node that acknowledged; it goes back or on to where it "
+        "was then and holds there; standstill was not verified, and there is no way to switch its torque off"
+    )
+
+
+class Started(NamedTuple):
+    """An event: this servo was started, because its make ignores positions before that."""
+
+    node: int
+    frame: CanFrame
+
+
+def move(
+    node: Node,
+    to: float,
+    *,
+    wait: bool = True,
+    tolerance: float = TOLERANCE,
+    timeout: float | None = None,
+) -> Operation[None]:
+    """Move to `to` rad, at the servo's own speed; returns when it is in position, at once with `wait=False`.
+
+    In position is: two looks in a row within `tolerance` rad. Raises LimitExceeded when `to` is not a finite number,
+    is outside the profile's range (nothing is sent then) or outside the travel limits of the servo, Stalled when it
+    stays off its target, MotionError after `timeout` seconds (None: from the way). Where the profile has a start rule,
+    the start is sent first and reported as `Started`.
+    """
+    raw = counts(node, to)
+    _checked_waiting(node, tolerance, timeout)
+    yield from send_goal(node, (yield from goal_of(node, raw)))
+    if wait:
+        row = node.table["goal_position"]
+        yield from arrive(node, Move(float(row.to_value(raw)), tolerance, timeout))
+
+
+def goal_of(node: Node, raw: int) -> Operation[Goal]:
+    """What this raw target orders, with the limits for the gate: those of the servo, else those of the profile."""
+    if node.limits is None:
+        node.limits = yield from _limits(node)
+    return Goal(node.node, "position", float(node.table["goal_position"].to_value(raw)), *node.limits)
+
+
+def send_goal(node: Node, goal: Goal) -> Operation[None]:
+    """Order a target, with the start first where the profile has that rule; it is sent each time, for a servo that
+    lost its supply has forgotten it, and it costs a short frame."""
+    row = node.table["goal_position"]
+    if node.dialect.must_start:
+        yield from started(node)
+    yield from order(node, row, node.raw(row, goal.value), (goal,))
+
+
+def started(node: Node) -> Operation[None]:
+    """Start this servo and say so."""
+    exchange = start_exchange(node, True)
+    assert isinstance(exchange.request, CanFrame)
+    yield from exchange
+    yield from Report(Started(node.node, exchange.request))
+
+
+def start_exchange(node: Node, on: bool) -> Exchange[None]:
+    """Start or stop, in the form of this bus; nobody answers. Where it lets a servo move, it counts as torque."""
+    form = node.dialect.nmt
+    frame = wire.encode_start(form, node.node, on, extended=node.dialect.extended(node.node))
+    effect = Effect.TORQUE if form == "standard" else Effect.NONE
+    return Exchange(frame, (), lambda _: None, lane=node.node, rank=Rank.CONTROL, effect=effect)
+
+
+def stop(node: Node) -> Operation[Promise]:
+    """Stay: the target becomes the position of this moment. Returns what was promised.
+
+    The servo comes back to where it was when it was asked. Its torque stays on: these servos have no switch for it.
+    """
+    yield from decided(node)
+    here = yield from upload_row(node, node.table["present_position"], int, tells_position=True)
+    row = node.table["goal_position"]
+    try:
+        yield from _hold(node, row, here)
+    except DeviceError as refusal:
+        if meant(refusal.code) not in TOO_FAR or abs(here) <= node.profile.limit:
+            raise
+        yield from _hold(node, row, max(-node.profile.limit, min(here, node.profile.limit)))
+    return Promise.HOLD_REQUESTED
+
+
+def _hold(node: Node, row: Entry, raw: int) -> Operation[None]:
+    """Target := this place, also when it lies beyond the range, for there it stands; the goal brings its own limits."""
+    value = float(row.to_value(raw))
+    yield from order(node, beyond(row), raw, (Goal(node.node, "position", value, value, value),))
+
+
+def beyond(row: Entry) -> Entry:
+    """The same row with all that its bytes can say for its range."""
+    reach = 1 << 8 * row.size - 1
+    return changed(row, low=-reach, high=reach - 1)
+
+
+def _limits(node: Node) -> Operation[tuple[float, float]]:
+    """The servo's travel limits where it has and tells them, inside the range of its profile."""
+    goal = node.table["goal_position"]
+    low, high = goal.low, goal.high
+    yield from decided(node)
+    for name in ("negative_limit", "positive_limit"):
+        if name in node.table:
+            raw = yield from _if_there(node, node.table[name])
+            low, high = (max(low, raw), high) if name == "negative_limit" else (low, min(high, raw))
+    return float(goal.to_value(low)), float(goal.to_value(high))
+
+
+def _if_there(node: Node, row: Entry) -> Operation[int]:
+    """Its raw value; where the servo lacks it, the row's own outer bound."""
+    try:
+        return (yield from upload_row(node, row, int))
+    except DeviceError as refusal:
+        if meant(refusal.code) not in ABSENT:
+            raise
+        return row.low or row.high
+
+
+def counts(node: Node, to: float) -> int:
+    """The raw target, halves away from zero. Raises LimitExceeded for what is no finite angle within the profile."""
+    row = node.table["goal_position"]
+    try:
+        return node.raw(row, to)
+    except RequestError as refusal:
+        if isinstance(to, bool) or not isinstance(to, int | float):
+            raise
+        raise LimitExceeded(
+            f"node {node.node}: {refusal.summary}",
+            expected=refusal.expected,
+            advice=refusal.advice,
+            node=node.node,
+        ) from None
+
+
+def _checked_waiting(node: Node, tolerance: float, timeout: float | None) -> None:
+    for value in (tolerance, timeout):
+        if value is not None and not 0 < value < float("inf"):
+            raise RequestError(
+                f"node {node.node}: {value} is not a finite number above 0",
+                advice="tolerance in rad, timeout in s; nothing was sent",
+                node=node.node,
+            )

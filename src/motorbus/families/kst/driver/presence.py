@@ -1,0 +1,115 @@
+"""Is one servo there, or two with one id, or none? Asked such that silence costs nothing and a second answer shows.
+
+Two servos with one id answer in one of two ways. Not quite together, and two answers come; or in the same moment,
+and then equal answers merge into one frame and unequal ones break each other. So they are asked several things that
+two servos seldom agree upon, again and again, and bus errors meanwhile count as a second one.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from motorbus.core.operation import (
+    Exchange,
+    Listen,
+    Notice,
+    Operation,
+    Timeout,
+    Together,
+    Tune,
+)
+from motorbus.errors import LinkError, LinkLost, NoReply, RequestError
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.dialect import Dialect
+from motorbus.families.kst.driver.exchanges import NODE_ID, POSITION, decided, listening
+from motorbus.families.kst.driver.line import FIRMWARE
+from motorbus.families.kst.driver.listening import GLANCE, Heard, heard
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.wire import SdoReply
+
+ROUNDS: Final = 3
+QUESTIONS: Final = (NODE_ID, POSITION, FIRMWARE)
+"""Ids may be equal, positions and versions seldom are to the last bit."""
+WATCH: Final = 0.5
+"""s in which bus errors count; about as long as all questions take."""
+
+
+class Presence(NamedTuple):
+    """What came of asking: when (s), the most answers to one request, the id read back, bus errors meanwhile."""
+
+    at: float
+    most: int
+    reads_back: int | None = None
+    errors: bool = False
+
+    @property
+    def there(self) -> bool:
+        """Somebody answered."""
+        return self.most > 0
+
+    @property
+    def several(self) -> bool:
+        """More than one answered, or what answered broke."""
+        return self.most > 1 or self.errors
+
+
+def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
+    """Ask once; silence is an answer too."""
+
+    def take(replies: list[SdoReply], at: float) -> Presence:
+        mine = [reply for reply in replies if reply.index in (index, 0)]
+        told = [reply.data[0] for reply in mine if reply.kind == "upload" and index == NODE_ID]
+        return Presence(at, len(mine), told[0] if told else None)
+
+    frame = wire.encode_upload(node.node, index, extended=node.dialect.extended(node.node))
+    return listening(node, frame, take, timeout=Timeout.REPLY)
+
+
+def survey(node: Node) -> Operation[Presence]:
+    """Ask several times and watch for bus errors meanwhile; nobody else must be addressed at the same time."""
+    asked, error = yield from Together[Presence | Notice | None](
+        [_asked(node), iter(Listen(_is_error, WATCH))]
+    )
+    assert isinstance(asked, Presence)
+    return asked._replace(errors=error is not None)
+
+
+def _asked(node: Node) -> Operation[Presence]:
+    most, reads_back = 0, None
+    for index in QUESTIONS * ROUNDS:
+        look = yield from glance(node, index)
+        most = max(most, look.most)
+        reads_back = look.reads_back or reads_back
+    return Presence(look.at, most, reads_back)
+
+
+def settle_format(node: Node) -> Operation[None]:
+    """Find out the id format where it may be either; a node that answers neither is looked for in 11 bits."""
+    try:
+        yield from decided(node)
+    except NoReply:
+        return
+
+
+def glance_at(dialect: Dialect, rate: int) -> Operation[None]:
+    """Tune to a rate that the caller has named, after listening where the adapter can.
+
+    Raises RequestError when errors show that the bus is in use at another rate.
+    """
+    try:
+        said = yield from heard(dialect, rate, GLANCE)
+    except LinkLost:
+        raise
+    except LinkError:
+        said = Heard.SILENCE
+    if said is Heard.ERRORS:
+        raise RequestError(
+            f"nothing is sent at {rate} bit/s: {said.value}",
+            cause="other devices speak on this bus, and a frame at a wrong rate breaks theirs",
+            advice="connect this servo alone, and call again; nothing was written",
+        )
+    yield from Tune(rate)
+
+
+def _is_error(notice: Notice) -> bool:
+    return notice.kind == "bus error"

@@ -1,0 +1,261 @@
+"""Giving a servo its id and its bit rate, from the first look to the proof after the restart.
+
+Five things make this more than two writes: nothing is in force before a save and a restart; the save is not
+answered; no command restarts, so a person must; two servos with one id cannot be told apart afterwards; and power may
+go at any moment. So the state is always found out by asking, never remembered: whoever calls this again, after
+whatever happened, goes on from where things stand. "Saved" is only said after the servo came back with it.
+Source: KST CAN protocol manual, commands 1 to 4.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from motorbus.core.operation import (
+    Alone,
+    Operation,
+    Pause,
+    Progress,
+    Rank,
+    Report,
+    Tune,
+    afterwards,
+)
+from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.kst.driver.exchanges import order
+from motorbus.families.kst.driver.identity import code_of, identify, set_node_id
+from motorbus.families.kst.driver.keeping import save
+from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
+from motorbus.families.kst.driver.presence import Presence, glance, glance_at, settle_format, survey
+
+PATIENCE: Final = 120.0
+"""s to wait for the power cycle."""
+POLL: Final = 0.1
+"""s between two looks at whether it has come back."""
+GONE: Final = 3
+"""Silent looks in a row that count as a loss of power; a single one may be a lost frame."""
+STEPS: Final = 4
+
+
+class PowerCycleNeeded(NamedTuple):
+    """An event: the servo was told to save; somebody must now take its supply away and give it back."""
+
+    node: int
+    new_id: int
+    new_rate: int
+
+
+class Provisioned(NamedTuple):
+    """A servo that came back under this id and at this rate (bit/s); `resumed`: it had them already when asked."""
+
+    node: int
+    rate: int
+    firmware: str
+    resumed: bool
+
+
+class Job(NamedTuple):
+    """What is wanted: of the servo `old`, at `rate` now, to become `new` at `new_rate`."""
+
+    old: Node
+    new: Node
+    rate: int
+    new_rate: int
+
+    @property
+    def moves_rate(self) -> bool:
+        return self.new_rate != self.rate
+
+
+class Place(NamedTuple):
+    """Where the servo was found, and what is known of a restart: the id it read back when everything was written."""
+
+    node: Node
+    rate: int
+    reads_back: int | None = None
+
+
+def provision(
+    node: Node, *, new_id: int | None = None, new_rate: int | None = None, patience: float = PATIENCE
+) -> Operation[Provisioned]:
+    """Give this servo another id, another bit rate (bit/s), or both, and see it come back with them.
+
+    Checks that one servo alone answers and that the new id is free, writes, reads back, saves, reports
+    `PowerCycleNeeded`, waits at most `patience` seconds for it to come back, and verifies. May be called again at any
+    point. Whoever names a new rate says that this bus may be spoken to at it; it is listened to first.
+
+    Raises RequestError (nothing was written) for an impossible id or rate, an id that is taken, or two servos with one
+    id; NoReply when it is nowhere; VerificationFailed when it comes back as it was; OutcomeUnknown when it does not
+    come back in time.
+    """
+    if new_id is None and new_rate is None:
+        raise RequestError(
+            "what shall it become?", expected="new_id=, new_rate=, or both", advice="nothing was sent"
+        )
+    new = node if new_id is None else Node(checked_id(new_id), node.dialect)
+    if new_rate is not None:
+        code_of(new_rate)
+    rate = yield from Tune(0)
+    job = Job(node, new, rate, rate if new_rate is None else new_rate)
+    place = yield from Alone(afterwards(_changed(job), lambda: iter(Tune(rate))))
+    resumed = place is None
+    if place is not None:
+        yield from Report(PowerCycleNeeded(node.node, new.node, job.new_rate))
+        yield from _waited(job, place, patience)
+    yield from Report(Progress(STEPS - 1, STEPS, "it is back: verifying"))
+    return (yield from Alone(afterwards(_verified(job, resumed), lambda: iter(Tune(rate)))))
+
+
+# --- find out where things stand, and write what is missing -------------------------------------------------
+
+
+def _changed(job: Job) -> Operation[Place | None]:
+    """Write and save; returns where it was found. None when it has everything already, and nothing was written."""
+    yield from Report(Progress(0, STEPS, "looking who is there"))
+    where = yield from _found(job)
+    if (where.node.node, where.rate) == (job.new.node, job.new_rate):
+        return None
+    yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
+    if where.node.node != job.new.node:
+        yield from set_node_id(where.node, job.new.node)
+    if where.rate != job.new_rate:
+        row = where.node.table["bit_rate_code"]
+        yield from order(where.node, row, code_of(job.new_rate), rank=Rank.CONFIGURATION)
+    seen = yield from glance(where.node)
+    yield from Report(Progress(2, STEPS, "saving"))
+    yield from save(where.node)
+    return where._replace(reads_back=seen.reads_back)
+
+
+def _found(job: Job) -> Operation[Place]:
+    """Under which of both ids, and at which of both rates, does it answer now?"""
+    for rate in dict.fromkeys((job.rate, job.new_rate)):
+        if rate != job.rate:
+            yield from glance_at(job.old.dialect, rate)
+        there = yield from _at_this_rate(job, rate)
+        if there is not None:
+            return there
+    raise NoReply(
+        f"no servo answers as {_ids(job)}",
+        expected=f"one servo at {' or '.join(map(str, dict.fromkeys((job.rate, job.new_rate))))} bit/s",
+        cause="no power, a loose cable, another id, or another bit rate",
+        advice="`motorbus scan BUS` lists who answers; nothing was written",
+        node=job.old.node,
+    )
+
+
+def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
+    old = yield from _single(job.old)
+    if job.new.node == job.old.node:
+        return Place(job.old, rate) if old else None
+    new = yield from _single(job.new)
+    if old and new:
+        raise RequestError(
+            f"the id {hexadecimal(job.new.node)} is taken: a servo answers as it beside {hexadecimal(job.old.node)}",
+            advice="choose a free id, or take that servo off the bus; nothing was written",
+            node=job.new.node,
+        )
+    if new:
+        return Place(job.new, rate)
+    return Place(job.old, rate) if old else None
+
+
+def _single(node: Node) -> Operation[bool]:
+    """Is one servo there under this id? Raises RequestError when there are two."""
+    yield from settle_format(node)
+    found = yield from survey(node)
+    if found.several:
+        raise _two(node, found)
+    return found.there
+
+
+def _two(node: Node, found: Presence) -> RequestError:
+    signs = f"{found.most} answers to one request" if found.most > 1 else "bus errors whenever it is asked"
+    return RequestError(
+        f"two servos answer as {hexadecimal(node.node)}: {signs}",
+        cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
+        advice="connect one servo at a time, provision it, then the next; nothing was written",
+        node=node.node,
+    )
+
+
+def _ids(job: Job) -> str:
+    ids = dict.fromkeys((job.old.node, job.new.node))
+    return " or ".join(hexadecimal(node) for node in ids)
+
+
+# --- wait for the power cycle, and prove it -----------------------------------------------------------------
+
+
+def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
+    """Look at the old place and the new one in turn until it shows up at the new one."""
+    begun: float | None = None
+    silent = 0
+    while True:
+        now = yield from glance(place.node)
+        begun = now.at if begun is None else begun
+        came_back = silent >= GONE and now.there
+        silent = 0 if now.there else silent + 1
+        if (yield from _arrived(job, place, now)):
+            return
+        if now.there and (came_back or _forgot(job, place, now)):
+            raise _as_it_was(job, place)
+        if now.at - begun > patience:
+            raise _never_came(job, patience)
+        yield from Pause(POLL)
+
+
+def _arrived(job: Job, place: Place, now: Presence) -> Operation[bool]:
+    """Does it answer as it should by now? At another rate it is looked for only when it is silent at the old one."""
+    if place.rate == job.rate == job.new_rate:
+        return (yield from glance(job.new)).there
+    if now.there and place.rate == job.rate:
+        return False
+    return (yield from Alone(afterwards(_there(job), lambda: iter(Tune(job.rate)))))
+
+
+def _there(job: Job) -> Operation[bool]:
+    yield from Tune(job.new_rate)
+    return (yield from glance(job.new)).there
+
+
+def _forgot(job: Job, place: Place, now: Presence) -> bool:
+    """It read back the id to come, and reads back the old one now: it has restarted without it."""
+    return place.reads_back == job.new.node != place.node.node and now.reads_back == place.node.node
+
+
+def _verified(job: Job, resumed: bool) -> Operation[Provisioned]:
+    if job.moves_rate:
+        yield from Tune(job.new_rate)
+    identity = yield from identify(job.new)
+    found = identity.details["reads_back_id"]
+    if found not in (None, job.new.node):
+        raise VerificationFailed(
+            f"it answers as {hexadecimal(job.new.node)} and reads back the id {found}",
+            expected=str(job.new.node),
+            cause="another id was written to it since, which the next restart may bring into force",
+            advice="provision it again",
+            node=job.new.node,
+        )
+    yield from Report(Progress(STEPS, STEPS, "verified after the restart"))
+    return Provisioned(job.new.node, job.new_rate, identity.firmware, resumed)
+
+
+def _as_it_was(job: Job, place: Place) -> VerificationFailed:
+    return VerificationFailed(
+        f"{hexadecimal(place.node.node)} came back as it was, at {place.rate} bit/s: the change was not saved",
+        expected=f"{hexadecimal(job.new.node)} at {job.new_rate} bit/s",
+        cause="its supply went before its flash was written, or it did not hear the save, which it never answers",
+        advice="call provision again, and keep its supply on until the power cycle is asked for",
+        node=place.node.node,
+    )
+
+
+def _never_came(job: Job, patience: float) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"{hexadecimal(job.old.node)} was told to become {hexadecimal(job.new.node)} at {job.new_rate} bit/s and to "
+        f"save; it was not seen to come back within {patience:g} s",
+        cause="its supply has not been taken away and given back yet, and there is no other way to restart it",
+        advice="power-cycle it, then call provision again with the same arguments: it finds out where things stand",
+        node=job.old.node,
+    )

@@ -1,0 +1,93 @@
+"""At which bit rate is this bus? Listen at each; speak only where that can harm nobody.
+
+The rate as shipped is "provisional" (the manual), so it must be found, and finding it by speaking at wrong rates
+breaks the frames of a bus that is running. So nothing is sent unless somebody says that the bus is isolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from motorbus.core.family import Found
+from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, afterwards
+from motorbus.errors import LinkError, LinkLost, RequestError
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.dialect import PLAIN, Dialect
+from motorbus.families.kst.driver.identity import code_of
+from motorbus.families.kst.driver.listening import Heard, heard
+from motorbus.families.kst.driver.scanning import at_one_rate
+from motorbus.families.kst.table import RATES
+
+LISTEN: Final = 1.0
+"""s at each rate; traffic of 1 Hz and more is heard."""
+
+
+class BitRates(NamedTuple):
+    """What a search found.
+
+    `rate` (bit/s) is None when it is not known; `heard` says what was heard at each rate that was listened to; `found`
+    are the servos that answered, where anything was sent.
+    """
+
+    rate: int | None
+    heard: dict[int, Heard]
+    found: tuple[Found, ...] = ()
+
+
+def scan_bit_rates(
+    dialect: Dialect = PLAIN,
+    *,
+    rates: Sequence[int] = RATES,
+    isolated: bool = False,
+    seconds: float = LISTEN,
+) -> Operation[BitRates]:
+    """Find the bit rate of a bus: `seconds` of listening at each rate, then, only with `isolated`, asking.
+
+    A frame that comes whole proves a rate, and the search ends. Errors rule one out. Where all are silent nothing is
+    sent unless the caller says that the bus is isolated: that no machine depends on it. The rate is set again at the
+    end. Raises RequestError for an impossible rate, and for an adapter that cannot just listen unless `isolated`.
+    """
+    for rate in rates:
+        code_of(rate)
+    present = yield from Tune(0)
+    search = _searched(dialect, tuple(rates), isolated, seconds)
+    return (yield from Alone(afterwards(search, lambda: iter(Tune(present)))))
+
+
+def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seconds: float) -> Operation[BitRates]:
+    verdicts: dict[int, Heard] = {}
+    for number, rate in enumerate(rates):
+        try:
+            verdicts[rate] = yield from heard(dialect, rate, seconds)
+        except LinkLost:
+            raise
+        except LinkError as error:
+            if not isolated:
+                raise _cannot_listen(error) from error
+            verdicts[rate] = Heard.SILENCE
+        if verdicts[rate] is Heard.TRAFFIC:
+            return BitRates(rate, verdicts)
+        yield from Report(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
+    if isolated:
+        return (yield from _asked(dialect, verdicts))
+    return BitRates(None, verdicts)
+
+
+def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> Operation[BitRates]:
+    """The first rate at which somebody answers, of those at which no errors were heard."""
+    for rate in [rate for rate, verdict in verdicts.items() if verdict is Heard.SILENCE]:
+        yield from Tune(rate)
+        found = yield from at_one_rate(dialect, wire.NODES, rate, broadcast=True)
+        if found:
+            return BitRates(rate, verdicts, tuple(found))
+    return BitRates(None, verdicts)
+
+
+def _cannot_listen(error: LinkError) -> RequestError:
+    return RequestError(
+        "this adapter cannot listen without taking part, so its bit rate is not searched for",
+        cause=error.summary,
+        expected="an adapter with a listen-only mode, or a bus on which nothing depends",
+        advice="if nothing depends on this bus, say isolated=True; nothing was sent",
+    )

@@ -1,0 +1,228 @@
+"""Looking for servos: one broadcast read that all answer, then the silent ids one by one, many in flight at once.
+
+Looking reads one object that every make has, the node id, and never writes: the goal position of these servos is the
+preset of some encoders. A refusal counts as presence, too. What does not fit (two answers to one request, another id
+than the one that answers, bus errors) is told as a `Suspicion`.
+Source: a public demo driver for the broadcast; the rest is CiA 301.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+from motorbus.core.family import Found, Identity
+from motorbus.core.operation import (
+    ANY,
+    EVERY_LANE,
+    Alone,
+    Answer,
+    Exchange,
+    Operation,
+    Progress,
+    Rank,
+    Report,
+    Timeout,
+    Together,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkError, LinkLost, NoReply, WireError
+from motorbus.families.kst import wire
+from motorbus.families.kst.driver.dialect import PLAIN, WINDOW, Dialect
+from motorbus.families.kst.driver.exchanges import NODE_ID
+from motorbus.families.kst.driver.identity import identify
+from motorbus.families.kst.driver.listening import GLANCE, Heard, heard
+from motorbus.families.kst.driver.node import Node, checked_ids
+from motorbus.families.kst.wire import SdoReply
+
+PASSES: Final = 2
+"""Whoever is silent is asked once more: the first frame after power-up may be missed."""
+
+
+class Suspicion(NamedTuple):
+    """An event: something at this rate (and node; 0 for the bus) that a person should look at."""
+
+    node: int
+    rate: int
+    what: str
+
+
+class Skipped(NamedTuple):
+    """An event: nothing was sent at this rate, and why."""
+
+    rate: int
+    why: str
+
+
+def scan(
+    ids: Sequence[int] = (), rates: Sequence[int] = (), dialect: Dialect = PLAIN
+) -> Operation[list[Found]]:
+    """Every servo that answers, with what it is; `ids` () means all, by a broadcast first; `rates` () the present one.
+
+    Who names other rates says that the bus may be spoken to at them. Even so each is listened to first, where the
+    adapter can, and left out (`Skipped`) when errors show that the bus is in use at another rate; `scan_bit_rates`
+    is for a bus of which nothing is known. The rate is set again at the end, whatever happens. Reports `Found` as soon
+    as one answers, `Progress` and `Suspicion`. Writes nothing.
+    """
+    asked = checked_ids(ids or wire.NODES)
+    present = yield from Tune(0)
+    if not rates or tuple(rates) == (present,):
+        return (yield from at_one_rate(dialect, asked, present, broadcast=not ids))
+    everywhere = _at_all_rates(dialect, asked, tuple(rates), present, broadcast=not ids)
+    return (yield from Alone(afterwards(everywhere, lambda: iter(Tune(present)))))
+
+
+def _at_all_rates(
+    dialect: Dialect, asked: Sequence[int], rates: Sequence[int], present: int, *, broadcast: bool
+) -> Operation[list[Found]]:
+    found: list[Found] = []
+    for index, rate in enumerate(rates):
+        if rate != present and (yield from _in_use(dialect, rate)):
+            yield from Report(Skipped(rate, Heard.ERRORS.value))
+            continue
+        yield from Tune(rate)
+        part = (index, len(rates))
+        found += yield from at_one_rate(dialect, asked, rate, broadcast=broadcast, part=part)
+    return found
+
+
+def _in_use(dialect: Dialect, rate: int) -> Operation[bool]:
+    """Do errors show that the bus is in use at another rate? Nobody knows, with an adapter that cannot just listen."""
+    try:
+        return (yield from heard(dialect, rate, GLANCE)) is Heard.ERRORS
+    except LinkLost:
+        raise
+    except LinkError:
+        return False
+
+
+def at_one_rate(
+    dialect: Dialect,
+    asked: Sequence[int],
+    rate: int,
+    *,
+    broadcast: bool,
+    part: tuple[int, int] = (0, 1),
+) -> Operation[list[Found]]:
+    """Who of these answers at the present rate, which is `rate`; the first of `part` is the share of the whole."""
+    errors = dialect.memory.errors if dialect.memory else 0
+    there = (yield from _called(dialect, rate)) if broadcast else []
+    total = PASSES * part[1] * len(asked)
+    for number in range(PASSES):
+        done = (PASSES * part[0] + number) * len(asked)
+        for batch in _batches([node for node in asked if node not in there]):
+            looks = [_looked(Node(node, dialect), rate) for node in batch]
+            there += [node for node in (yield from Together(looks)) if node is not None]
+            done += len(batch)
+            yield from Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
+    if dialect.memory and dialect.memory.errors > errors:
+        yield from Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
+    return (yield from _identified(dialect, sorted(there), rate))
+
+
+def _errors(count: int) -> str:
+    return (
+        f"{count} bus errors during the scan: two servos with one id, another rate on the bus, bad wiring, "
+        "or a missing terminator"
+    )
+
+
+def _batches(nodes: Sequence[int]) -> Iterator[Sequence[int]]:
+    return (nodes[start : start + WINDOW] for start in range(0, len(nodes), WINDOW))
+
+
+def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[list[Found]]:
+    found: list[Found] = []
+    for batch in _batches(nodes):
+        told = yield from Together([outcome(identify(Node(node, dialect))) for node in batch])
+        pairs = zip(batch, told, strict=True)
+        found += [Found(node, rate, one if isinstance(one, Identity) else None) for node, one in pairs]
+    return found
+
+
+# --- everyone at once ---------------------------------------------------------------------------------------
+
+
+def _called(dialect: Dialect, rate: int) -> Operation[list[int]]:
+    """Who answers a read of the node id by everyone, in each id format that is expected."""
+    there: list[int] = []
+    for extended in sorted(dialect.formats):
+        answer = yield from called(extended)
+        for node in dict.fromkeys(reply.lane for reply in answer.replies):
+            replies = [wire.decode_reply(reply.data) for reply in answer.replies if reply.lane == node]
+            if node not in there:
+                there.append(node)
+                dialect.learn_format(node, extended)
+                yield from Report(Found(node, rate, None))
+            if len(replies) > 1:
+                yield from Report(Suspicion(node, rate, TWICE))
+            yield from _compared(node, rate, replies[0])
+    return there
+
+
+def called(extended: bool) -> Exchange[Answer]:
+    """Read the node id of everyone at once; the replies come one after the other, by arbitration."""
+    return Exchange(
+        wire.encode_upload(wire.EVERYONE, NODE_ID, extended=extended),
+        ANY,
+        _about_ids,
+        lane=EVERY_LANE,
+        rank=Rank.CONFIGURATION,
+    )
+
+
+def _about_ids(answer: Answer) -> Answer:
+    """Without what came late from something else."""
+    told = [(reply, wire.decode_reply(reply.data)) for reply in answer.replies]
+    mine = tuple(reply for reply, one in told if one is not None and one.index in (NODE_ID, 0))
+    return answer._replace(replies=mine)
+
+
+TWICE: Final = (
+    "two answers to one request: two servos with one id; connect them one at a time, and provision one"
+)
+
+
+def _compared(node: int, rate: int, reply: SdoReply | None) -> Operation[None]:
+    """Tell when the id that was read is not the one that answered."""
+    if reply is not None and reply.kind == "upload" and reply.data[:1] != bytes((node,)):
+        what = f"answers as {node} and reads back the id {reply.data[0]}: written, and not in force before a restart"
+        yield from Report(Suspicion(node, rate, what))
+
+
+# --- one by one ---------------------------------------------------------------------------------------------
+
+
+def _looked(node: Node, rate: int) -> Operation[int | None]:
+    """Its id when it answers. What answers wrongly, or twice, is there as well."""
+    formats = (False, True) if node.dialect.undecided(node.node) else (node.dialect.extended(node.node),)
+    for extended in formats:
+        try:
+            reply = yield from _present(node, extended)
+        except NoReply:
+            continue
+        except WireError as error:
+            yield from Report(Suspicion(node.node, rate, f"{TWICE} ({error.summary})"))
+            reply = None
+        node.dialect.learn_format(node.node, extended)
+        yield from Report(Found(node.node, rate, None))
+        yield from _compared(node.node, rate, reply)
+        return node.node
+    return None
+
+
+def _present(node: Node, extended: bool) -> Exchange[SdoReply | None]:
+    def read(answer: Answer) -> SdoReply | None:
+        return wire.decode_reply(answer.replies[0].data)
+
+    return Exchange(
+        wire.encode_upload(node.node, NODE_ID, extended=extended),
+        (wire.upload_due(node.node, NODE_ID),),
+        read,
+        lane=node.node,
+        rank=Rank.CONFIGURATION,
+        timeout=Timeout.SCAN,
+        repeatable=True,
+    )

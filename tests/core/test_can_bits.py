@@ -1,0 +1,132 @@
+"""Bits on the wire, against a slow count bit by bit that shares nothing with the tables of the fast one."""
+
+from __future__ import annotations
+
+from itertools import product
+from random import Random
+from statistics import mean
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motorbus.core.can_bits import ERROR_BITS, bits, least, most, precedence, unstuffed
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+
+NODES = range(1, 128)
+POSITIONS = range(-900, 901)
+
+
+def slow(frame: CanFrame) -> int:
+    """As the standard draws it, with strings of "0" and "1"."""
+    remote = bool(frame.id & REMOTE_FLAG)
+    number = frame.id & 0x1FFFFFFF
+    if frame.extended:
+        name = f"{number:029b}"
+        text = "0" + name[:11] + "11" + name[11:] + str(int(remote)) + "00"
+    else:
+        text = "0" + f"{number:011b}" + str(int(remote)) + "0" + "0"
+    text += f"{len(frame.data):04b}"
+    if not remote:
+        text += "".join(f"{byte:08b}" for byte in frame.data)
+    register = [0] * 15
+    for bit in text:
+        feedback = int(bit) ^ register[0]
+        register = [*register[1:], 0]
+        if feedback:  # x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
+            for power in (14, 10, 8, 7, 4, 3, 0):
+                register[14 - power] ^= 1
+    text += "".join(map(str, register))
+    sent = ""
+    for bit in text:
+        sent += bit
+        if len(sent) >= 5 and sent[-5:] == bit * 5:
+            sent += "1" if bit == "0" else "0"
+    return len(sent) + 1 + 2 + 7 + 3
+
+
+def request(node: int, index: int) -> CanFrame:
+    return CanFrame(0x600 + node, bytes((0x40, index & 255, index >> 8, 0, 0, 0, 0, 0)))
+
+
+def reply(node: int, raw: int) -> CanFrame:
+    return CanFrame(0x580 + node, b"\x4b\x02\x60\0" + raw.to_bytes(2, "little", signed=True) + bytes(2))
+
+
+frames = st.builds(CanFrame, st.integers(0, 0x7FF), st.binary(max_size=8)) | st.builds(
+    CanFrame, st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.just(True)
+)
+
+
+@given(frames, st.booleans())
+def test_it_agrees_with_a_count_bit_by_bit(frame: CanFrame, remote: bool) -> None:
+    frame = frame._replace(id=frame.id | REMOTE_FLAG) if remote else frame
+    assert bits(frame) == slow(frame)
+
+
+def test_it_agrees_for_the_frames_of_every_node() -> None:
+    random = Random(1)
+    for node in NODES:
+        for frame in (request(node, 0x6002), reply(node, random.randint(-900, 900))):
+            assert bits(frame) == slow(frame)
+            extended = frame._replace(extended=True)
+            assert bits(extended) == slow(extended)
+
+
+def order(node: int, raw: int) -> CanFrame:
+    return CanFrame(0x600 + node, b"\x22\x03\x60\0" + raw.to_bytes(2, "little", signed=True) + bytes(2))
+
+
+def test_the_figures_of_a_position_read_and_write_over_all_nodes_and_positions() -> None:
+    """A pair has 242 to 243 bits in the mean, against 222 without stuff bits and 270 at worst."""
+    asked = [bits(request(node, 0x6002)) for node in NODES]
+    answered = [bits(reply(node, raw)) for node, raw in product(NODES, POSITIONS)]
+    assert (min(asked), max(asked)) == (122, 125)
+    assert (min(answered), max(answered)) == (118, 125)
+    assert mean(asked) + mean(answered) == pytest.approx(242.3, abs=0.05)
+    ordered = [bits(order(node, raw)) for node, raw in product(NODES, POSITIONS)]
+    acknowledged = [bits(CanFrame(0x580 + node, b"\x60\x03\x60".ljust(8, b"\0"))) for node in NODES]
+    assert (min(ordered), max(ordered)) == (119, 127)
+    assert (min(acknowledged), max(acknowledged)) == (122, 126)
+    assert mean(ordered) + mean(acknowledged) == pytest.approx(243.4, abs=0.05)
+
+
+def test_a_report_of_four_bytes_has_83_to_90_bits() -> None:
+    found = [
+        bits(CanFrame(0x580 + node, raw.to_bytes(2, "little", signed=True) + bytes(2)))
+        for node, raw in product(NODES, POSITIONS)
+    ]
+    assert (min(found), max(found)) == (83, 90)
+    assert mean(found) == pytest.approx(84.6, abs=0.1)
+
+
+def test_without_stuff_bits_a_frame_of_eight_bytes_has_111() -> None:
+    assert unstuffed(CanFrame(0x625, bytes(8))) == least(8) == 111
+    assert unstuffed(CanFrame(0x625, bytes(8), True)) == least(8, extended=True) == 131
+    assert unstuffed(CanFrame(0x625 | REMOTE_FLAG, bytes(8))) == least(0) == 47
+    assert most(8) == 135
+
+
+@given(frames)
+def test_it_lies_between_the_least_and_the_most(frame: CanFrame) -> None:
+    low, high = (limit(len(frame.data), frame.extended) for limit in (least, most))
+    assert low <= bits(frame) <= high
+
+
+def test_an_error_flag_has_its_own_length() -> None:
+    assert bits(CanFrame(ERROR_FLAG | 4, bytes(8))) == ERROR_BITS
+
+
+def test_the_lowest_identifier_goes_first_and_a_short_one_before_a_long_one() -> None:
+    data, remote = CanFrame(0x123, b""), CanFrame(0x123 | REMOTE_FLAG, b"")
+    long = CanFrame(0x123 << 18, b"", True)
+    order = [
+        CanFrame(0x122, b""),
+        data,
+        remote,
+        long,
+        long._replace(id=(0x123 << 18) + 1),
+        CanFrame(0x124, b""),
+    ]
+    shuffled = order[::-1]
+    assert sorted(shuffled, key=precedence) == order

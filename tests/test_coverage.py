@@ -1,0 +1,181 @@
+"""Every cell of the coverage page is true: names exist, commands parse, simulators answer, frames are explained."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import shlex
+from collections.abc import Iterable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import pytest
+
+import motorbus
+from motorbus.cli import build
+from motorbus.core.family import Family
+from motorbus.core.operation import CanFrame, Data
+from motorbus.simulation.named import Simulation
+from scripts import coverage
+from scripts.coverage import Command, Coverage, Object
+from tests.conformance.subjects import vectors
+
+ROOT = coverage.ROOT
+TOLD = {name: coverage.load(name) for name in coverage.known()}
+COMMANDS = [
+    pytest.param(told, one, id=f"{name}-{one.name}") for name, told in TOLD.items() for one in told.commands
+]
+OBJECTS = [
+    pytest.param(told, one, map_, id=f"{name}-{map_}-{one.row.name}")
+    for name, told in TOLD.items()
+    for one in told.objects
+    for map_ in one.maps
+]
+TESTS = sorted({one.test for told in TOLD.values() for one in (*told.commands, *told.objects)})
+NAMES = sorted(
+    {(n, a) for n, told in TOLD.items() for one in (*told.commands, *told.objects) for a in one.api}
+)
+LINES = sorted(
+    {line for told in TOLD.values() for one in (*told.commands, *told.objects) for line in one.cli}
+)
+PATIENCE = 1.0
+"""s in which a device must have answered."""
+
+
+def test_every_family_is_on_the_page() -> None:
+    assert coverage.known() == [name for name in motorbus.families.names() if name != "template"]
+
+
+def test_the_page_is_the_one_that_would_be_made() -> None:
+    assert coverage.PAGE.read_text(encoding="utf-8") == coverage.page(), "python -m scripts.coverage makes it"
+
+
+def test_the_page_has_no_empty_cell() -> None:
+    rows = [line for line in coverage.page().splitlines() if line.startswith("|")]
+    assert len(rows) > 50
+    assert [row for row in rows if re.search(r"\|\s*\|", row)] == []
+
+
+def test_an_empty_cell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = {"name": "SING", "manual": "9", "vectors": ["x"], "api": [], "cli": ["sing"], "test": "t"}
+    one = coverage._command(told)
+    monkeypatch.setattr(coverage, "_command", lambda _: one)
+    with pytest.raises(ValueError, match="a cell of SING is empty"):
+        coverage.load("feetech")
+
+
+def test_a_row_that_nothing_reaches_is_refused() -> None:
+    row = coverage.families.load("feetech").tables["sts"]["id"]
+    told = {"device": "Servo", "tests": {"read": "t"}}
+    unreachable = motorbus.core.entry.changed(row, access=motorbus.core.entry.Access.WRITE)
+    with pytest.raises(ValueError, match="can be neither read nor written"):
+        coverage._object(unreachable, ("sts",), told)
+
+
+@pytest.mark.parametrize(("family", "name"), NAMES)
+def test_a_name_exists_in_python(family: str, name: str) -> None:
+    found: Any = import_module(f"motorbus.families.{family}")
+    for part in name.split("."):
+        found = getattr(found, part)
+    assert callable(found) or hasattr(found, "function")
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_words_are_a_command(line: str) -> None:
+    spoken = (
+        line.replace("BUS", "feetech:sim").replace("ID", "1").replace("VALUE", "1").replace("RATE", "500000")
+    )
+    words = shlex.split(spoken)
+    command, _, _ = build().parse_args(words, exit_on_error=False, print_error=False)
+    assert command.__module__ == f"motorbus.cli.{words[0]}"
+
+
+@cache
+def functions_of(file: str) -> set[str]:
+    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)}
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_the_test_is_there(test: str) -> None:
+    file, _, name = test.partition("::")
+    assert name in functions_of(file)
+
+
+def frame(name: str, vector: str) -> Data:
+    (found,) = (one.data for one in vectors(name) if one.id == vector)
+    return found
+
+
+def flat(data: Data) -> bytes:
+    return data.flat() if isinstance(data, CanFrame) else data
+
+
+def heard(simulator: Any, frames: Iterable[Data], at: float) -> list[Data]:
+    """Everything that is answered within `PATIENCE`."""
+    for one in frames:
+        simulator.receive(one, at)
+    return [data for _, data in simulator.advance(at + PATIENCE)]
+
+
+def fresh(told: Coverage) -> Simulation:
+    return motorbus.simulate(told.family.name, ids=told.ids, **next(iter(told.maps.values())))
+
+
+def memory(simulator: Any, name: str) -> list[int]:
+    return [node.memory[name] for node in simulator.nodes.values()]
+
+
+@pytest.mark.parametrize(("told", "one"), COMMANDS)
+def test_the_simulated_device_answers_or_obeys(told: Coverage, one: Command) -> None:
+    name = told.family.name
+    for vector in one.vectors:
+        with fresh(told) as simulation:
+            simulator = simulation.simulator
+            heard(simulator, [frame(name, before) for before in one.before], 0.0)
+            held = memory(simulator, one.changes) if one.changes else []
+            answers = heard(simulator, [frame(name, vector)], 10.0)
+            assert bool(answers) == one.answers, vector
+            assert not one.changes or memory(simulator, one.changes) != held, vector
+            assert [
+                bad.fault for data in answers for bad in told.family.explain(flat(data)) if bad.fault
+            ] == []
+
+
+@pytest.mark.parametrize(("told", "one"), COMMANDS)
+def test_the_frame_is_explained(told: Coverage, one: Command) -> None:
+    for vector in one.vectors:
+        (explained,) = told.family.explain(flat(frame(told.family.name, vector)))
+        assert explained.fault == ""
+        assert explained.parts
+
+
+def names_it(family: Family, data: Iterable[Data], name: str) -> bool:
+    explained = [one for piece in data for one in family.explain(flat(piece))]
+    assert [one.fault for one in explained if one.fault] == []
+    return any(name in json.dumps([one.title, *(part[2:] for part in one.parts)]) for one in explained)
+
+
+@pytest.mark.parametrize(("told", "one", "map_"), OBJECTS)
+def test_a_row_is_answered_and_named(told: Coverage, one: Object, map_: str) -> None:
+    row = told.family.tables[map_][one.row.name]
+    if one.command:
+        assert one.command in {command.name for command in told.commands}
+    if not row.readable and row.protected:
+        assert one.command, "the command is judged above"
+        return
+    with motorbus.simulate(told.family.name, ids=told.ids, **told.maps[map_]) as simulation:
+        node = min(simulation.simulator.nodes)
+        with motorbus.open(simulation.url) as bus:
+            device = bus.family.devices.blocking(bus, node)
+            device.identify()
+            seen = bus.trace.subscribe()
+            if row.readable:
+                device.read(row.name)
+            else:
+                device.write(**{row.name: row.to_value(row.high)})
+            frames = [record.data for record in seen]
+    assert len(frames) >= 2
+    assert names_it(told.family, frames, row.name)
