@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from bench import machine, report, responder, rounds, startup, syscalls
+from bench import can_rounds, machine, report, responder, rounds, startup, syscalls
 from bench.places import BUILD, ROOT
 from bench.rounds import CANDIDATES, Candidate
 from bench.workloads import WORKLOADS
@@ -60,7 +60,8 @@ def measured(given: argparse.Namespace) -> report.Results:
         memory=rounds.rounds(rounds.in_memory, inside, given.count, given.rounds, say),
         calls=counted(program, there),
         starts=startup.costs(given.rounds, say),
-        missing=missing,
+        missing=missing + can_rounds.missing(),
+        can=() if given.only or can_rounds.missing() else can_rounds.rounds(given.count, given.rounds, say),
     )
 
 

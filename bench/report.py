@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
+from bench import can_report
 from bench.figures import Spread, cost, ratio
 from bench.rounds import Sample
 from bench.startup import Cost
@@ -31,6 +32,7 @@ class Results(NamedTuple):
     calls: dict[tuple[str, str], dict[str, float]] | None
     starts: list[Cost]
     missing: list[str]
+    can: Sequence[Sample] = ()
 
 
 class Table(NamedTuple):
@@ -105,6 +107,11 @@ def start_table(results: Results) -> Table:
     return Table("Start-up", ("", "ms", "min – max", "modules", "heavy ones loaded"), rows)
 
 
+def can_table(results: Results) -> Table:
+    """Positions over slcan."""
+    return Table("CAN, over slcan", can_report.COLUMNS, can_report.rows(list(results.can)))
+
+
 def tables(results: Results) -> list[Table]:
     """All of them, in reading order."""
     found = list(wire_tables(results))
@@ -112,6 +119,8 @@ def tables(results: Results) -> list[Table]:
         found.append(memory_table(results))
     if results.starts:
         found.append(start_table(results))
+    if results.can:
+        found.append(can_table(results))
     return found
 
 
@@ -162,6 +171,7 @@ def as_json(results: Results) -> str:
         "system_calls": None
         if calls is None
         else [{"contender": who, "workload": what, "calls": each} for (who, what), each in calls.items()],
+        "can": [sample._asdict() for sample in results.can],
         "start_up": [{**start._asdict(), "seconds": start.seconds._asdict()} for start in results.starts],
         "missing": results.missing,
     }
@@ -195,7 +205,7 @@ can be measured so.
 
 {memory}
 
-## Start-up
+{can}## Start-up
 
 Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
@@ -216,5 +226,6 @@ def page(results: Results) -> str:
         spoiled=spoiled(results),
         wire=wire,
         memory=as_markdown(memory_table(results)),
+        can=can_report.TEXT + as_markdown(can_table(results)) + "\n\n" if results.can else "",
         start=as_markdown(start_table(results)),
     )

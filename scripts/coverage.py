@@ -30,6 +30,8 @@ class Command(NamedTuple):
 
     `vectors`  frames of it, by their names in tests/vectors; `before` must be sent first
     `answers`  whether a device answers; if not, `changes` names what it changes
+    `restarts` what it changes shows after a power cycle
+    `map`      the register map of the simulated device; the first when left out
     """
 
     name: str
@@ -41,6 +43,8 @@ class Command(NamedTuple):
     answers: bool = True
     before: tuple[str, ...] = ()
     changes: str = ""
+    restarts: bool = False
+    map: str = ""
 
 
 class Object(NamedTuple):

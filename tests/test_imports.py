@@ -17,7 +17,7 @@ import motorbus
 pytestmark = pytest.mark.quick
 
 LOADED = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
-HARDWARE_AND_NUMBERS = {"serialx", "serial", "can", "matplotlib", "numpy", "starlette"}
+HARDWARE_AND_NUMBERS = {"serialx", "serial", "can", "canopen", "wrapt", "matplotlib", "numpy", "starlette"}
 POSIX_ONLY = "import sys; sys.modules.update(dict.fromkeys(['termios', 'fcntl', 'pty', 'tty'])); "
 OPEN_A_SOCKET = """
 from motorbus.link.url import open_link

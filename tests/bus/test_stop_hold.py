@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.bus.air import FRESH
+from motorbus.bus.known import FRESH
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import ROUNDS
 from motorbus.core.operation import Operation, Pause, Tune
@@ -165,10 +165,10 @@ def test_a_position_told_by_a_flying_exchange_counts_too() -> None:
     with bus.turns.lock:
         bus.turns.known[1] = None
     answer = bus.run(read(1))
-    known = bus.turns.fresh(bus.link.now())[1]
+    known = bus.turns.known.fresh(bus.link.now())[1]
     assert known is not None
     assert number(known) == answer
-    assert bus.turns.fresh(bus.link.now() + FRESH)[1] is None
+    assert bus.turns.known.fresh(bus.link.now() + FRESH)[1] is None
 
 
 def test_a_stop_speaks_again_where_an_operation_only_listened() -> None:

@@ -98,5 +98,5 @@ def test_whoever_is_ordered_to_move_is_known_to_the_stop() -> None:
     script = Script()
     script.submit(Exchange(wire.action(), effect=Effect.MOTION, goals=(Goal(9, "position", 0.0, -1.0, 1.0),)))
     script.sent()
-    replies = [exchange.replies for exchange in script.turns.stop.exchanges]
+    replies = [exchange.replies for exchange in script.turns.known.frames.exchanges]
     assert [due.node for dues in replies if isinstance(dues, tuple) for due in dues] == [9]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -13,12 +14,15 @@ import sys
 import pytest
 
 from motorbus import __version__
-from motorbus.cli import build, main
+from motorbus.cli import build, main, parse
 from tests.cli.conftest import Run
 
 APP = build()
 COMMANDS = [name for name in APP if not name.startswith("-")]
-FAMILY_COMMANDS = [("feetech", name) for name in APP["feetech"] if not name.startswith("-")]
+OF_ONE_FAMILY = ("feetech", "kst")
+FAMILY_COMMANDS = [
+    (family, name) for family in OF_ONE_FAMILY for name in APP[family] if not name.startswith("-")
+]
 ALL = [*((name,) for name in COMMANDS), *FAMILY_COMMANDS]
 
 
@@ -32,15 +36,17 @@ def examples(words: tuple[str, ...]) -> list[str]:
 
 
 EXAMPLES = sorted({line for words in ALL for line in examples(words)})
-SIMULATED = [line for line in EXAMPLES if "feetech:sim" in line]
+SIMULATED = [line for line in EXAMPLES if re.search(r"(feetech|kst):sim", line) and " > " not in line]
 
 
 def arguments(line: str) -> list[str]:
     """The words of an example, without the program's name and without what the shell takes."""
-    return shlex.split(line.partition(" < ")[0])[1:]
+    return shlex.split(line.partition(" < ")[0].partition(" > ")[0])[1:]
 
 
-@pytest.mark.parametrize("words", [words for words in ALL if words != ("feetech",)], ids="-".join)
+@pytest.mark.parametrize(
+    "words", [words for words in ALL if words[0] not in OF_ONE_FAMILY or words[1:]], ids="-".join
+)
 def test_every_command_shows_examples(words: tuple[str, ...]) -> None:
     found = examples(words)
     assert found
@@ -59,7 +65,7 @@ def test_help_fits_a_terminal(words: tuple[str, ...]) -> None:
 @pytest.mark.parametrize("line", EXAMPLES)
 def test_an_example_can_be_said(line: str) -> None:
     words = [word for word in arguments(line) if word not in {"--json", "-v"}]
-    command, _, _ = APP.parse_args(words, exit_on_error=False, print_error=False)
+    command, _, _ = parse(APP, words)
     assert command.__module__.startswith("motorbus.cli.")
 
 

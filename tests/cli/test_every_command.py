@@ -54,9 +54,42 @@ FEETECH = [
     "feetech sync-write BUS goal_position 1=HERE",
     "feetech sync-write BUS goal_position 1=HERE --dry-run",
 ]
-HERE = {"feetech": "3.0", "template": "0.2"}
+KST = [
+    "ping BUS --broadcast",
+    "estop BUS",
+    "scan BUS --bitrate all",
+    "kst position BUS#1",
+    "kst position BUS#1 HERE --wait",
+    "kst position BUS#1 HERE --dry-run",
+    "kst status BUS#1",
+    "kst version BUS#1",
+    "kst node-id BUS#1",
+    "kst node-id BUS#1 9 --yes",
+    "kst node-id BUS#1 9 --dry-run",
+    "kst bit-rate BUS#1",
+    "kst bit-rate BUS#1 1M --yes",
+    "kst bit-rate BUS#1 1M --dry-run",
+    "kst save BUS#1 --yes",
+    "kst save BUS#1 --dry-run",
+    "kst provision BUS#1 --new-id 1 --yes",
+    "kst provision BUS#1 --new-id 9 --new-bitrate 1M --dry-run",
+    "kst reports on BUS#1 --interval 20ms",
+    "kst reports on BUS#1 --dry-run",
+    "kst reports off BUS#1",
+    "kst mid-point BUS#1 --yes",
+    "kst mid-point BUS#1 --dry-run",
+    "kst limits BUS#1",
+    "kst limits BUS#1 -0.5 0.5 --yes",
+    "kst limits BUS#1 -30deg 30deg --dry-run",
+    "kst reverse BUS#1",
+    "kst reverse BUS#1 on --yes",
+    "kst reverse BUS#1 on --dry-run",
+]
+LACKS = {"kst": ("torque ", "--velocity")}
+"""What devices of a family cannot: no torque switch, no speed."""
+HERE = {"feetech": "3.0", "kst": "0.2", "template": "0.2"}
 """rad; inside the limits, and near to where a simulated device stands."""
-LIMIT = {"feetech": "max_temperature=65", "template": "max_position=3.0"}
+LIMIT = {"feetech": "max_temperature=65", "kst": "negative_limit=-1.5", "template": "max_position=3.0"}
 """A row in EEPROM."""
 
 
@@ -78,17 +111,25 @@ def words(command: str, family: str, bus: str) -> list[str]:
 
 @contextmanager
 def standing(family: str) -> Iterator[str]:
-    """Two simulated devices under torque; their bus."""
-    turned = {"broadcast_ping": "in_turn"} if family == "feetech" else {}
+    """Two simulated devices, under torque where that can be switched; their bus."""
+    turned = {"feetech": {"broadcast_ping": "in_turn"}, "kst": {"profile": "kst-ext"}}.get(family, {})
     with motorbus.simulate(family, ids="1-2", **turned) as simulation:
         with motorbus.open(simulation.url) as bus:
             for node in (1, 2):
-                bus.family.devices.blocking(bus, node).enable_torque()
+                device = bus.family.devices.blocking(bus, node)
+                if hasattr(device, "enable_torque"):
+                    device.enable_torque()
         yield simulation.url
 
 
-CASES = [(family, command) for family in HERE for command in COMMON]
+def can(family: str, command: str) -> bool:
+    return not any(word in command for word in LACKS.get(family, ()))
+
+
+CASES = [(family, command) for family in HERE for command in COMMON if can(family, command)]
 CASES += [("feetech", command) for command in FEETECH]
+CASES += [("kst", command) for command in KST]
+LACKING = [(family, command) for family in HERE for command in COMMON if not can(family, command)]
 
 
 def test_every_family_that_moves_has_a_place_to_go() -> None:
@@ -113,6 +154,15 @@ def test_it_says_so_to_programs_too(family: str, command: str, run: Run) -> None
     assert ran.records
 
 
+@pytest.mark.parametrize(("family", "command"), LACKING, ids=lambda value: str(value))
+def test_what_its_devices_cannot_is_refused_and_nothing_is_sent(family: str, command: str, run: Run) -> None:
+    with standing(family) as bus:
+        ran = run(*words(command, family, bus), "-vv")
+    assert (ran.code, ran.out) == (2, "")
+    assert "have no torque switch" in ran.err or "has no velocity" in ran.err
+    assert " tx " not in ran.err
+
+
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_frames_are_explained(family: str, run: Run) -> None:
     good = next(vector.data for vector in vectors(family) if vector.valid)
@@ -126,6 +176,7 @@ def test_a_frame_on_can_is_withheld_and_shown(run: Run) -> None:
     ran = run("write", "template:sim#1", "goal_position=0.2", "--dry-run", "--json")
     (frame,) = ran.document["withheld"]
     assert frame["data"].startswith("00 00 02 01 08 02 20 01")
+    assert frame["frame"].startswith("201#022001")
     assert "request to node 1" in frame["meaning"]
 
 

@@ -6,10 +6,12 @@ from motorbus.cli import faces
 
 
 def test_a_face_is_a_module_of_the_familys_name() -> None:
-    assert faces.names() == ["feetech"]
+    assert faces.names() == ["feetech", "kst"]
 
 
 def test_what_a_face_offers() -> None:
     assert callable(faces.offer("feetech", "move_together"))
+    assert callable(faces.offer("kst", "budget_frames"))
+    assert faces.offer("feetech", "budget_frames") is None
     assert faces.offer("feetech", "make_coffee") is None
     assert faces.offer("nobody", "move_together") is None

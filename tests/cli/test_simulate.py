@@ -120,6 +120,18 @@ def test_the_switches_are_listed(run: Run) -> None:
         (["feetech", "--ids", "x"], 2),
         (["feetech", "--switch", "gravity=off"], 2),
         (["feetech", "--switch", "gravity"], 2),
+        (["feetech", "--gravity", "off"], 2),
+        (["feetech", "--gravity"], 2),
+        (["feetech", "--socketcand", "0"], 2),
+        (["feetech", "--can", "virtual/x"], 2),
+        (["feetech", "--bitrate", "500000"], 2),
+        (["feetech", "--baud", "-1"], 2),
+        (["kst", "--baud", "500000"], 2),
+        (["kst", "--ids", "0"], 2),
+        (["kst", "--profile", "abacus"], 2),
+        (["kst", "--out-of-range", "explode"], 2),
+        (["kst", "--socketcand", "somewhere"], 2),
+        (["kst", "--can", "nowhere/x"], 2),
         (["feetech", "--tcp", "0", "--link", "bus"], 2),
         (["feetech", "--tcp", "somewhere"], 2),
         (["feetech", "--link", "/no/such/folder/bus"], 1),
@@ -141,3 +153,105 @@ def test_a_link_that_is_somebody_elses_stays(tmp_path: Path, run: Run) -> None:
     (tmp_path / "bus").write_text("precious")
     assert run("simulate", "feetech", "--link", str(tmp_path / "bus")).code == 2
     assert (tmp_path / "bus").read_text() == "precious"
+
+
+# CAN.
+
+READ = b"t62584002600000000000"
+POSITION = b"t5A584B02600000000000\r"
+
+
+def asked(descriptor: int, text: bytes, count: int) -> bytes:
+    """What comes back to these words, so many bytes of it."""
+    os.write(descriptor, text)
+    answer = b""
+    while len(answer) < count:
+        answer += os.read(descriptor, 256)
+    return answer
+
+
+def slcan(descriptor: int) -> bytes:
+    """Open the adapter and read the position of node 37."""
+    asked(descriptor, b"C\rS6\rO\r", 3)
+    return asked(descriptor, READ + b"\r", 24).removeprefix(b"z\r")
+
+
+def test_a_can_bus_is_served_in_every_way_at_once(tmp_path: Path) -> None:
+    link = tmp_path / "can"
+    with Simulated("kst", ids="0x25,0x26", link=link, tcp="0", socketcand="0") as simulated:
+        assert simulated.ready["ids"] == [0x25, 0x26]
+        one, other, third = simulated.buses
+        assert simulated.bus == one == f"kst:can://slcan{link}"
+        terminal = os.open(link, os.O_RDWR | os.O_NOCTTY)
+        try:
+            assert slcan(terminal) == POSITION
+        finally:
+            os.close(terminal)
+        host, _, port = other.removeprefix("kst:can://slcan/socket://").rpartition(":")
+        with socket.create_connection((host, int(port))) as client:
+            assert slcan(client.fileno()) == POSITION
+        host, _, port = third.removeprefix("kst:can://socketcand/").removesuffix("/can0").rpartition(":")
+        with socket.create_connection((host, int(port))) as client:
+            assert asked(client.fileno(), b"", 6) == b"< hi >"
+            for word in (b"< open can0 >", b"< rawmode >"):
+                assert asked(client.fileno(), word, 6) == b"< ok >"
+            answer = asked(client.fileno(), b"< send 625 8 40 2 60 0 0 0 0 0 >", 40)
+            assert answer.startswith(b"< frame 5A5 ")
+            assert b"4B02600000000000" in answer
+
+
+def test_without_a_way_a_can_bus_is_on_a_terminal() -> None:
+    with Simulated("kst", ids="37") as simulated:
+        assert simulated.buses == [simulated.bus]
+        path = simulated.bus.removeprefix("kst:can://slcan")
+        assert path.startswith("/dev/")
+        terminal = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        try:
+            assert slcan(terminal) == POSITION
+        finally:
+            os.close(terminal)
+
+
+def test_a_relative_link_is_named_in_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with Simulated("kst", ids="37", link=Path("can")) as simulated:
+        assert simulated.bus == f"kst:can://slcan{tmp_path / 'can'}"
+
+
+def test_switches_are_flags_and_settings_belong_to_the_address(tmp_path: Path) -> None:
+    with Simulated(
+        "kst",
+        ids="37",
+        link=tmp_path / "can",
+        socketcand="0",
+        profile="kst-ext",
+        status_6002="x1x2",
+        x1="64",
+        bitrate="500000",
+    ) as simulated:
+        assert simulated.bus == f"kst:can://slcan{tmp_path / 'can'},profile=kst-ext,bitrate=500000"
+        assert simulated.buses[1].endswith("/can0,profile=kst-ext")
+        terminal = os.open(tmp_path / "can", os.O_RDWR | os.O_NOCTTY)
+        try:
+            assert slcan(terminal) == b"t5A584B02600040000000\r"
+        finally:
+            os.close(terminal)
+
+
+def test_a_bus_of_python_can_may_be_joined() -> None:
+    with Simulated("kst", ids="37", can="virtual/here", profile="kingmax") as simulated:
+        assert simulated.buses == ["kst:can://virtual/here,profile=kingmax"]
+    assert simulated.process.returncode == 0
+
+
+def test_an_unknown_flag_is_told_what_it_may_have_meant(run: Run) -> None:
+    ran = run("simulate", "kst", "--profil", "kst-ext")
+    assert (ran.code, ran.out) == (2, "")
+    assert "profile" in ran.err
+
+
+def test_the_settings_of_a_bus_are_among_the_switches(run: Run) -> None:
+    rows = run("simulate", "kst", "--switches", "--json").document["switches"]
+    names = [row["name"] for row in rows]
+    assert {"profile", "sized", "out_of_range"} <= set(names)
+    assert len(names) == len(set(names))

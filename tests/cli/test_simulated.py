@@ -14,6 +14,7 @@ def test_it_is_ready_inside_and_gone_afterwards(tmp_path: Path) -> None:
     link = tmp_path / "bus"
     with Simulated("feetech", ids="1-2", link=link) as simulated:
         assert simulated.bus == f"feetech:{link}"
+        assert simulated.buses == [simulated.bus]
         assert simulated.ready["ids"] == [1, 2]
         assert link.is_symlink()
         assert simulated.process.poll() is None

@@ -1,7 +1,9 @@
 """Runs each test once for every family it suits, and each test of vectors once for every vector.
 
 A test asks by name: `family`; `lockable`, a family whose EEPROM has a lock; `mover`, a family whose devices move;
-`reporter`, a family whose devices say something unasked; or a family together with one of its vectors, see `VECTORS`.
+`limp`, one whose devices can be let go; `reporter`, one whose devices say something unasked; `reporting_mover`, one
+whose devices report a move without having been told to; `plain_one`, one with rows that just keep a value; or a family
+together with one of its vectors, see `VECTORS`.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import pytest
 
 from motorbus.core.family import Family
 from tests.conformance.subjects import FAMILIES, Vector, vectors
-from tests.conformance.world import locks, moves, reports
+from tests.conformance.world import has, has_torque_switch, locks, moves, plain, reports
 
 
 def _is_reply(vector: Vector) -> bool:
@@ -34,7 +36,9 @@ SUITS: dict[str, Callable[[Family], object]] = {
     "lockable": locks,
     "mover": moves,
     "reporter": reports,
-    "reporting_mover": lambda family: moves(family) and reports(family),
+    "limp": has_torque_switch,
+    "reporting_mover": lambda family: moves(family) and reports(family) and not has(family, "start_reports"),
+    "plain_one": lambda family: any(plain(table) for table in family.tables.values()),
     "family": bool,
 }
 """Which families a test gets that asks by this name."""

@@ -7,19 +7,12 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.entry import Entry, Storage, Table
+from motorbus.core.entry import Entry, Storage
 from motorbus.core.family import Family
-from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
-from tests.conformance.world import IDS, World, kept, samples, sent, world
+from tests.conformance.world import IDS, World, kept, plain, samples, sent, world
 
 NODE = IDS[0]
-
-
-def plain(table: Table) -> list[Entry]:
-    """Rows whose writing does nothing but keep a value for as long as there is power."""
-    rows = [row for row in table.values() if row.writable and not row.protected]
-    return [row for row in rows if row.effect is Effect.NONE]
 
 
 def write(there: World, row: Entry, raw: int) -> None:
@@ -53,8 +46,8 @@ def test_every_readable_row_reads_alone_as_among_others(family: Family) -> None:
         assert alone == pytest.approx(together)
 
 
-def test_every_plain_row_takes_values_up_to_both_ends(family: Family) -> None:
-    with world(family) as there:
+def test_every_plain_row_takes_values_up_to_both_ends(plain_one: Family) -> None:
+    with world(plain_one) as there:
         rows = plain(there.table(NODE))
         assert rows
         for row in rows:
@@ -135,8 +128,8 @@ def test_a_name_that_does_not_exist_is_refused(family: Family) -> None:
         assert frames == []
 
 
-def test_one_bad_value_among_good_ones_keeps_all_back(family: Family) -> None:
-    with world(family) as there:
+def test_one_bad_value_among_good_ones_keeps_all_back(plain_one: Family) -> None:
+    with world(plain_one) as there:
         device, before = there.device(NODE), there.settings()
         row = plain(there.table(NODE))[0]
         good = next(raw for raw in samples(row) if raw != before[NODE][row.name])

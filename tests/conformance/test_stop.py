@@ -14,7 +14,7 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Effect, Exchange
 from motorbus.errors import Interrupted, MotionError, NoReply
 from tests.conformance.test_guarded import Interrupting, guarded
-from tests.conformance.world import IDS, World, closed, locks, said, sent, world
+from tests.conformance.world import IDS, World, closed, kept, locks, said, sent, switch_on, world
 
 NODE = IDS[0]
 WAY = 1.0  # rad
@@ -35,10 +35,19 @@ def under_way(there: World) -> None:
     """All of them move."""
     for node in IDS:
         device = there.device(node)
-        device.enable_torque()
+        switch_on(device)
         device.move(device.position() + WAY, wait=False)
     there.link.advance(0.05)
-    assert [there.device(node).telemetry().moving for node in IDS] == [True] * len(IDS)
+    assert [moving(there, node) for node in IDS] == [True] * len(IDS)
+
+
+def moving(there: World, node: int) -> bool:
+    """What it says, or, where it says nothing of the kind, whether it is elsewhere two milliseconds later."""
+    state = there.device(node).telemetry()
+    if state.moving is not None:
+        return bool(state.moving)
+    there.link.advance(0.002)
+    return bool(there.device(node).position() != state.position)
 
 
 def assert_at_rest(there: World, outcome: StopOutcome, silent: tuple[int, ...] = ()) -> None:
@@ -84,8 +93,8 @@ def test_when_everything_moves(mover: Family) -> None:
         assert all(0 < way < WAY / 2 for way in ways)
 
 
-def test_when_the_torque_is_off(mover: Family) -> None:
-    with world(mover) as there:
+def test_when_the_torque_is_off(limp: Family) -> None:
+    with world(limp) as there:
         met(there)
         for node in IDS:
             there.device(node).enable_torque()
@@ -127,12 +136,13 @@ def test_twice_and_then_released(mover: Family) -> None:
         assert_at_rest(there, there.bus.estop())
         device = there.device(NODE)
         here = device.position()
-        for refused in (device.enable_torque, lambda: device.move(here + 0.1)):
-            with pytest.raises(Interrupted):
-                refused()
+        for refused in [getattr(device, "enable_torque", None), lambda: device.move(here + 0.1)]:
+            if refused is not None:
+                with pytest.raises(Interrupted):
+                    refused()
         assert device.position() == pytest.approx(here, abs=1e-3)
         there.bus.reset()
-        device.enable_torque()
+        switch_on(device)
         device.move(here + 0.1)
         assert device.position() == pytest.approx(here + 0.1, abs=0.06)
 
@@ -143,9 +153,10 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
     async def stopped_at(number: int) -> bool:
         with world(mover) as there:
             met(there)
-            there.device(NODE).enable_torque()
+            switch_on(there.device(NODE))
             to = there.device(NODE).position() + WAY
-            operations = [said(there.device(NODE), "move", to), guarded(there)]
+            operations = [said(there.device(NODE), "move", to)]
+            operations += [guarded(there)] if kept(there.table(NODE)) else []
             bus = there.async_bus()
             for node in IDS:
                 await mover.devices.awaiting(bus, node).ping()

@@ -15,6 +15,7 @@ from motorbus.bus.pump import Bus
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
 from motorbus.core.operation import Alone, Data, Effect, Exchange, Notice, Operation, Runnable, Step, Together
+from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
@@ -68,9 +69,20 @@ class World:
         """Everything that a host could have changed, of all devices."""
         tables = list(self.family.tables.values())
         return {
-            node: {name: self.memory(node)[name] for table in tables for name in _writable(table)}
+            node: {
+                name: held for table in tables for name in _writable(table) for held in self._held(node, name)
+            }
             for node in self.simulator.nodes
         }
+
+    def _held(self, node: int, name: str) -> list[int]:
+        """What it holds in this row; [] where it has another table of its family, without such a row."""
+        try:
+            return [self.memory(node)[name]]
+        except (KeyError, RequestError):
+            if len(self.family.tables) == 1:
+                raise
+            return []
 
     def close(self) -> None:
         """Give the port back."""
@@ -118,6 +130,17 @@ def moves(family: Family) -> bool:
     return has(family, "move")
 
 
+def has_torque_switch(family: Family) -> bool:
+    """Whether devices that move can be let go; some hold whenever they have power."""
+    return moves(family) and has(family, "enable_torque")
+
+
+def switch_on(device: Any) -> None:
+    """Make it ready to move, where that is a thing of its own."""
+    if hasattr(device, "enable_torque"):
+        device.enable_torque()
+
+
 def reports(family: Family) -> list[Notice]:
     """What devices of this family are known to say on their own account."""
     events = [event for vector in vectors(family.name) for event in family.receiver().feed(vector.data)]
@@ -134,6 +157,12 @@ def closed(lock: Entry) -> int:
     values = [value for value, meaning in lock.choices.items() if meaning.startswith("closed")]
     assert len(values) == 1, "the choices of a lock say which value is closed"
     return values[0]
+
+
+def plain(table: Table) -> list[Entry]:
+    """Rows whose writing does nothing but keep a value, which can be read, for as long as there is power."""
+    rows = [row for row in table.values() if row.writable and row.readable and not row.protected]
+    return [row for row in rows if row.effect is Effect.NONE]
 
 
 def kept(table: Table) -> list[Entry]:

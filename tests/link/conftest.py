@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import can
 import pytest
 
 from motorbus.link.pty import PtyMaster
@@ -17,6 +19,14 @@ def state_home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="mb-", dir="/tmp") as folder:
         monkeypatch.setenv("XDG_STATE_HOME", folder)
         yield Path(folder)
+
+
+@pytest.fixture(autouse=True)
+def no_can_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What whoever runs the tests has configured for python-can is none of their business."""
+    monkeypatch.setattr(can.util, "CONFIG_FILES", [])
+    for name in [name for name in os.environ if name.startswith("CAN_")]:
+        monkeypatch.delenv(name)
 
 
 @pytest.fixture

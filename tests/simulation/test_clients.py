@@ -112,7 +112,7 @@ def test_a_frame_is_never_torn() -> None:
     assert desk.got == b"t12320102\r" * 3
 
 
-def test_who_does_not_read_misses_answers_too_and_memory_stays_small() -> None:
+def test_who_never_reads_misses_answers_at_last_and_memory_stays_small() -> None:
     desk = Desk()
     client = opened(desk)
     desk.room = 0
@@ -121,7 +121,20 @@ def test_who_does_not_read_misses_answers_too_and_memory_stays_small() -> None:
         client.read(0.0)
         client.tell(FRAME, 0.0)
         client.flush()
-    assert len(client._out) <= 1000
+    assert len(client._out) < 4096 + 1000
+
+
+def test_who_reads_late_gets_every_answer() -> None:
+    desk = Desk()
+    client = opened(desk)
+    desk.room = 3
+    client.tell(FRAME, 0.0)
+    client.flush()
+    desk.said = b"C\rV\r"
+    client.read(0.0)
+    desk.room = 1000
+    client.flush()
+    assert desk.got == b"t12320102\r\rV1013\r"
 
 
 def test_what_does_not_fit_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 from contextlib import closing
@@ -9,7 +10,7 @@ from contextlib import closing
 import pytest
 
 from motorbus.errors import LinkError, PortBusy, RequestError
-from motorbus.simulation.listener import TcpListener, parse_endpoint
+from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 
 
 def ready(listener: TcpListener) -> bytes:
@@ -116,3 +117,32 @@ def test_closing_twice() -> None:
     listener = TcpListener()
     listener.close()
     listener.close()
+
+
+def test_a_port_takes_in_several() -> None:
+    with closing(TcpPort()) as port:
+        assert port.address == f"127.0.0.1:{port.port}"
+        assert port.accept() is None
+        for _ in range(2):
+            with socket.create_connection((port.host, port.port), timeout=10.0) as program:
+                assert select.select([port], (), (), 10.0)[0]
+                client = port.accept()
+                assert client is not None
+                with closing(client):
+                    assert client.rate() is None
+                    assert client.read() == b""
+                    assert not client.gone
+                    program.sendall(b"abc")
+                    assert select.select([client], (), (), 10.0)[0]
+                    assert client.read() == b"abc"
+                    assert client.write(b"xyz") == 3
+                    assert program.recv(3) == b"xyz"
+
+
+def test_what_is_small_leaves_at_once() -> None:
+    with closing(TcpPort()) as port, socket.create_connection((port.host, port.port)):
+        assert select.select([port], (), (), 10.0)[0]
+        client = port.accept()
+        assert client is not None
+        with closing(client), socket.socket(fileno=os.dup(client.fileno())) as same:
+            assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

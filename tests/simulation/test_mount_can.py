@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import socket
+import time
 import tty
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -185,6 +186,19 @@ def test_a_client_that_closes_leaves_the_bus_at_its_own_rate() -> None:
             program.say(word)
             program.hears(b"\r")
     assert bus.tuned == [250_000, 500_000, 250_000]
+
+
+def test_a_client_that_leaves_takes_its_rate_along() -> None:
+    bus, door = Parrots(500_000), Door(TcpPort(), SlcanAdapter)
+    with closing(door), served(Mount(bus, door, rate=500_000)), caller(door) as one:
+        with caller(door) as other:
+            other.opens(b"5")
+        one.say(b"O\r")
+        one.hears(b"\r")
+        while bus.tuned[-1] != 500_000:  # the other has left, sooner or later
+            time.sleep(0.001)
+        one.say(ASK)
+        assert one.hears(b"z\r" + ANSWER)
 
 
 def test_who_sets_no_rate_has_that_of_the_bus() -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from motorbus import families
+from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.memory import MemoryLink
+from motorbus.link.memory import MemoryLink, NoisyLine
 from motorbus.simulation.faults import ScriptedLine
 from motorbus.simulation.named import Simulation, find
+from tests.simulation.links import QueueLink
 
 PING_1 = bytes.fromhex("FF FF 01 02 01 FB")
 PONG_1 = bytes.fromhex("FF FF 01 02 00 FC")
@@ -146,3 +148,73 @@ def test_an_impossible_clock_model_and_option() -> None:
     for wrong in ({"clock": "wall"}, {"model": "sts9999"}, {"no_such": "1"}):
         with pytest.raises(RequestError):
             simulation(**wrong)
+
+
+# On a CAN channel of somebody else.
+
+
+@pytest.fixture
+def channel(monkeypatch: pytest.MonkeyPatch) -> QueueLink:
+    """What opens, whatever channel is asked for."""
+    link = QueueLink()
+    monkeypatch.setattr("motorbus.simulation.served.open_link", lambda port, **options: link)
+    return link
+
+
+def servos(*ids: int, **options: object) -> Simulation:
+    return Simulation(families.load("kst"), ids, **options)  # type: ignore[arg-type]
+
+
+READ_37 = CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00"))
+POSITION_37 = CanFrame(0x5A5, bytes.fromhex("4B 02 60 00 00 00 00 00"))
+
+
+def test_can_devices_can_be_put_on_a_channel(channel: QueueLink) -> None:
+    with servos(37) as sim, sim.serve("can://virtual/here"):
+        channel.arrive(READ_37)
+        assert channel.next_sent() == POSITION_37
+    assert channel.closed
+
+
+def test_a_simulation_that_is_served_is_open(channel: QueueLink) -> None:
+    with servos(37) as sim:
+        with sim.serve("can://virtual/here"):
+            for open_it in (sim.link, lambda: sim.serve("can://virtual/there")):
+                with pytest.raises(PortBusy):
+                    open_it()
+        link = sim.link()
+        with pytest.raises(PortBusy):
+            sim.serve("can://virtual/here")
+        link.close()
+
+
+def test_it_may_be_served_again_and_time_goes_on(channel: QueueLink) -> None:
+    with servos(37) as sim:
+        with sim.serve("can://virtual/here") as served:
+            left = served.now()
+        link = sim.link()
+        assert left <= link.now()
+        link.close()
+
+
+def test_closing_the_simulation_ends_it(channel: QueueLink) -> None:
+    sim = servos(37)
+    sim.serve("can://virtual/here")
+    sim.close()
+    assert channel.closed
+    with pytest.raises(PortNotFound):
+        sim.serve("can://virtual/here")
+
+
+def test_line_and_rate_hold_on_a_channel_too(channel: QueueLink) -> None:
+    with servos(37, bit_rate=250_000) as sim:
+        sim.line = NoisyLine(1, duplicate=1.0)
+        with sim.serve("can://virtual/here", 250_000) as served:
+            assert served.line is sim.line
+            channel.arrive(READ_37)
+            assert [channel.next_sent(), channel.next_sent()] == [POSITION_37, POSITION_37]
+
+
+def test_devices_on_a_serial_line_have_no_channel(channel: QueueLink) -> None:
+    with simulation() as sim, pytest.raises(RequestError, match="CAN"):
+        sim.serve("can://virtual/here")

@@ -11,6 +11,7 @@ from typing import Any
 
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
+from motorbus.bus.known import Known
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
@@ -23,7 +24,6 @@ from motorbus.core.operation import (
     Answer,
     CanFrame,
     Data,
-    Effect,
     Exchange,
     Noise,
     Notice,
@@ -39,8 +39,6 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
 }
 SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 EARLY = 0.9  # of the air time: a reply sooner than this on a paced link answers an older request
-MOVING = (Effect.TORQUE, Effect.MOTION)
-FRESH = 0.02  # s; an older position is not where a moving device is: stop does not hold there
 
 
 class Air:
@@ -58,10 +56,8 @@ class Air:
         self.trust = Trust(family)
         self.echo = Echo()
         self.receiver = family.receiver()
-        self.known: dict[int, Answer | None] = {}
-        self.stop = family.stop(self.known)
+        self.known = Known(family, rate)
         self.settled = 0
-        self.known_rate = rate
         self._flying: dict[int, Flight] = {}
         self._free_at = 0.0
 
@@ -94,21 +90,19 @@ class Air:
         flight.echo_checked = echo_checked
         self.trust.ask(exchange, now)
         start = max(now, self._free_at)
-        air = flight.air = self.family.air_time(exchange, self.rate)
+        air = self.family.air_time(exchange, self.rate)
         flight.sent_at = now
         flight.left = True
         flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
-        if self._flying:
-            self._share_wire(flight)
+        if self.window > 1:
+            self._share_wire(flight, air)
         flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
         if exchange.replies == ():
             self._free_at = start + air
         else:
             self._flying[exchange.lane] = flight
-        if exchange.goals:
-            self._know_all([goal.node for goal in exchange.goals])
-        if exchange.effect and exchange.effect in MOVING and exchange.rank is not Rank.STOP:
-            self._unsettle(exchange)
+        if exchange.effect or exchange.goals:
+            self.known.order(exchange, self.rate)
         if isinstance(exchange.request, bytes):
             self.echo.sent(exchange.request, flight.parent is not None or exchange is self.echo.test)
         self._count_sent(exchange)
@@ -118,12 +112,13 @@ class Air:
             self._settle(flight, flight.answer(now))
         return exchange.request
 
-    def _share_wire(self, flight: Flight) -> None:
+    def _share_wire(self, flight: Flight, air: float) -> None:
         """Lanes share one wire: whichever goes first, each may have to wait for all the others, once."""
+        flight.air = air
         for other in self._flying.values():
             flight.deadline += other.air
             if other.beside < self.window - 1 and not other.abandoned:
-                other.deadline += flight.air
+                other.deadline += air
                 other.beside += 1
         flight.beside = len(self._flying)
 
@@ -189,16 +184,14 @@ class Air:
 
     def _take_reply(self, reply: Reply, now: float) -> None:
         flight = self._flying.get(reply.lane)
-        if EVERY_LANE in self._flying and (flight is None or not flight.awaits(reply)):
-            flight = self._flying[EVERY_LANE]
         if flight is None:
-            self._nobodys(reply, now)
+            self._unawaited(reply, now)
         elif reply.data in self.echo.recent and not flight.echo_checked:
             self.echo.doubted()
             flight.spoiled = "echo"
             self.statistics.other["echo"] += 1
         elif flight.complete:
-            flight.surplus = True
+            flight.surplus |= not self._everyones(reply)
         elif not self._is_stale(flight, reply) and not flight.take(reply):
             self._mismatch(flight, reply, now)
 
@@ -216,7 +209,7 @@ class Air:
     def _mismatch(self, flight: Flight, reply: Reply, now: float) -> None:
         dues = flight.exchange.replies
         mine = dues is not ANY and any(due.key == reply.key for due in dues)
-        if self._late(reply):
+        if self._late(reply) or self._everyones(reply):
             return
         if mine and not flight.parent:
             flight.disbelieve(reply)
@@ -224,9 +217,16 @@ class Air:
         else:
             self._nobodys(reply, now)
 
+    def _unawaited(self, reply: Reply, now: float) -> None:
+        if not self._late(reply) and not self._everyones(reply):
+            self._nobodys(reply, now)
+
+    def _everyones(self, reply: Reply) -> bool:
+        """Everybody was asked, and this is what one of them says."""
+        flight = self._flying.get(EVERY_LANE)
+        return flight is not None and flight.take(reply)
+
     def _nobodys(self, reply: Reply, now: float) -> None:
-        if self._late(reply):
-            return
         self.statistics.other["foreign"] += 1
         self.trust.doubt(now, self._quiet, reply.lane)
 
@@ -327,40 +327,13 @@ class Air:
                 if flight.rank is not Rank.STOP:  # what a stop cut short may still answer
                     self.trust.believe(due, barrier=flight.parent is not None)
                 self.statistics.of(due.node).answered(now - flight.sent_at)
-                self._know(due.node, answer if flight.exchange.tells_position else None)
+                self.known.hear(due.node, answer if flight.exchange.tells_position else None, self.rate)
             else:
                 if index not in flight.got:
                     self.trust.missed(flight.exchange.lane, due, now, self._quiet)
                 elif not self.trust.of(due.node).silent:
                     self.trust.of(due.node).quiet_until = now + self._quiet
                 self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
-
-    def _know_all(self, nodes: list[int]) -> None:
-        """Whoever has been ordered to move is to be stopped, whether it has ever answered or not."""
-        for node in nodes:
-            self._know(node, None)
-
-    def _know(self, node: int, position: Answer | None) -> None:
-        self.known_rate = self.rate
-        if node not in self.known:
-            self.known[node] = position
-            self.stop = self.family.stop(dict.fromkeys(self.known))
-        elif position is not None:
-            self.known[node] = position
-
-    def _unsettle(self, exchange: Exchange[Any]) -> None:
-        """This sets something moving, so where it was last seen is where it is not any more."""
-        dues = () if exchange.replies is ANY else exchange.replies
-        nodes = {due.node for due in dues} | {goal.node for goal in exchange.goals}
-        for node in nodes & set(self.known) if nodes else list(self.known):
-            self.known[node] = None
-
-    def fresh(self, now: float) -> dict[int, Answer | None]:
-        """Whom a stop must reach, each with its last position if that is fresh: see `FRESH`."""
-        return {
-            node: answer if answer is not None and now - answer.at < FRESH else None
-            for node, answer in self.known.items()
-        }
 
     def _lost_try(self, lane: int, flight: Flight, now: float) -> None:
         kind = verdict.fault(flight)

@@ -112,13 +112,13 @@ class Stopper:
         """A scan may be trying another rate, or only listening; whoever is to stop was last heard at its own."""
         turns = self.turns
         with turns.lock:
-            if (turns.known_rate, turns.listen_only) != (turns.rate, turns.listening):
-                retune(self.link, turns, Retune(Tune(turns.known_rate), None, None))
+            if (turns.known.rate, turns.listen_only) != (turns.rate, turns.listening):
+                retune(self.link, turns, Retune(Tune(turns.known.rate), None, None))
 
     def _frames(self, nodes: Iterable[int]) -> tuple[Exchange[Answer], ...]:
         """What stops these nodes as things are now."""
         with self.turns.lock:
-            fresh = self.turns.fresh(self.link.now())
+            fresh = self.turns.known.fresh(self.link.now())
             stop: Stop = self.turns.family.stop({node: fresh[node] for node in nodes if node in fresh})
         return stop.exchanges
 

@@ -75,7 +75,13 @@ class Claim(Ticket):
 
 
 class Flight(Ticket):
-    """Awaits the answer to one exchange, over all its tries."""
+    """Awaits the answer to one exchange, over all its tries.
+
+    Where lanes share a wire, `air` is its time there and `beside` how many others its deadline allows for.
+    """
+
+    air: float
+    beside: int
 
     __slots__ = (
         "abandoned",
@@ -111,8 +117,6 @@ class Flight(Ticket):
         self.abandoned = False
         self.left = False
         self.echo_checked = False
-        self.air = 0.0
-        self.beside = 0
         self.unbelieved: tuple[int, ...] = ()
         self.reset()
 
@@ -130,14 +134,6 @@ class Flight(Ticket):
     @property
     def rank(self) -> Rank:
         return self.exchange.rank
-
-    def awaits(self, reply: Reply) -> bool:
-        """Is this one of the replies due that have not come yet?"""
-        dues = self.exchange.replies
-        return dues is ANY or any(
-            key == reply.key and length == len(reply.data) and index not in self.got
-            for index, (_, key, length) in enumerate(dues)
-        )
 
     def take(self, reply: Reply) -> bool:
         """Is this one of the replies due? Keeps it if so."""

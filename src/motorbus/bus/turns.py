@@ -269,8 +269,9 @@ class Turns(Air):
 
     def expire(self, now: float) -> None:
         """Settle everything whose moment has passed."""
-        super().expire(now)
-        for timer in list(self._timers):
+        if self._flying:
+            super().expire(now)
+        for timer in list(self._timers) if self._timers else ():
             if now >= timer.deadline:
                 self._timers.remove(timer)
                 self._settle(timer)
@@ -339,7 +340,7 @@ class Turns(Air):
         """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""
         self.latched = self.stopping = True
         with contextlib.suppress(Exception):  # if it fails, the frames made before, without positions, do
-            self.stop = self.family.stop(self.fresh(now))
+            self.known.frames = self.family.stop(self.known.fresh(now))
         for queue in self._queues:
             for ticket in list(queue):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:
@@ -353,7 +354,7 @@ class Turns(Air):
         for timer in list(self._timers):
             self._timers.remove(timer)
             self._settle(timer, error=verdict.latched())
-        return self.stop
+        return self.known.frames
 
     def stopped(self) -> None:
         """The stop frames are out: clean-ups and reading may go on, motion and torque stay refused."""

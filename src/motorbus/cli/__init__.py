@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import signal
 import sys
 import threading
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
@@ -24,6 +25,7 @@ from motorbus.cli.output import Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from inspect import BoundArguments
 
 # A command's parser lives as long as its module, so the groups it belongs to are made once, too.
 _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
@@ -81,6 +83,11 @@ def build() -> App:
 def _default_shown(default: object) -> str | None:
     return str(default) if default else None
 
+
+_COMMON: Final = re.compile(r"--json|--verbose|-v+")
+_MINUS: Final = "\N{MINUS SIGN}"
+_NEGATIVE: Final = re.compile(r"-[.]?[0-9].*")
+"""A negative number, with a unit or without: no flag begins with a digit."""
 
 _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#ID:
 
@@ -154,15 +161,50 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
             Say on stderr what happens; -vv says more.
         """
         output.json = as_json
-        command, bound, ignored = app.parse_args(words, exit_on_error=False, print_error=False)
+        command, bound, ignored = parse(app, words)
         bound.arguments.update(dict.fromkeys(ignored, output))
         with _logging(verbose):
             result = command(*bound.args, **bound.kwargs)
         return result if isinstance(result, int) else Exit.OK
 
     app.meta.suppress_keyboard_interrupt = False
-    code = app.meta(words, exit_on_error=False, print_error=False, result_action="return_value")
+    code = app.meta(
+        _common_first(words), exit_on_error=False, print_error=False, result_action="return_value"
+    )
     return code if isinstance(code, int) else Exit.OK
+
+
+def _common_first(words: Sequence[str]) -> list[str]:
+    """The flags that every command has may stand anywhere; the parser finds them for sure where they come first."""
+    common = [word for word in words if _COMMON.fullmatch(word)]
+    return [*common, *(word for word in words if not _COMMON.fullmatch(word))]
+
+
+def parse(app: App, words: Sequence[str]) -> tuple[Any, BoundArguments, Mapping[str, Any]]:
+    """The command that these words mean, its arguments, and those that it does not take from words.
+
+    Raises CycloptsError for words that mean none.
+    """
+    told = [_positional(word) for word in words]
+    command, bound, ignored = app.parse_args(told, exit_on_error=False, print_error=False)
+    bound.arguments.update({name: _as_said(value) for name, value in bound.arguments.items()})
+    return command, bound, ignored
+
+
+def _positional(word: str) -> str:
+    """-30deg is a quantity and no flag: for the parser its sign is written as a minus that begins none."""
+    return _MINUS + word[1:] if _NEGATIVE.fullmatch(word) else word
+
+
+def _as_said(value: object) -> object:
+    """What the parser made of the words, with the sign that was said."""
+    if isinstance(value, str):
+        return "-" + value[1:] if value.startswith(_MINUS) else value
+    if isinstance(value, tuple):
+        return tuple(_as_said(one) for one in value)
+    if isinstance(value, dict):
+        return {name: _as_said(one) for name, one in value.items()}
+    return value
 
 
 @contextmanager

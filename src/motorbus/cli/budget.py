@@ -25,9 +25,9 @@ app = App(
     help_epilogue="""CAN buses only in this version. Counts every bit of every frame, stuff bits and
 the gap between frames included, over all positions: least, mean, most. The
 load is that of a loop which once a cycle sends each device its goal, takes the
-acknowledgement, and reads its position. --latency is what adapter and host need
-for one exchange, --turnaround what a device needs before it answers: they do
-not load the bus, but decide how many exchanges must be under way at once to
+acknowledgement, and reads its position. --latency is what adapter and host
+need for one exchange, --turnaround what a device needs before it answers: they
+do not load the bus, but decide how many exchanges must be under way at once to
 fill it. Ends with exit code 8 when the bus cannot carry the loop.
 
 Examples:

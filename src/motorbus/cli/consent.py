@@ -9,7 +9,7 @@ from motorbus.cli.target import able
 from motorbus.core.operation import Effect
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from motorbus.cli.output import Output
     from motorbus.core.entry import Entry, Value
@@ -18,13 +18,24 @@ FAR: Final = math.pi
 """rad; a way that is longer needs consent."""
 
 
-def consent_to_ways(goals: Sequence[tuple[Any, float]], output: Output, *, yes: bool) -> None:
-    """Ask before a device goes far from where it stands; goals in rad. Raises NeedsConsent when nobody agrees."""
+def consent_to_ways(
+    goals: Sequence[tuple[Any, float]],
+    output: Output,
+    *,
+    yes: bool,
+    rehearse: Callable[[], object] | None = None,
+) -> None:
+    """Ask before a device goes far from where it stands; goals in rad. Raises NeedsConsent when nobody agrees.
+
+    Before anybody is asked, `rehearse` raises what the move itself would be refused for.
+    """
     if yes:
         return
     ways = [(one.node, abs(goal - able(one, "position")())) for one, goal in goals]
     far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways if way > FAR]
     if far:
+        if rehearse is not None:
+            rehearse()
         output.consent(f"move {', '.join(far)}", yes=False)
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_FRAMING: Final = ("checksum", "identifier", "length", "reserved")
 _EVERYONE: Final = -1
 """Among the nodes that something was withheld from: what nobody answers may have been for each of them."""
 
@@ -113,5 +114,5 @@ def _meaning(one: Explanation) -> str:
     """What a frame of ours says; who it could come from besides, and how it is framed, is left to `decode`."""
     names = [part.name for part in one.parts]
     start = names.index("instruction") + 1 if "instruction" in names else 0
-    parts = [f"{part.name} {part.meaning}" for part in one.parts[start:] if part.name != "checksum"]
+    parts = [f"{part.name} {part.meaning}" for part in one.parts[start:] if part.name not in _FRAMING]
     return "; ".join([one.title.partition(" (or ")[0], *parts])

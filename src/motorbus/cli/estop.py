@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import Target, opened, target
+from motorbus.cli.target import Target, everyone, opened, target
+from motorbus.core.operation import Effect
 from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
 
+ANYBODY: Final = 1
+"""An id that a device of any family can have."""
+
 app = App(
     name="estop",
     help_epilogue="""THE ARM WILL SAG: an emergency stop cuts the torque of FEETECH servos, and
-nothing holds them up then. `motorbus stop` decelerates and holds instead.
+nothing holds them up then. `motorbus stop` decelerates and holds instead. KST
+servos have no torque switch: their target becomes the place where they were
+last seen, or asked for now, and they hold there.
 
 A bus that another motorbus process holds is stopped by that process, even if
 its event loop hangs, and stays stopped until that process says reset(). A bus
@@ -45,7 +52,7 @@ def estop(
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
-    """Emergency stop: cut the torque of a bus at once, from any shell. The arm will sag.
+    """Emergency stop: stop a bus at once, from any shell. Where torque is cut, an arm sags.
 
     Parameters
     ----------
@@ -95,6 +102,7 @@ def _ask(port: str) -> StopOutcome:
 def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> dict[str, Any]:
     """Nobody offers the stop: send it from here, then have each device that was named confirm it."""
     with opened(wanted.bus, options, output) as opening:
+        _meet(opening, wanted, output)
         outcome = opening.estop()
         confirmed, silent = set(outcome.acknowledged), set(outcome.silent)
         for node in wanted.nodes:
@@ -106,10 +114,22 @@ def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> 
     return _facts(wanted.bus, "this process", outcome, note)
 
 
+def _meet(opening: Bus, wanted: Target, output: Output) -> None:
+    """Where a device can be stopped only at a place that is known, ask it, or everyone, where it is."""
+    needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
+    if not needs or not all(needs):
+        return
+    for node in everyone(wanted.bus, opening, wanted.nodes, output):
+        for exchange in opening.family.stop({node: None}).exchanges:
+            with suppress(MotorbusError):  # the stop itself will say who is silent
+                opening.run(exchange)
+
+
 def _confirms(opening: Bus, node: int) -> bool:
     """Send this node what its family stops it with; has it acknowledged?"""
     answers = []
-    for exchange in opening.family.stop({node: None}).exchanges:
+    exchanges = opening.family.stop({node: None}).exchanges
+    for exchange in (one for one in exchanges if one.effect is not Effect.NONE):
         try:
             opening.run(exchange)
         except MotorbusError:

@@ -8,6 +8,8 @@ A family's face is the module of its name in this folder. Apart from its own com
     budget_frames(family, node)                                what a loop says to a node ("read", "write"): for each
                                                                frame of that exchange all that it may be
     report_frames(family, node)                                all that a report of a node may be
+    say(event)                                                 what an event of its operations says, "" if nothing
+    meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
 
 A family that lacks one of them is served by the common verbs, or the command says that it cannot be done.
 """

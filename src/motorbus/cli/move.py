@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
@@ -24,11 +25,11 @@ app = App(
     name="move",
     usage="Usage: motorbus move BUS#ID=POSITION... [OPTIONS]",
     help_epilogue="""Positions are in rad, or with a unit: 90deg, 0.25turn. Torque goes on by
-itself where devices do that, as FEETECH servos do; `motorbus torque on` first
-elsewhere. A way of more than 180 degrees needs --yes. The goal must lie inside
-the limits of the device. Several devices of one bus begin in the same instant
-where their family can do that. Ctrl-C ends the waiting, not the motion:
-`motorbus stop` does.
+itself where devices do that, as FEETECH servos do, or is never off, as in KST
+servos; `motorbus torque on` first elsewhere. A way of more than 180 degrees
+needs --yes. The goal must lie inside the limits of the device. Several devices
+of one bus begin in the same instant where their family can do that. Ctrl-C
+ends the waiting, not the motion: `motorbus stop` does.
 
 Examples:
 
@@ -77,10 +78,11 @@ def move(
     results = []
     for bus, wanted in _wanted(goals).items():
         with opened(bus, options, output) as opening:
-            consent_to_ways(_ways(opening, wanted, bounds), output, yes=yes or dry_run)
+            ways, rehearsal = _ways(opening, wanted, bounds), dry.DryBus(opening)
+            rehearse = partial(_move, rehearsal, wanted, {**bounds, "wait": False})
+            consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
             if dry_run:
-                rehearsal = dry.DryBus(opening)
-                _move(rehearsal, wanted, {**bounds, "wait": False})
+                rehearse()
                 dry.show(rehearsal, output)
                 continue
             _move(opening, wanted, {**bounds, "wait": wait})

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from motorbus.cli import quantity
+from motorbus.cli import faces, quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from motorbus.cli.output import Output
     from motorbus.core.entry import Entry, Value
@@ -18,20 +18,22 @@ FULL = ("register", ">address", "value", ">raw", "meaning", "storage", "access")
 
 def facts(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[dict[str, Any]]:
     """What these registers of a device hold, as plain data."""
+    meaning = faces.offer(one.bus.family.name, "meaning") or quantity.meaning
     return [
-        _facts(entry, values[entry.name], quantity.to_raw(one, entry, values[entry.name]))
+        _facts(entry, values[entry.name], quantity.to_raw(one, entry, values[entry.name]), meaning)
         for entry in entries
     ]
 
 
-def _facts(entry: Entry, value: Value, raw: int) -> dict[str, Any]:
+def _facts(entry: Entry, value: Value, raw: int, meaning: Callable[[Entry, int], str]) -> dict[str, Any]:
     return {
         "name": entry.name,
         "address": entry.address,
+        **({} if entry.subindex is None else {"subindex": entry.subindex}),
         "value": value,
         "unit": entry.unit,
         "raw": raw,
-        "meaning": quantity.meaning(entry, raw),
+        "meaning": meaning(entry, raw),
         "storage": entry.storage.value,
         "access": entry.access.value,
     }
@@ -41,5 +43,13 @@ def show(title: str, rows: Iterable[Mapping[str, Any]], output: Output, *, full:
     """The same as a table."""
     names = FULL if full else BRIEF
     keys = ["name" if name == "register" else name.removeprefix(">") for name in names]
-    cells = [{**row, "value": quantity.shown(row["value"], row["unit"])} for row in rows]
+    cells = [
+        {**row, "address": _address(row), "value": quantity.shown(row["value"], row["unit"])} for row in rows
+    ]
     output.table(title, names, [[row[key] for key in keys] for row in cells])
+
+
+def _address(row: Mapping[str, Any]) -> str:
+    if "subindex" not in row:
+        return str(row["address"])
+    return f"0x{row['address']:04X}:{row['subindex']:02X}"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import faces
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.target import id_shown, nobody, opened, rate_word, target
@@ -69,13 +71,16 @@ def scan(
     tried = _tried({"baud": baud, "bitrate": bitrate}, wanted.family)
     early: list[Found] = []
     found: list[Found] | None = None
+    notes: list[str] = []
     with opened(wanted.bus, options, output) as opening:
         operation = opening.family.scan(asked, tried or (opening.rate,))
         try:
             with output.progress("scanning") as bar:
-                found = opening.run(operation, report=lambda event: listen(event, early, bar))
+                found = opening.run(operation, report=partial(_heard, wanted.family.name, early, bar, notes))
         finally:
-            _show(wanted, early if found is None else found, output)
+            for text in notes:
+                output.note(f"note: {text}")
+            _show(wanted, early if found is None else found, notes, output)
         if not found:
             raise nobody(bus)
     return Exit.OK
@@ -105,6 +110,14 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
     return tuple(int(word) for word in words)
 
 
+def _heard(family: str, found: list[Found], bar: Bar, notes: list[str], event: object) -> None:
+    listen(event, found, bar)
+    say = faces.offer(family, "say")
+    text = say(event) if say is not None else ""
+    if text and text not in notes:
+        notes.append(text)
+
+
 def listen(event: object, found: list[Found], bar: Bar) -> None:
     """Take note of what a scan reports on its way: an early result, or how far it has come."""
     if isinstance(event, Found):
@@ -118,9 +131,10 @@ def _model(one: Found) -> str:
     return one.identity.model if one.identity else "?"
 
 
-def _show(wanted: Target, found: list[Found], output: Output) -> None:
+def _show(wanted: Target, found: list[Found], notes: list[str], output: Output) -> None:
     word = rate_word(wanted.family)
-    output.document("motorbus.scan/1", {"bus": wanted.bus, "devices": [facts(one, word) for one in found]})
+    devices = [facts(one, word) for one in found]
+    output.document("motorbus.scan/1", {"bus": wanted.bus, "devices": devices, "notes": notes})
     if found:
         rows = [(id_shown(one.node, wanted.family), *row(one)[1:]) for one in found]
         output.table(f"Devices on {wanted.bus}", COLUMNS, rows)

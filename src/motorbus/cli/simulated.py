@@ -50,6 +50,11 @@ class Simulated:
         return str(self.ready["bus"])
 
     @property
+    def buses(self) -> list[str]:
+        """Every address by which it can be reached; the first is `bus`."""
+        return [str(bus) for bus in self.ready["buses"]]
+
+    @property
     def process(self) -> subprocess.Popen[str]:
         """The child."""
         assert self._process is not None

@@ -86,18 +86,19 @@ def _server(port: str, rest: str) -> dict[str, Any]:
 def configured(can: Any, port: str, rate: int, options: Mapping[str, object]) -> CanConfig:
     """Everything that was said about this port, put together; `can` is python-can. Raises RequestError."""
     interface, said = split_port(port)
-    rest = {name: _WORDS.get(str(value).lower(), value) for name, value in options.items()}
+    rest = _worded(options)
     context = rest.pop("config_context", None)
     given = {**rest, **said, **({"interface": interface} if interface else {})}
     whole = _load(can, port, given, None if context is None else str(context))
-    interface = whole.pop("interface")
+    interface, channel = whole.pop("interface"), whole.pop("channel")
+    whole = _worded(whole)
     back_end = _class(can, interface)
     names = parameters(back_end) - _ELSEWHERE if back_end else None
     _check_options(port, interface, set(rest), names, timing=_takes(back_end, "timing"))
     config = CanConfig(
         name=port,
         interface=interface,
-        channel=whole.pop("channel"),
+        channel=channel,
         rate=rate or _number(whole.get("bitrate")),
         listen_only=_switch("listen_only", whole.pop("listen_only", False)),
         settings={name: value for name, value in whole.items() if names is None or name in names},
@@ -186,6 +187,11 @@ def _check_options(
                 expected=f"one of {', '.join(known)}",
                 advice=f"did you mean {close[0]}?" if close else "",
             )
+
+
+def _worded(options: Mapping[str, object]) -> dict[str, Any]:
+    """python-can knows true and false, and takes any other word for true."""
+    return {name: _WORDS.get(str(value).lower(), value) for name, value in options.items()}
 
 
 def _switch(name: str, value: object) -> bool:

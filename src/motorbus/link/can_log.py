@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.errors import RequestError
+from motorbus.errors import LinkError, RequestError
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -147,14 +147,15 @@ def _by_python_can(path: Path) -> Iterator[Logged]:
 
 
 def _python_can(path: Path) -> ModuleType:
+    from motorbus.link.can import python_can  # the one file that imports it
+
     try:
-        import can
-    except ImportError:
+        return python_can(str(path))
+    except LinkError:
         raise RequestError(
             f"{path}: reading {path.suffix} needs python-can, which is not installed",
             advice='pip install "motorbus[can]", or give the log as candump text',
         ) from None
-    return can
 
 
 def _from_message(message: Any) -> Logged:

@@ -41,7 +41,7 @@ def known_rates(interface: str, back_end: Any) -> frozenset[int]:
     name = _TABLES.get(interface)
     if name is None or back_end is None:
         return frozenset()
-    table = getattr(back_end, name, None) or getattr(sys.modules[back_end.__module__], name, ())
+    table: Any = getattr(back_end, name, None) or getattr(sys.modules[back_end.__module__], name, ())
     rates = frozenset(table[0] if interface == "ixxat" and table else table)
     return rates - {AMBIGUOUS} if interface == "slcan" else rates
 
@@ -83,7 +83,7 @@ def cannot(config: CanConfig, rate: int, rates: Iterable[int]) -> LinkError:
     is_trap = config.interface == "slcan" and rate in (AMBIGUOUS, 800_000)
     return LinkError(
         f"{config.name}: {config.interface} has no bit rate of {rate} bit/s"
-        f"{why.get(config.interface, '') if is_trap or config.interface != 'slcan' else ''}; nothing was opened",
+        f"{why.get(config.interface, '') if is_trap or config.interface != 'slcan' else ''}",
         expected=f"one of {', '.join(map(str, known))} bit/s" if known else "whole kbit/s, at most 1000",
         advice=f"give the bit timing instead of a rate: {_ANY_TIMING} is 800 kbit/s"
         if config.interface == "slcan"
@@ -126,7 +126,8 @@ def kernel_rate(config: CanConfig, rate: int, usual: int) -> tuple[int, tuple[st
         )
     if not link.up:
         raise LinkError(
-            f"{config.name}: {channel} is switched off", advice=ip_line(channel, rate or usual, link.listen_only)
+            f"{config.name}: {channel} is switched off",
+            advice=ip_line(channel, rate or usual, link.listen_only),
         )
     if rate and link.rate and rate != link.rate:
         raise LinkError(

@@ -87,7 +87,7 @@ class SerialLink:
         self.paced = not self._device.startswith(PSEUDO_TERMINALS)
         if not os.path.exists(self._device):
             raise not_found(port, ports())
-        if not _could_be_a_port(self._device):
+        if not could_be_a_port(self._device):
             raise LinkError(f"{port} is not a serial port")
         self._lock = PortLock(port).acquire()
         try:
@@ -255,7 +255,7 @@ def open_serial(port: str, *, rate: int) -> SerialLink | PolledLink:
 # -- opening ----------------------------------------------------------------------------------------------------
 
 
-def _could_be_a_port(device: str) -> bool:
+def could_be_a_port(device: str) -> bool:
     """A character device, and not one like /dev/null that half of all programs have open."""
     about = os.stat(device)
     is_memory = sys.platform == "linux" and os.major(about.st_rdev) == MEMORY_DEVICES

@@ -25,7 +25,7 @@ def open_link(
     PortNotFound, PortBusy (naming its owner) or LinkError.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
-    if scheme == "can" and kind == "frames":
+    if scheme == "can" and kind == "frames" and "\0" not in port:
         from motorbus.link.can import CanLink
 
         return CanLink(port, rate=rate, usual=usual, options=options or {})

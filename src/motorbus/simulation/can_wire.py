@@ -85,6 +85,7 @@ class CanWire:
         """Everything that reaches the host up to this moment."""
         while (moment := self._next()) <= to:
             self._happen(moment)
+        self._happen(to)  # the nodes learn what time it is even when nothing happens
         arrived = []
         while self._out and self._out[0][0] <= to:
             arrived.append(self._out.popleft())

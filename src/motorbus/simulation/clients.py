@@ -16,6 +16,8 @@ from motorbus.link.base import Adapter
 from motorbus.simulation.listener import TcpClient, TcpPort
 
 MOST_CLIENTS: Final = 16
+_UNREAD: Final = 4096
+"""Bytes kept for a client who does not read."""
 
 
 class Endpoint(Protocol):
@@ -121,7 +123,7 @@ class CanClient(Participant):
     def read(self, at: float, patience: float = 0.0) -> list[Data]:
         frames: list[Data] = [*self.adapter.feed(self._endpoint.read(), at)]
         answer = self.adapter.take()
-        if not self._stuck:  # as a frame, so an answer: who does not read misses it
+        if len(self._out) < _UNREAD:  # who never reads misses answers at last
             self._out += answer
         self._rate = self.adapter.bitrate if self.adapter.open or frames else None
         return frames

@@ -119,10 +119,7 @@ class Mount:
         """This client has said something, or left."""
         heard = client.read(self._clock(), patience)
         now, rate = self._clock(), client.rate()
-        if rate is None:  # the rate is that of the others then, or of the bus
-            others = (other.rate() for other in self.clients)
-            self.course.tune(next((one for one in others if one is not None), self._usual))
-        self.course.tune(rate)
+        self.course.tune(self._others_rate() if rate is None else rate)
         for data in heard:
             self.course.hear(data, now, client, rate)
 
@@ -136,8 +133,15 @@ class Mount:
             client.flush()
 
     def _sweep(self) -> None:
-        for door in self._doors:
-            self._lost_before += sum(client.lost for client in door.sweep())
+        gone = [client for door in self._doors for client in door.sweep()]
+        self._lost_before += sum(client.lost for client in gone)
+        if gone:
+            self.course.tune(self._others_rate())
+
+    def _others_rate(self) -> int | None:
+        """The rate that some client has set, else that of the bus."""
+        rates = (client.rate() for client in self.clients)
+        return next((rate for rate in rates if rate is not None), self._usual)
 
 
 def _participant(place: Endpoint | Participant, adapter: Adapter | None, rate: int | None) -> Participant:

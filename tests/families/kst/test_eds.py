@@ -6,13 +6,12 @@ That other people's software reads them is tested with it, in tests/interop.
 from __future__ import annotations
 
 from configparser import RawConfigParser
-from datetime import datetime
 from pathlib import Path
 
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.kst.eds import REVISED, eds
+from motorbus.families.kst.eds import REVISED, Moment, eds
 from motorbus.families.kst.table import PROFILES, Profile
 
 HERE = Path(__file__).resolve().parent
@@ -151,12 +150,12 @@ def test_the_same_call_gives_the_same_file() -> None:
 @pytest.mark.parametrize(
     ("made", "time", "date"),
     [
-        (datetime(2027, 1, 2, 0, 5), "12:05AM", "01-02-2027"),
-        (datetime(2027, 1, 2, 11, 59), "11:59AM", "01-02-2027"),
-        (datetime(2030, 12, 31, 23, 59), "11:59PM", "12-31-2030"),
+        (Moment(2027, 1, 2, 0, 5), "12:05AM", "01-02-2027"),
+        (Moment(2027, 1, 2, 11, 59), "11:59AM", "01-02-2027"),
+        (Moment(2030, 12, 31, 23, 59), "11:59PM", "12-31-2030"),
     ],
 )
-def test_the_head_says_who_and_when(made: datetime, time: str, date: str) -> None:
+def test_the_head_says_who_and_when(made: Moment, time: str, date: str) -> None:
     head = parsed(eds(PROFILES["kst"], file_name="arm.eds", creator="Ada", made=made))["FileInfo"]
     assert head["FileName"] == "arm.eds"
     for what in ("Creation", "Modification"):

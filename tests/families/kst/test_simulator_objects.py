@@ -180,3 +180,19 @@ def test_the_reverse_bit_may_roll_back_at_a_restart_although_it_was_saved(back: 
     write(host, 0x300F, 0x27)
     assert restarted(host)[0x25].memory["function_enable"] == kept
     assert host[0x25].shaft.reversed is bool(kept & 0x20)
+
+
+# --- access -----------------------------------------------------------------------------------------------------
+
+
+def test_what_newer_firmware_only_takes_cannot_be_read() -> None:
+    for index in ("0022", "0930"):
+        assert ext().say(f"625#40{index}0000000000") == [f"5A5#80{index}0001000106"]
+
+
+def test_lengths_stated_by_a_public_tool_are_the_right_ones() -> None:
+    host = ext()
+    assert host.say("625#2F00220014000000", "625#2309300000000000") == [
+        "5A5#6000220000000000",
+        "5A5#6009300000000000",
+    ]

@@ -54,8 +54,8 @@ def test_every_first_byte_of_eight_bytes_from_a_node() -> None:
         if is_a_reply(specifier):
             assert isinstance(event, Reply)
             assert (event.lane, event.data) == (5, data)
-        else:  # from that node's server, but no answer to anything: the node is doubted
-            assert event == Noise(data, "framing", 5)
+        else:  # from that node's server, but no answer to anything
+            assert event == Noise(data, "foreign", 5)
 
 
 def test_every_first_byte_of_four_bytes_from_a_node() -> None:

@@ -7,13 +7,14 @@ use, see `motorbus.cli.faces`.
 from __future__ import annotations
 
 from motorbus.cli.kst import identity, position, provision, settings, sheet
-from motorbus.cli.kst.offers import budget_frames, ping_everyone, report_frames, say
+from motorbus.cli.kst.offers import budget_frames, meaning, ping_everyone, report_frames, say
 from motorbus.cli.kst.servo import app
 
 __all__ = [
     "app",
     "budget_frames",
     "identity",
+    "meaning",
     "ping_everyone",
     "position",
     "provision",

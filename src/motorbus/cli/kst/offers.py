@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from motorbus.cli import quantity
 from motorbus.families.kst import driver, wire
+from motorbus.families.kst.table import text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from motorbus.bus.pump import Bus
+    from motorbus.core.entry import Entry
     from motorbus.core.family import Family
     from motorbus.core.operation import CanFrame
+
+VERSIONS: Final = ("firmware_version", "software_version")
 
 
 def ping_everyone(bus: Bus) -> list[int]:
@@ -44,6 +49,11 @@ def report_frames(family: Family, node: int) -> list[CanFrame]:
         wire.encode_report(node, raw, form=form, extended=extended)
         for raw in range(-profile.limit, profile.limit + 1)
     ]
+
+
+def meaning(row: Entry, raw: int) -> str:
+    """A version is text; everything else as its row says."""
+    return text(row, raw) if row.name in VERSIONS else quantity.meaning(row, raw)
 
 
 def say(event: Any) -> str:

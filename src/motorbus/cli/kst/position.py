@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from functools import partial
+from typing import Annotated
 
 from cyclopts import Parameter
 
+from motorbus.cli import dry
 from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
 from motorbus.cli.kst.servo import Device, Flag, Silent, app, on_servo, one_of_ours
 from motorbus.core import units
-from motorbus.families.kst.driver import RawStatus
+from motorbus.families.kst.driver import RawStatus, Servo
 
 
 @app.command(
     usage="Usage: motorbus kst position BUS#ID [VALUE] [OPTIONS]",
     help_epilogue="""Positions are in rad, or with a unit: 90deg. They are rounded to the servo's
 tenth of a degree as decimals are, halves away from zero. Out of range nothing
-is sent. The way back of a negative angle is no flag: it may be written as it is.
+is sent.
 
 Examples:
 
@@ -62,10 +64,12 @@ def position(
         return Exit.OK
     goal = units.parse(value, "position")
 
-    def go(servo: Any) -> float:
-        consent_to_ways([(servo, goal)], output, yes=yes or dry_run)
+    def go(servo: Servo) -> float:
+        rehearsal = Servo(dry.DryBus(servo.bus), servo.node)  # type: ignore[arg-type]
+        rehearse = partial(rehearsal.move, goal, wait=False)
+        consent_to_ways([(servo, goal)], output, yes=yes or dry_run, rehearse=rehearse)
         servo.move(goal, wait=wait and not dry_run)
-        return float(servo.position())
+        return goal if dry_run else servo.position()
 
     node, here = on_servo(device_, options, output, go, dry_run=dry_run)
     if not dry_run:

@@ -30,7 +30,7 @@ SCHEMA = "motorbus.kst.provision/1"
     usage="Usage: motorbus kst provision BUS#ID [--new-id ID] [--new-bitrate RATE] [OPTIONS]",
     help_epilogue="""Connect one servo at a time. Sees that it is alone and the new id free, writes,
 saves, asks for a power cycle, waits for the servo to come back, and verifies.
-When it was interrupted, say the same again: it goes on from where things stand.
+When it was interrupted, say the same again: it goes on from where things are.
 With --json every step is a line. Ends with exit code 9 when the servo comes
 back as it was.
 
@@ -128,5 +128,5 @@ def _rehearsed(bus: dry.DryBus, node: int, wanted: dict[str, int], output: Outpu
         servo.set_bit_rate(wanted["new_rate"])
     servo.save()
     dry.show(bus, output)
-    output.note("then a power cycle would be asked for, and the servo looked for")
+    output.text("then a power cycle would be asked for, and the servo looked for")
     return Exit.OK

@@ -14,8 +14,8 @@ from motorbus.errors import RequestError
 
 @app.command(
     usage="Usage: motorbus kst reports on|off BUS#ID [OPTIONS]",
-    help_epilogue="""Not in the manual; a profile without it refuses. By the profile xqpower the same
-start lets the servo move, and the stop makes it ignore positions.
+    help_epilogue="""Not in the manual; a profile without it refuses. By the profile xqpower the
+same start lets the servo move, and the stop makes it ignore positions.
 
 Examples:
 
@@ -162,8 +162,8 @@ def limits(
 @app.command(
     usage="Usage: motorbus kst reverse BUS#ID [on|off] [OPTIONS]",
     help_epilogue="""Only the one known bit is changed, the others are written back as they were.
-Some firmware undoes it at a restart: look again after one. Not in the manual; a
-profile without it refuses.
+Some firmware undoes it at a restart: look again after one. Not in the manual;
+a profile without it refuses.
 
 Examples:
 
@@ -172,7 +172,7 @@ Examples:
 )
 def reverse(
     device_: Device,
-    switch: Literal["on", "off", ""] = "",
+    switch: Literal["on", "off"] | None = None,
     /,
     *,
     yes: Flag = False,

@@ -9,13 +9,12 @@ from motorbus.cli.kst.identity import whole
 from motorbus.cli.kst.servo import Flag, Silent, app
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver import Node
-from motorbus.families.kst.eds import eds as made
 from motorbus.families.kst.table import PROFILES
 
 
 @app.command(
-    help_epilogue="""Written from the same rows as everything else. --with-mandatory declares the
-three objects that CiA 301 demands and these servos lack, for tools that insist.
+    help_epilogue="""Written from the same rows as everything else. --with-mandatory declares three
+objects that CiA 301 demands and these servos lack, for tools that insist.
 
 Examples:
 
@@ -43,6 +42,8 @@ def eds(
     output_
         A file to write; stdout when left out.
     """
+    from motorbus.families.kst.eds import eds as made
+
     if profile not in PROFILES:
         raise RequestError(f"there is no profile {profile!r}", expected=f"one of {', '.join(PROFILES)}")
     number = Node(whole(node, "an id")).node

@@ -10,16 +10,26 @@ three objects that CiA 301 demands and they lack are added for tools that insist
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from datetime import datetime
 from functools import partial
 from itertools import groupby
 from textwrap import wrap
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.entry import Access, Coding, Entry, Storage, changed
 from motorbus.families.kst.table import DEFAULT_NODE, RATES, Profile
 
-REVISED: Final = datetime(2026, 11, 21, 12, 0)
+
+class Moment(NamedTuple):
+    """A date and a time of day (24 hours) as the head of the file says them. A family has no clock to look at."""
+
+    year: int
+    month: int
+    day: int
+    hour: int = 0
+    minute: int = 0
+
+
+REVISED: Final = Moment(2026, 11, 21, 12, 0)
 """When these descriptions were last revised: the date in a file for which no other is given."""
 
 Keys: TypeAlias = dict[str, object]
@@ -55,7 +65,7 @@ def eds(
     with_mandatory: bool = False,
     file_name: str = "",
     creator: str = "motorbus",
-    made: datetime = REVISED,
+    made: Moment = REVISED,
 ) -> str:
     """The data sheet of this profile, as text in ASCII with lines ended by a line feed.
 
@@ -89,9 +99,10 @@ def _plain(value: object) -> str:
     return " ".join(text.split()).encode("ascii", "replace").decode("ascii")
 
 
-def _file(profile: Profile, file_name: str, creator: str, made: datetime) -> str:
-    half = "AM" if made.hour < 12 else "PM"  # not %p, which speaks the language of the place
-    time, date = f"{made:%I:%M}{half}", f"{made:%m-%d-%Y}"
+def _file(profile: Profile, file_name: str, creator: str, made: Moment) -> str:
+    half = "AM" if made.hour < 12 else "PM"
+    time = f"{(made.hour + 11) % 12 + 1:02}:{made.minute:02}{half}"
+    date = f"{made.month:02}-{made.day:02}-{made.year}"
     keys: Keys = {
         "FileName": file_name,
         "FileVersion": 1,

@@ -45,6 +45,10 @@ GIVE_UP: Final = 0x0800_0000
 """What a client's abort says: general error."""
 
 
+class OtherSize(UnexpectedReply):
+    """The object is told in another size than its row has."""
+
+
 def upload(
     node: Node,
     index: int,
@@ -84,11 +88,11 @@ def upload_row(
 
 
 def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:
-    """The bytes of this row in a reply. Raises UnexpectedReply when it has fewer, or announces segments."""
+    """The bytes of this row in a reply. Raises OtherSize when it has fewer, or announces segments."""
     if reply.kind == "upload" and len(reply.data) >= row.size:
         return reply.data[: row.size]
     came = f"{reply.size} bytes in segments" if reply.kind == "upload-start" else f"{len(reply.data)} bytes"
-    raise UnexpectedReply(
+    raise OtherSize(
         f"node {node.node} tells {row.name} in {came}, and not in {row.size}",
         received=reply.data,
         expected=f"{row.size} bytes",
@@ -207,28 +211,38 @@ def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> Operation[T]:
 
 
 def decided(node: Node) -> Operation[None]:
-    """Find out, once, which id format this node answers: 11 bits are tried first. Raises NoReply for neither."""
+    """Find out, once, which id format this node answers: 11 bits are tried first. Raises NoReply for neither.
+
+    Silence is expected of one of the two, so it must not make the node doubtful.
+    """
     if not node.dialect.undecided(node.node):
         return
-    for extended in (False, True):
-        try:
-            yield from answers(node, extended)
-        except NoReply:
-            if extended:
-                raise
-        else:
+    for extended in (False, True) * 2:
+        frame = wire.encode_upload(node.node, NODE_ID, extended=extended)
+        if (yield from listening(node, frame, _somebody, timeout=Timeout.REPLY, rank=Rank.POLL)):
             node.dialect.learn_format(node.node, extended)
             return
+    raise NoReply(
+        f"node {node.node} answers neither 11-bit nor 29-bit identifiers",
+        expected=f"an answer to a read of 0x{NODE_ID:04X}",
+        cause="no such id on this bus, another bit rate, no power, or a loose cable",
+        advice="`motorbus scan BUS` lists who answers",
+        node=node.node,
+    )
 
 
-def answers(node: Node, extended: bool) -> Exchange[None]:
-    """Ask for the node id in this format; a refusal is an answer, silence raises NoReply."""
+def _somebody(replies: list[SdoReply], at: float) -> bool:
+    return any(reply.index in (NODE_ID, 0) for reply in replies)
+
+
+def answers(node: Node) -> Exchange[None]:
+    """Ask for the node id; a refusal is an answer, silence raises NoReply."""
 
     def read(answer: Answer) -> None:
         node.at = answer.at
 
     return Exchange(
-        wire.encode_upload(node.node, NODE_ID, extended=extended),
+        wire.encode_upload(node.node, NODE_ID, extended=node.dialect.extended(node.node)),
         (wire.upload_due(node.node, NODE_ID),),
         read,
         lane=node.node,

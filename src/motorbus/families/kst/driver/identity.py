@@ -10,7 +10,7 @@ from __future__ import annotations
 from motorbus.core.entry import Entry
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Rank, outcome
-from motorbus.errors import DeviceError, NoReply, RequestError, VerificationFailed
+from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
     ABSENT,
@@ -32,7 +32,7 @@ def ping(node: Node) -> Operation[bool]:
     """Is it there? A refusal is an answer; silence is the answer False."""
     try:
         yield from decided(node)
-        yield from answers(node, node.dialect.extended(node.node))
+        yield from answers(node)
     except NoReply:
         return False
     return True
@@ -109,7 +109,7 @@ def bit_rate(node: Node) -> Operation[int | None]:
     try:
         code = yield from upload_row(node, node.table["bit_rate_code"], int)
     except NoReply:
-        yield from answers(node, node.dialect.extended(node.node))  # or is nobody there at all?
+        yield from answers(node)  # or is nobody there at all?
         return None
     except DeviceError as refusal:
         if meant(refusal.code) not in ABSENT:
@@ -142,8 +142,8 @@ def _if_told(node: Node, row: Entry) -> Operation[int | None]:
     """The raw value, or None when the servo refuses to tell."""
     yield from decided(node)
     found = yield from outcome(upload_row(node, row, int))
-    if isinstance(found, int):
-        return found
     if isinstance(found, DeviceError):
         return None
-    raise found
+    if isinstance(found, MotorbusError):
+        raise found
+    return found

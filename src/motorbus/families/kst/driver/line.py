@@ -29,7 +29,7 @@ from motorbus.families.kst.driver.node import Node
 
 STUFFING: Final = 1.1
 """Bits on the wire for each bit of a frame: counted over all nodes and positions, frames of this protocol have 118 to
-126 where 111 are without stuffing. A frame without any is 0.91 of that, so none comes sooner than it can."""
+126 where 111 are without stuffing."""
 REPLY: Final = 0.030
 """s a servo may think. A public flight-controller driver gives up after 3 ms; ten times that costs time only where a
 reply is missing, and a reply that comes late costs a quiet time."""

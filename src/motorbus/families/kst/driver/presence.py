@@ -14,11 +14,12 @@ from motorbus.core.operation import (
     Listen,
     Notice,
     Operation,
+    Rank,
     Timeout,
     Together,
     Tune,
 )
-from motorbus.errors import LinkError, LinkLost, NoReply, RequestError
+from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import Dialect
 from motorbus.families.kst.driver.exchanges import NODE_ID, POSITION, decided, listening
@@ -49,8 +50,8 @@ class Presence(NamedTuple):
 
     @property
     def several(self) -> bool:
-        """More than one answered, or what answered broke."""
-        return self.most > 1 or self.errors
+        """More than one answered, or some of the answers broke; where all broke, it may be the bit rate."""
+        return self.most > 1 or (self.errors and self.there)
 
 
 def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
@@ -62,7 +63,7 @@ def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
         return Presence(at, len(mine), told[0] if told else None)
 
     frame = wire.encode_upload(node.node, index, extended=node.dialect.extended(node.node))
-    return listening(node, frame, take, timeout=Timeout.REPLY)
+    return listening(node, frame, take, timeout=Timeout.REPLY, rank=Rank.POLL)
 
 
 def survey(node: Node) -> Operation[Presence]:
@@ -84,10 +85,10 @@ def _asked(node: Node) -> Operation[Presence]:
 
 
 def settle_format(node: Node) -> Operation[None]:
-    """Find out the id format where it may be either; a node that answers neither is looked for in 11 bits."""
+    """Find out the id format where it may be either; where that is not to be had, 11 bits are used."""
     try:
         yield from decided(node)
-    except NoReply:
+    except (NoReply, WireError):
         return
 
 

@@ -115,6 +115,8 @@ def _changed(job: Job) -> Operation[Place | None]:
     where = yield from _found(job)
     if (where.node.node, where.rate) == (job.new.node, job.new_rate):
         return None
+    dialect = job.new.dialect
+    dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
     yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
     if where.node.node != job.new.node:
         yield from set_node_id(where.node, job.new.node)
@@ -192,7 +194,7 @@ def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
     begun: float | None = None
     silent = 0
     while True:
-        now = yield from glance(place.node)
+        now = yield from _seen(job, place.node, place.rate)
         begun = now.at if begun is None else begun
         came_back = silent >= GONE and now.there
         silent = 0 if now.there else silent + 1
@@ -207,16 +209,21 @@ def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
 
 def _arrived(job: Job, place: Place, now: Presence) -> Operation[bool]:
     """Does it answer as it should by now? At another rate it is looked for only when it is silent at the old one."""
-    if place.rate == job.rate == job.new_rate:
-        return (yield from glance(job.new)).there
-    if now.there and place.rate == job.rate:
+    if now.there and place.rate != job.new_rate:
         return False
-    return (yield from Alone(afterwards(_there(job), lambda: iter(Tune(job.rate)))))
+    return (yield from _seen(job, job.new, job.new_rate)).there
 
 
-def _there(job: Job) -> Operation[bool]:
-    yield from Tune(job.new_rate)
-    return (yield from glance(job.new)).there
+def _seen(job: Job, node: Node, rate: int) -> Operation[Presence]:
+    """One look at this id and rate; at another rate than the bus has, with the bus alone and its rate set again."""
+    if rate == job.rate:
+        return (yield from glance(node))
+    return (yield from Alone(afterwards(_tuned(node, rate), lambda: iter(Tune(job.rate)))))
+
+
+def _tuned(node: Node, rate: int) -> Operation[Presence]:
+    yield from Tune(rate)
+    return (yield from glance(node))
 
 
 def _forgot(job: Job, place: Place, now: Presence) -> bool:

@@ -78,7 +78,7 @@ def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> Operation[BitRates]:
     """The first rate at which somebody answers, of those at which no errors were heard."""
     for rate in [rate for rate, verdict in verdicts.items() if verdict is Heard.SILENCE]:
         yield from Tune(rate)
-        found = yield from at_one_rate(dialect, wire.NODES, rate, broadcast=True)
+        found = yield from at_one_rate(dialect, wire.NODES, rate, broadcast=True, careful=True)
         if found:
             return BitRates(rate, verdicts, tuple(found))
     return BitRates(None, verdicts)

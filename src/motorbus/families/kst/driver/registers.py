@@ -11,8 +11,8 @@ from typing import Final
 
 from motorbus.core.entry import Entry, Storage, Value
 from motorbus.core.operation import Effect, Operation
-from motorbus.errors import DeviceError, RequestError, UnexpectedReply
-from motorbus.families.kst.driver.exchanges import ABSENT, meant, order, ready, upload_row
+from motorbus.errors import DeviceError, RequestError
+from motorbus.families.kst.driver.exchanges import ABSENT, OtherSize, meant, order, ready, upload_row
 from motorbus.families.kst.driver.keeping import keep
 from motorbus.families.kst.driver.motion import goal_of, send_goal
 from motorbus.families.kst.driver.node import Node
@@ -46,7 +46,7 @@ def read_raw(node: Node, /, *names: str) -> Operation[dict[str, int]]:
     for row in rows:
         try:
             found[row.name] = yield from raw_of(node, row)
-        except (DeviceError, UnexpectedReply) as error:
+        except (DeviceError, OtherSize) as error:
             if names or (isinstance(error, DeviceError) and meant(error.code) not in ABSENT):
                 raise
     return found

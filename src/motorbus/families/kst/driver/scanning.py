@@ -35,8 +35,10 @@ from motorbus.families.kst.driver.exchanges import NODE_ID
 from motorbus.families.kst.driver.identity import identify
 from motorbus.families.kst.driver.listening import GLANCE, Heard, heard
 from motorbus.families.kst.driver.node import Node, checked_ids
+from motorbus.families.kst.driver.presence import glance
 from motorbus.families.kst.wire import SdoReply
 
+BROKEN: Final = "the first frame was broken and nobody answered it: somebody on this bus uses another rate"
 PASSES: Final = 2
 """Whoever is silent is asked once more: the first frame after power-up may be missed."""
 
@@ -63,8 +65,9 @@ def scan(
 
     Who names other rates says that the bus may be spoken to at them. Even so each is listened to first, where the
     adapter can, and left out (`Skipped`) when errors show that the bus is in use at another rate; `scan_bit_rates`
-    is for a bus of which nothing is known. The rate is set again at the end, whatever happens. Reports `Found` as soon
-    as one answers, `Progress` and `Suspicion`. Writes nothing.
+    is for a bus of which nothing is known. What is sent first there is one broadcast, and no more where that was
+    broken. The rate is set again at the end, whatever happens. Reports `Found` as soon as one answers, `Progress` and
+    `Suspicion`. Writes nothing.
     """
     asked = checked_ids(ids or wire.NODES)
     present = yield from Tune(0)
@@ -82,9 +85,18 @@ def _at_all_rates(
         if rate != present and (yield from _in_use(dialect, rate)):
             yield from Report(Skipped(rate, Heard.ERRORS.value))
             continue
-        yield from Tune(rate)
+        try:
+            yield from Tune(rate)
+        except LinkLost:
+            raise
+        except LinkError as unable:  # an adapter need not have every rate
+            yield from Report(Skipped(rate, unable.summary))
+            continue
+        careful = rate != present
         part = (index, len(rates))
-        found += yield from at_one_rate(dialect, asked, rate, broadcast=broadcast, part=part)
+        found += yield from at_one_rate(
+            dialect, asked, rate, broadcast=broadcast or careful, careful=careful, part=part
+        )
     return found
 
 
@@ -104,11 +116,18 @@ def at_one_rate(
     rate: int,
     *,
     broadcast: bool,
+    careful: bool = False,
     part: tuple[int, int] = (0, 1),
 ) -> Operation[list[Found]]:
-    """Who of these answers at the present rate, which is `rate`; the first of `part` is the share of the whole."""
+    """Who of these answers at the present rate, which is `rate`; the first of `part` is the share of the whole.
+
+    With `careful` the broadcast, one frame, is the last when nobody answers it and bus errors come instead.
+    """
     errors = dialect.memory.errors if dialect.memory else 0
-    there = (yield from _called(dialect, rate)) if broadcast else []
+    there = (yield from _called(dialect, asked, rate)) if broadcast else []
+    if careful and not there and dialect.memory and dialect.memory.errors > errors:
+        yield from Report(Skipped(rate, BROKEN))
+        return []
     total = PASSES * part[1] * len(asked)
     for number in range(PASSES):
         done = (PASSES * part[0] + number) * len(asked)
@@ -119,6 +138,8 @@ def at_one_rate(
             yield from Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
     if dialect.memory and dialect.memory.errors > errors:
         yield from Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
+    if not broadcast:
+        yield from _counted(dialect, sorted(there), rate)
     return (yield from _identified(dialect, sorted(there), rate))
 
 
@@ -133,6 +154,15 @@ def _batches(nodes: Sequence[int]) -> Iterator[Sequence[int]]:
     return (nodes[start : start + WINDOW] for start in range(0, len(nodes), WINDOW))
 
 
+def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[None]:
+    """Ask each once more, and wait whether a second answer comes; a broadcast has shown that already."""
+    for batch in _batches(nodes):
+        looks = yield from Together([glance(Node(node, dialect)) for node in batch])
+        for node, look in zip(batch, looks, strict=True):
+            if look.several:
+                yield from Report(Suspicion(node, rate, TWICE))
+
+
 def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[list[Found]]:
     found: list[Found] = []
     for batch in _batches(nodes):
@@ -145,12 +175,12 @@ def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[
 # --- everyone at once ---------------------------------------------------------------------------------------
 
 
-def _called(dialect: Dialect, rate: int) -> Operation[list[int]]:
-    """Who answers a read of the node id by everyone, in each id format that is expected."""
+def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> Operation[list[int]]:
+    """Who of these answers a read of the node id by everyone, in each id format that is expected."""
     there: list[int] = []
     for extended in sorted(dialect.formats):
         answer = yield from called(extended)
-        for node in dict.fromkeys(reply.lane for reply in answer.replies):
+        for node in dict.fromkeys(reply.lane for reply in answer.replies if reply.lane in asked):
             replies = [wire.decode_reply(reply.data) for reply in answer.replies if reply.lane == node]
             if node not in there:
                 there.append(node)

@@ -58,12 +58,12 @@ class Switches:
     )
     duplicate: str = _switch(
         "",
-        "ids of which there is one servo more, as 0x25 or 0x25+0x26",
+        "ids of which there is one servo more, as 0x25 or 0x25+0x26; its key is 1000 + its number on the bus",
         source="two servos as shipped share 0x25",
     )
     duplicate_delay: float = _switch(
         0.0,
-        "how much later those servos answer; 0: at the same moment, so unequal answers collide",
+        "how much later those servos answer, in s; 0: at the same moment, so unequal answers collide",
         source="two devices never think equally long, but arbitration lets late ones begin together",
     )
     collision: str = _switch(
@@ -74,7 +74,7 @@ class Switches:
         source="ISO 11898: 16 errors of a transmitter make it error passive; what follows differs by controller",
     )
     turnaround: float = _switch(
-        0.0001, "from the end of a request to the beginning of its answer", source=_ASSUMED
+        0.0001, "s from the end of a request to the beginning of its answer", source=_ASSUMED
     )
 
     # -- the SDO server ---------------------------------------------------------------------------------------
@@ -112,7 +112,7 @@ class Switches:
         source="not documented",
     )
     bit_rate_readable: bool = _switch(
-        False, "0x3001 can be read", source="manual, command 1, shows the write only"
+        False, "the bit-rate code, 0x3001, can be read", source="manual, command 1, shows the write only"
     )
     abort_mux: str = _switch(
         "echo",
@@ -158,7 +158,7 @@ class Switches:
         source="manual, command 3: no reply; CiA 301 demands one",
     )
     flash_time: float = _switch(
-        0.15, "how long a save takes", source="a public flight-controller driver leaves 150 ms"
+        0.15, "how long a save takes, in s", source="a public flight-controller driver leaves 150 ms"
     )
     flash_reads: str = _switch(
         "lost",

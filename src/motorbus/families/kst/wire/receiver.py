@@ -1,9 +1,9 @@
 """What each frame on the bus is to whoever listens as the client: a reply, a notice, or neither.
 
 One frame is one event, so nothing is ever held back. A CAN controller checks what it takes in, so a frame that makes
-no sense is not a damaged one: it stands by itself and casts no doubt on others, with one exception. Eight bytes under
-a reply's identifier whose specifier is no reply's came from that node's server, perhaps in place of the answer that is
-awaited: they are never taken for an answer, and the node (its lane alone) is doubted until it has been probed.
+no sense is not a damaged one: it stands by itself and casts no doubt on others. That goes too for eight bytes under a
+reply's identifier whose specifier is no reply's: if they came in place of an answer, the answer is missing, and that
+is what makes the node doubtful.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _reply(node: int, data: bytes) -> Event:
     specifier = data[0]
     kind = _KEY_KINDS[specifier]
     if not kind:
-        return Noise(data, "framing", node)
+        return Noise(data, "foreign", node)
     if kind == "segment":
         return Reply(node, Key(kind, 0, 0, 1 if specifier & TOGGLE else 0), data)
     return Reply(node, Key(kind, data[1] | data[2] << 8, data[3]), data)

@@ -1,0 +1,48 @@
+"""Ours on CAN, by its public calls; several nodes by one blocking bus that keeps as many in flight as it may."""
+
+from __future__ import annotations
+
+import motorbus
+from bench.can_loop import BITRATE, main
+from motorbus import kst
+from motorbus.core.operation import Operation, Together
+
+COUNTS_PER_RADIAN = 10 * 57.29577951308232
+
+
+class Motorbus:
+    """One open bus; servos made once."""
+
+    def __init__(self, port: str, nodes: tuple[int, ...]) -> None:
+        self.bus = motorbus.open(f"kst:can://slcan{port},bitrate={BITRATE}")
+        self.servos = [kst.Servo(self.bus, node) for node in nodes]
+
+    def read(self, count: int) -> list[int]:
+        """So many positions of each node, raw."""
+        values: list[float] = []
+        if len(self.servos) == 1:
+            position = self.servos[0].position
+            for _ in range(count):
+                values.append(position())
+        else:
+            self._together(count, values)
+        return [round(value * COUNTS_PER_RADIAN) for value in values]
+
+    def _together(self, count: int, values: list[float]) -> None:
+        verb = kst.Servo.position.function
+
+        def endless(servo: kst.Servo) -> Operation[None]:
+            for _ in range(count):
+                values.append((yield from verb(servo)))
+
+        def together() -> Operation[None]:
+            yield from Together([endless(servo) for servo in self.servos])
+
+        self.bus.run(together())
+
+    def close(self) -> None:
+        self.bus.close()
+
+
+if __name__ == "__main__":
+    main(Motorbus)

@@ -1,0 +1,34 @@
+"""Simulated CAN servos for the commands of this family: in this process, and on a pseudo-terminal by slcan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import motorbus
+from motorbus.cli.simulated import Simulated
+from motorbus.simulation.named import Simulation
+
+
+@pytest.fixture
+def servos() -> Iterator[Simulation]:
+    """Two servos as the manual says, 37 and 38, in virtual time; `servos.url` is their bus."""
+    with motorbus.simulate("kst", ids="0x25+0x26") as simulation:
+        yield simulation
+
+
+@pytest.fixture
+def newer() -> Iterator[Simulation]:
+    """One servo with newer firmware, 37."""
+    with motorbus.simulate("kst", ids="0x25", profile="kst-ext") as simulation:
+        yield simulation
+
+
+@pytest.fixture
+def on_slcan(tmp_path: Path, state_folder: Path) -> Iterator[Simulated]:
+    """Two servos, 37 and 38, in a process of their own behind a simulated slcan adapter, with a control socket."""
+    more = {"control": str(tmp_path / "control")}
+    with Simulated("kst", ids="0x25+0x26", link=tmp_path / "can", **more) as simulated:
+        yield simulated

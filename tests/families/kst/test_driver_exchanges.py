@@ -1,0 +1,161 @@
+"""Reading and writing one object: which bytes leave, what is believed, and what a refusal becomes."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.core.operation import Effect, Rank
+from motorbus.errors import DeviceError, UnexpectedReply
+from motorbus.families.kst import driver, wire
+from motorbus.families.kst.driver import dialect_of
+from motorbus.families.kst.driver.exchanges import OtherSize, meant, order, upload_row, whole
+from tests.families.kst.bench import abort, bench, node, play, watch
+
+READ = "605#4002600000000000"
+NO_SUCH = 0x0602_0000
+
+
+def test_a_read_is_one_exchange_that_can_be_kept() -> None:
+    one = node()
+    exchange = upload_row(one, one.table["present_position"], int, tells_position=True)
+    assert (exchange.lane, exchange.rank, exchange.effect) == (5, Rank.POLL, Effect.NONE)
+    assert exchange.repeatable
+    assert exchange.tells_position
+    assert exchange.replies == (wire.upload_due(5, 0x6002),)
+    for back, raw in (("4b02600084030000", 900), ("4b0260007cfc0000", -900), ("430260008403ffff", 900)):
+        assert play(exchange, (READ, back)) == raw
+    assert play(exchange, (READ, "4202600001000000")) == 1  # length not stated: the object takes its own
+    assert one.at > 100
+
+
+@pytest.mark.parametrize("back", ["4f02600001000000", "4102600008000000"])
+def test_a_value_of_another_size_is_no_value(back: str) -> None:
+    one = node()
+    with pytest.raises(OtherSize, match="and not in 2"):
+        play(upload_row(one, one.table["present_position"], int), (READ, back))
+
+
+def test_a_refusal_is_told_in_the_manual_s_words() -> None:
+    one = node()
+    with pytest.raises(DeviceError, match="Object does not exist in the object dictionary") as raised:
+        play(driver.position(one), (READ, abort(0x6002, NO_SUCH)))
+    error = raised.value
+    assert (error.code, error.register, error.node) == (NO_SUCH, "present_position", 5)
+    assert not hasattr(error, "__notes__")
+
+
+@pytest.mark.parametrize("index", [0x1010, 0])
+def test_a_refusal_that_names_less_is_taken_and_says_so(index: int) -> None:
+    one = node()
+    with pytest.raises(DeviceError) as raised:
+        play(
+            order(one, one.table["store"], 0x65766173),
+            ("605#2210100173617665", abort(index, 0x0800_0000)),
+        )
+    assert f"names 0x{index:04X}:0" in raised.value.__notes__[0]
+
+
+def test_a_code_the_wrong_way_round_is_understood() -> None:
+    assert meant(0x0000_0206) == NO_SUCH
+    assert meant(NO_SUCH) == NO_SUCH
+    assert meant(0x0F00_0009) == 0x0F00_0009
+
+
+@pytest.mark.parametrize("code", [0x0504_0001, 0x0607_0010, 0x0607_0012, 0x0607_0013])
+def test_who_refuses_a_write_without_length_gets_one_with_it_ever_after(code: int) -> None:
+    one = node()
+    row = one.table["node_id"]
+    unsized, sized = "605#2200300007000000", "605#2F00300007000000"
+    played = watch(order(one, row, 7), (unsized, abort(0x3000, code)), (sized, "6000300000000000"))
+    assert [exchange.effect for exchange in played.exchanges] == [Effect.IDENTITY] * 2
+    play(order(one, row, 7), (sized, "6000300000000000"))
+    assert not one.dialect.states_length(6), "another node is another servo"
+
+
+def test_other_refusals_are_no_reason_to_say_it_differently() -> None:
+    one = node()
+    with pytest.raises(DeviceError):
+        play(order(one, one.table["node_id"], 7), ("605#2200300007000000", abort(0x3000, 0x0609_0030)))
+
+
+def test_the_form_of_writes_can_be_set() -> None:
+    frame, refusal = "605#2200300007000000", abort(0x3000, 0x0607_0010)
+    never = node(sized="no")
+    with pytest.raises(DeviceError):
+        play(order(never, never.table["node_id"], 7), (frame, refusal))
+    always = node(sized="yes")
+    with pytest.raises(DeviceError):
+        play(order(always, always.table["node_id"], 7), ("605#2F00300007000000", refusal))
+
+
+def test_a_servo_that_takes_no_sized_write_is_written_to_all_the_same() -> None:
+    with bench(accept_sized=False) as there:
+        there.servo().move(0.2)
+    with bench(accept_sized=False, settings={"sized": "yes"}) as there, pytest.raises(DeviceError):
+        there.servo().move(0.2)
+
+
+# --- segments -----------------------------------------------------------------------------------------------
+
+VERSION = "605#400A100000000000"
+START = "410a10000a000000"
+
+
+def test_a_long_text_is_taken_in_segments_with_the_bus_alone() -> None:
+    one = node()
+    script = [
+        (VERSION, START),
+        (VERSION, START),
+        ("605#6000000000000000", "00" + b"V2.10-r".hex()),
+        ("605#7000000000000000", "19" + b"c42".hex() + "00000000"),
+    ]
+    played = watch(driver.version(one), *script)
+    assert played.alone == 1
+    assert play(driver.version(one), *script) == "V2.10-rc42"
+
+
+def test_a_text_of_another_length_than_announced_is_no_text() -> None:
+    one = node()
+    with pytest.raises(UnexpectedReply, match="announced 10 bytes"):
+        play(
+            whole(one, one.table["firmware_version"]),
+            (VERSION, START),
+            (VERSION, START),
+            ("605#6000000000000000", "01" + b"V2.10-r".hex()),
+        )
+
+
+def test_a_text_without_end_is_given_up() -> None:
+    one = node()
+    endless = [(f"605#{60 + 10 * (n % 2)}00000000000000", f"{10 * (n % 2):02}" + "41" * 7) for n in range(37)]
+    with pytest.raises(UnexpectedReply, match="does not end"):
+        play(
+            whole(one, one.table["firmware_version"]),
+            (VERSION, START),
+            (VERSION, START),
+            *endless,
+            ("605#800A100000000008", None),
+        )
+
+
+def test_long_versions_of_the_simulator() -> None:
+    with bench(firmware="KST X20-3612 V1.07 2026", ids=(5, 6)) as there:
+        assert there.servo().version() == "KST X20-3612 V1.07 2026"
+        assert [one.identity and one.identity.firmware for one in there.run(there.family.scan())] == [
+            "KST X20-3612 V1.07 2026"
+        ] * 2
+        assert "firmware_version" not in there.servo().read()
+        with pytest.raises(UnexpectedReply):
+            there.servo().read("firmware_version")
+
+
+def test_the_simulator_s_refusals_whatever_they_repeat() -> None:
+    for mux in ("echo", "index-only", "zero"):
+        for turned in ("little", "big"):
+            with bench(abort_mux=mux, abort_order=turned) as there:
+                servo = there.servo()
+                assert servo.bit_rate() is None
+                with pytest.raises(DeviceError):
+                    there.run(order(servo, servo.table["present_position"], 0))
+                assert servo.position() == 0.0
+                assert dialect_of(there.family).memory is not None

@@ -1,0 +1,77 @@
+"""What survives power-off: written, read back, saved, left alone, read back again."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.core.operation import ANY, Effect, Timeout
+from motorbus.errors import DeviceError, VerificationFailed
+from motorbus.families.kst import FAMILY, driver
+from motorbus.families.kst.driver.keeping import keep, save_exchange
+from tests.families.kst.bench import abort, bench, node, play
+
+SAVE = "605#2210100173617665"
+LIMIT = "605#220A30000CFE0000"
+READ = "605#400A300000000000"
+TOLD = "4b0a30000cfe0000"
+OTHER = "4b0a300018fc0000"
+
+
+def test_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
+    for back in (None, "6010100100000000", ["6010100100000000"] * 2):
+        play(driver.save(node()), (SAVE, back))
+    with pytest.raises(DeviceError, match="hardware error"):
+        play(driver.save(node()), (SAVE, abort(0x1010, 0x0606_0000, 1)))
+    with pytest.raises(DeviceError):
+        play(driver.save(node()), (SAVE, abort(0, 0x0800_0020)))
+
+
+def test_a_save_holds_its_lane_until_the_flash_is_written() -> None:
+    exchange = save_exchange(node())
+    assert (exchange.lane, exchange.replies, exchange.timeout) == (5, ANY, Timeout.STORE)
+    assert (exchange.effect, exchange.repeatable) == (Effect.PERSISTENT, False)
+    assert FAMILY.turnaround(exchange) == pytest.approx(0.170)
+    with bench(ids=(5, 6)) as there:
+        begun = there.link.now()
+        there.servo().save()
+        assert there.link.now() - begun >= 0.170
+        assert there.servo().position() == 0.0
+        assert there.bus.statistics.of(5).retries == 0
+
+
+@pytest.mark.parametrize("reply", ["none", "ack"])
+def test_the_simulator_s_ways_to_answer_a_save(reply: str) -> None:
+    with bench(save_reply=reply) as there:
+        there.servo().save()
+    with bench(save_reply="abort") as there, pytest.raises(DeviceError):
+        there.servo().save()
+
+
+def test_a_write_that_fails_is_tried_three_times() -> None:
+    one = node("kst-ext")
+    row = one.table["negative_limit"]
+    ack = "600a300000000000"
+    play(
+        keep(one, [(row, -500)]),
+        *[(LIMIT, ack), (READ, OTHER)] * 2,
+        *[(LIMIT, ack), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, TOLD)],
+    )
+    with pytest.raises(VerificationFailed, match="reads back -1000, not -500") as raised:
+        play(keep(one, [(row, -500)]), *[(LIMIT, ack), (READ, OTHER)] * 3)
+    assert raised.value.received == bytes.fromhex("18fc")
+
+
+def test_what_the_save_undid_is_told() -> None:
+    one = node("kst-ext")
+    with pytest.raises(VerificationFailed):
+        play(
+            keep(one, [(one.table["negative_limit"], -500)]),
+            *[(LIMIT, "600a300000000000"), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, OTHER)],
+        )
+
+
+def test_a_slow_make_is_waited_for() -> None:
+    with bench(profile="xqpower") as there:
+        begun = there.link.now()
+        there.servo().set_mid_point()
+        assert there.link.now() - begun >= 0.5

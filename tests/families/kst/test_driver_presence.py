@@ -1,0 +1,54 @@
+"""One servo, two with one id, or none."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.errors import NoReply
+from motorbus.families.kst.driver.presence import Presence, glance, settle_format, survey
+from tests.families.kst.bench import abort, bench, node, play
+
+ASK = "605#4000300000000000"
+
+
+def test_one_look() -> None:
+    assert play(glance(node()), (ASK, "4f00300005000000")) == Presence(pytest.approx(100.001), 1, 5)
+    assert play(glance(node()), (ASK, None)).there is False
+    refused = play(glance(node()), (ASK, abort(0x3000, 0x0602_0000)))
+    assert (refused.there, refused.reads_back) == (True, None)
+    assert play(glance(node()), (ASK, ["4f00300005000000"] * 2)).several is True
+    assert play(glance(node()), (ASK, "4b02600005000000")).there is False, "a late answer to something else"
+
+
+def test_one_servo_is_one() -> None:
+    with bench() as there:
+        found = there.run(survey(there.servo()))
+        assert (found.there, found.several, found.reads_back, found.errors) == (True, False, 5, False)
+        assert there.run(survey(there.servo(6))).there is False
+
+
+def test_a_second_answer_shows() -> None:
+    with bench(duplicate="5", duplicate_delay=0.0002) as there:
+        assert there.run(survey(there.servo())).several is True
+
+
+def test_answers_that_break_each_other_show() -> None:
+    with bench(ids=(5, 5)) as there:
+        there.simulator.servos[1].raw_position = 3
+        found = there.run(survey(there.servo()))
+        assert (found.most, found.errors, found.several) == (1, True, True)
+
+
+def test_errors_without_any_answer_may_be_the_bit_rate() -> None:
+    with bench(bit_rate=250_000) as there:
+        found = there.run(survey(there.servo()))
+        assert (found.there, found.errors, found.several) == (False, True, False)
+
+
+def test_a_format_is_settled_where_somebody_answers() -> None:
+    with bench(settings={"id_format": "auto"}, id_format="ext") as there:
+        there.run(settle_format(there.servo(6)))
+        there.run(settle_format(there.servo()))
+        assert there.run(glance(there.servo())).there is True
+        with pytest.raises(NoReply):
+            there.servo(6).position()

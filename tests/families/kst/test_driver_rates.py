@@ -1,0 +1,63 @@
+"""Finding the bit rate: by listening, and by speaking only where somebody says that nothing depends on the bus."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.errors import LinkLost, RequestError
+from motorbus.families.kst import Heard, dialect_of, scan_bit_rates
+from motorbus.families.kst.table import RATES
+from tests.families.kst.bench import Bench, bench
+from tests.families.kst.test_driver_scanning import Deaf
+
+
+def look(there: Bench, **how: object) -> object:
+    return there.run(scan_bit_rates(dialect_of(there.family), **how))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_traffic_tells_the_rate_and_nothing_is_sent(rate: int) -> None:
+    with bench(bit_rate=rate, reports_ms=100, profile="kst-ext") as there:
+        found = there.run(scan_bit_rates(dialect_of(there.family)))
+        assert found.rate == rate
+        assert found.heard[rate] is Heard.TRAFFIC
+        assert {found.heard[one] for one in RATES if one < rate} <= {Heard.ERRORS}
+        assert there.sent() == []
+        assert there.sim().errors == 0
+        assert there.bus.rate == 500_000
+
+
+def test_a_silent_bus_is_not_spoken_to_unless_it_is_isolated() -> None:
+    with bench(bit_rate=125_000) as there:
+        found = there.run(scan_bit_rates(dialect_of(there.family)))
+        assert (found.rate, set(found.heard.values())) == (None, {Heard.SILENCE})
+        assert there.sent() == []
+        found = there.run(scan_bit_rates(dialect_of(there.family), isolated=True))
+        assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
+        assert there.servo().ping() is False, "the rate of the bus is as it was"
+
+
+def test_nobody_is_there() -> None:
+    with bench() as there:
+        there.sim().unplug()
+        assert there.run(scan_bit_rates(dialect_of(there.family), isolated=True)).rate is None
+
+
+def test_an_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
+    with bench(bit_rate=125_000, link=Deaf) as there:
+        with pytest.raises(RequestError, match="cannot listen"):
+            look(there)
+        assert there.sent() == []
+        assert there.run(scan_bit_rates(dialect_of(there.family), isolated=True)).rate == 125_000
+
+
+def test_impossible_rates_are_refused() -> None:
+    with bench() as there, pytest.raises(RequestError, match="no rate"):
+        look(there, rates=(9600,))
+
+
+def test_a_lost_adapter_ends_it() -> None:
+    with bench() as there:
+        there.link.unplug(0.5)
+        with pytest.raises(LinkLost):
+            look(there)

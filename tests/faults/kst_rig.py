@@ -1,0 +1,182 @@
+"""Simulated KST servos whose position changes with every request, so that any answer but the present one is known.
+
+The oracle counts requests. A servo is at another place after each; a value is true of a call if it is the place after
+one of the requests that were heard during the call. Places repeat after 1801 requests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from random import Random
+
+from motorbus.bus.pump import Bus
+from motorbus.core.can_bits import ERROR_BITS, bits
+from motorbus.core.family import SimulatedNode
+from motorbus.core.operation import CanFrame, Data, Operation, Together
+from motorbus.errors import MotorbusError
+from motorbus.families.kst import FAMILY, Servo
+from motorbus.families.kst.simulator import KstBus
+from motorbus.families.kst.wire import encode_abort_reply
+from motorbus.link.base import Delivery, Line, PerfectLine, Side
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+
+RATE = 500_000
+BIT = 1 / RATE
+PLACES = 1801
+INDEX, OTHER_INDEX = 0x6002, 0x6003
+NOT_THERE = 0x0602_0000
+SWAPPED = int.from_bytes(NOT_THERE.to_bytes(4, "little"), "big")
+
+
+class Turning:
+    """A simulator whose servos turn by one count with every request that reaches it; `heard` counts them."""
+
+    def __init__(self, bus: KstBus) -> None:
+        self.bus = bus
+        self.heard = 0
+
+    @property
+    def nodes(self) -> Mapping[int, SimulatedNode]:
+        return self.bus.nodes
+
+    def receive(self, data: Data, at: float) -> None:
+        self.bus.receive(CanFrame(0x7FF, b""), at)  # lets its clock know
+        self.heard += 1
+        for servo in self.bus.servos:
+            servo.raw_position = self.heard % PLACES - 900
+        self.bus.receive(data, at)
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        return self.bus.advance(to)
+
+    def due(self) -> float | None:
+        return self.bus.due()
+
+    def tune(self, rate: int) -> None:
+        self.bus.tune(rate)
+
+
+class Rig:
+    """A bus with true bit time, the servos at its end, and the ledger of what the calls returned."""
+
+    def __init__(self, ids: tuple[int, ...] = (0x25,), line: Line | None = None, **options: object) -> None:
+        simulator = FAMILY.simulator(ids, "", **options)
+        assert isinstance(simulator, KstBus)
+        self.servos = Turning(simulator)
+        self.link = MemoryLink(self.servos, rate=RATE, line=line or PerfectLine(), pace=True)
+        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate())
+        self.devices = {node: Servo(self.bus, node) for node in ids}
+        self.good = self.failed = self.wrong = 0
+        self.errors: list[MotorbusError] = []
+
+    def read(self, node: int) -> bool:
+        """One position, judged; False when it failed honestly."""
+        before = self.servos.heard
+        try:
+            value = self.devices[node].position()
+        except MotorbusError as error:
+            self._fail(error)
+            return False
+        self._judge(before, value)
+        return True
+
+    def reading(self, node: int, count: int) -> Operation[None]:
+        """So many positions of one node, beside those of others."""
+        operation = type(self.devices[node]).position.function
+        for _ in range(count):
+            before = self.servos.heard
+            try:
+                value = yield from operation(self.devices[node])
+            except MotorbusError as error:
+                self._fail(error)
+            else:
+                self._judge(before, value)
+
+    def read_all(self, count: int) -> None:
+        """So many positions of each node, all nodes at once."""
+
+        def together() -> Operation[None]:
+            yield from Together([self.reading(node, count) for node in self.devices])
+
+        self.bus.run(together())
+
+    def _judge(self, before: int, value: float) -> None:
+        """Is this where the servo was after one of the requests since then?"""
+        place = self.devices[next(iter(self.devices))].table["present_position"].to_raw(value) + 900
+        true = any(asked % PLACES == place for asked in range(before + 1, self.servos.heard + 1))
+        self.good += true
+        self.wrong += not true
+
+    def _fail(self, error: MotorbusError) -> None:
+        self.failed += 1
+        self.errors.append(error)
+
+
+class Mischief:
+    """What can happen to a reply on CAN, by chance, the same for the same seed.
+
+    Damaged frames do not exist (the controller drops them), so: `lost`; `late` by `late_by`, and all that follows
+    held up, for devices and adapters are first-in first-out; `twice`, as CAN makes a copy, by a retransmission
+    directly behind the original; and replies to something else, in place of the true one or just before it. With
+    `copy_after` the copy comes that much later: CAN does not do that, an adapter might. After a fault, `rest` replies
+    are left alone. `fired` counts faults.
+    """
+
+    def __init__(
+        self, seed: int, probability: float, *kinds: str, copy_after: float = 0.0, rest: int = 0
+    ) -> None:
+        self.random = Random(seed)
+        self.probability = probability
+        self.kinds = kinds
+        self.copy_after = copy_after
+        self.rest = rest
+        self.resting = 0
+        self.late_by = (0.001, 0.5)
+        self.fired = dict.fromkeys(kinds, 0)
+        self._last = 0.0
+
+    @property
+    def count(self) -> int:
+        """All faults so far."""
+        return sum(self.fired.values())
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            return [Delivery(at, Side.DEVICE, data)]
+        assert isinstance(data, CanFrame)
+        moment = max(at, self._last)
+        self.resting -= len(data.data) == 8
+        if len(data.data) != 8 or self.resting >= 0 or self.random.random() >= self.probability:
+            return self._deliver([(moment, data)])
+        self.resting = self.rest
+        kind = self.random.choice(self.kinds)
+        self.fired[kind] += 1
+        return self._deliver(self._struck(kind, data, moment))
+
+    def _deliver(self, frames: list[tuple[float, CanFrame]]) -> list[Delivery]:
+        self._last = max([self._last, *(at for at, _ in frames)])
+        return [Delivery(at, Side.HOST, frame) for at, frame in frames]
+
+    def _struck(self, kind: str, frame: CanFrame, at: float) -> list[tuple[float, CanFrame]]:
+        behind = at + (ERROR_BITS + bits(frame)) * BIT
+        if kind == "lost":
+            return []
+        if kind == "late":
+            return [(at + self.random.uniform(*self.late_by), frame)]
+        if kind == "twice":
+            return [(at, frame), (behind + self.copy_after, frame)]
+        name, _, place = kind.partition(" ")
+        other = self._other(name, frame)
+        return [(at, other)] if place == "instead" else [(at, other), (at + bits(frame) * BIT, frame)]
+
+    def _other(self, name: str, frame: CanFrame) -> CanFrame:
+        data = frame.data
+        if name == "index":
+            return frame._replace(data=data[:1] + OTHER_INDEX.to_bytes(2, "little") + data[3:])
+        if name == "sub":
+            return frame._replace(data=data[:3] + bytes((self.random.randrange(1, 256),)) + data[4:])
+        if name == "kind":
+            return frame._replace(data=b"\x60" + data[1:4] + bytes(4))
+        code = {"abort": NOT_THERE, "swapped": SWAPPED}[name]
+        return encode_abort_reply(frame.id - 0x580, INDEX, 0, code)

@@ -1,0 +1,112 @@
+"""python-canopen, unmodified, works with our simulated servos through the EDS files that we write.
+
+It knows neither these servos nor us: objects, sizes and units come from the file, replies from the simulator in
+another process, by slcan and by socketcand.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Effect
+from motorbus.families.kst.eds import eds
+from motorbus.families.kst.table import PROFILES, Profile
+from tests.interop.can_bus import WAYS, Way, can_bus
+from tests.interop.canopen_peer import Canopen, CanopenError
+
+NODE = 0x25
+PATIENCE = 10.0
+"""s that it waits for a reply; its own 0.3 s may be short on a busy machine."""
+READ_ONLY, TOO_HIGH, NO_OBJECT = 0x06010002, 0x06090031, 0x06020000
+
+
+@pytest.fixture(params=WAYS)
+def interface(request: pytest.FixtureRequest) -> str:
+    """By which of python-can's back ends."""
+    return str(request.param)
+
+
+def canopen(way: Way, profile: Profile, folder: Path) -> Canopen:
+    """The library with the data sheet of this profile."""
+    file = folder / f"{profile.name}.eds"
+    file.write_text(eds(profile, node_id=NODE), encoding="ascii")
+    peer = Canopen(way.interface, way.channel, way.kwargs, file, NODE)
+    peer.timeout(PATIENCE)
+    return peer
+
+
+def numbers(profile: Profile) -> list[Entry]:
+    """What can be read and written, but for what makes it another node."""
+    return [
+        row
+        for row in profile.table.values()
+        if row.readable and row.writable and row.effect is not Effect.IDENTITY
+    ]
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=list(PROFILES))
+def test_reads_and_writes_every_object_by_its_name(interface: str, profile: Profile, tmp_path: Path) -> None:
+    flags = {"profile": profile.name, "bit_rate_readable": "yes", "needs_start": "no"}
+    with can_bus(tmp_path, "0x25", **flags) as bus, canopen(bus.way(interface), profile, tmp_path) as peer:
+        for row in profile.table.values():
+            if row.readable:
+                data = bytes.fromhex(peer.upload(row.address, row.subindex))
+                assert len(data) == row.size, row.name
+                assert peer.read(row.name) in (data.decode("latin-1"), row.decode(data)), row.name
+        assert peer.read("node_id") == NODE
+        for row in numbers(profile):
+            value = 10 if row.low <= 10 <= row.high else row.low
+            peer.write(row.name, value)
+            assert peer.read(row.name) == value, row.name
+
+
+def test_moves_a_servo_in_degrees(interface: str, tmp_path: Path) -> None:
+    profile = PROFILES["kst"]
+    with can_bus(tmp_path) as bus, canopen(bus.way(interface), profile, tmp_path) as peer:
+        peer.write_phys("goal_position", 10.9)
+        while peer.read("present_position") != 109:
+            pass
+        assert peer.read_phys("present_position") == pytest.approx(10.9)
+        assert [node["raw_position"] for node in bus.nodes()] == [109]
+
+
+def test_is_refused_as_cia_301_says(interface: str, tmp_path: Path) -> None:
+    profile = PROFILES["kst"]
+    with can_bus(tmp_path) as bus, canopen(bus.way(interface), profile, tmp_path) as peer:
+        for request, code in (
+            (partial(peer.write, "present_position", 0), READ_ONLY),
+            (partial(peer.write, "goal_position", 2000), TOO_HIGH),
+            (partial(peer.upload, 0x6005, 0), NO_OBJECT),
+        ):
+            with pytest.raises(CanopenError) as caught:
+                request()
+            assert (caught.value.kind, caught.value.code) == ("SdoAbortedError", code)
+        assert peer.read("node_id") == NODE
+
+
+def test_reads_a_version_in_segments(interface: str, tmp_path: Path) -> None:
+    with (
+        can_bus(tmp_path, firmware="1.00 of today") as bus,
+        canopen(bus.way(interface), PROFILES["kst"], tmp_path) as peer,
+    ):
+        assert peer.read("firmware_version") == "1.00 of today"
+
+
+def test_its_scanner_finds_the_nodes(interface: str, tmp_path: Path) -> None:
+    with (
+        can_bus(tmp_path, ids="1,0x25,0x26,127") as bus,
+        canopen(bus.way(interface), PROFILES["kst"], tmp_path) as peer,
+    ):
+        found: list[int] = []
+        while found != [
+            1,
+            0x25,
+            0x26,
+            127,
+        ]:  # it gives them half a second, which a busy machine may need twice
+            found = peer.scan()
+        assert bus.simulated.ready["ids"] == found

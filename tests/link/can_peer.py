@@ -1,0 +1,178 @@
+"""The other end of a CAN adapter, for the tests of the link: a real port, a thread that serves it, an adapter behind.
+
+What a host sends is noted and comes back with the identifier plus one. `say` puts bytes of our own onto the port.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import Callable, Iterator
+from select import select
+from threading import Event, Thread
+from typing import Protocol
+
+from motorbus.core.operation import REMOTE_FLAG, CanFrame, Data
+from motorbus.link.base import Adapter
+from motorbus.link.can import CanLink
+from motorbus.link.pty import PtyMaster
+from motorbus.link.slcan import SlcanAdapter
+from motorbus.link.socketcand import SocketcandAdapter
+
+PING = CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00"))
+PONG = PING._replace(id=0x626)
+LONG_PING = CanFrame(0x625, b"\x01", extended=True)
+
+
+class Mute(SlcanAdapter):
+    """An slcan adapter that answers nothing, as there are."""
+
+    def take(self) -> bytes:
+        super().take()
+        return b""
+
+
+class Picky(SlcanAdapter):
+    """An slcan adapter that says no to some commands, and keeps what it was told."""
+
+    def __init__(self, *refused: bytes, strict: bool = False) -> None:
+        super().__init__(strict=strict)
+        self.refuses = refused
+        self.told: list[bytes] = []
+
+    def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
+        frames = []
+        for line in data.split(b"\r")[:-1]:
+            self.told.append(line)
+            if line in self.refuses:
+                self._answer += b"\a"
+            else:
+                frames += super().feed(line + b"\r", at)
+        return frames
+
+
+class Peer:
+    """An adapter on a port; `url` is how a host opens it."""
+
+    def __init__(self, adapter: Adapter, url: str) -> None:
+        self.adapter = adapter
+        self.url = url
+        self.heard: list[CanFrame] = []
+        self.echoes = True
+        self.write: Callable[[bytes], object] = lambda _: None
+
+    def say(self, *data: bytes | CanFrame) -> None:
+        """Bytes as they are; a frame as the adapter delivers it."""
+        for item in data:
+            self.write(self.adapter.deliver(item, 1.0) if isinstance(item, CanFrame) else item)
+
+    def hear(self, data: bytes) -> None:
+        frames = self.adapter.feed(data)
+        answer = self.adapter.take()
+        self.heard += frames
+        if self.echoes:
+            for frame in frames:
+                answer += self.adapter.deliver(frame._replace(id=frame.id + 1), 1.0)
+        if answer:
+            self.write(answer)
+
+
+class Readable(Protocol):
+    def fileno(self) -> int: ...
+
+
+@contextlib.contextmanager
+def serving(source: Readable, hear: Callable[[], bool]) -> Iterator[None]:
+    """A thread that calls `hear` whenever there is something, until it says that there will be no more."""
+    over = Event()
+
+    def run() -> None:
+        while not over.is_set():
+            if select((source,), (), (), 0.02)[0] and not hear():
+                return
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+@contextlib.contextmanager
+def on_terminal(adapter: Adapter | None = None) -> Iterator[Peer]:
+    """An slcan adapter on a pseudo-terminal."""
+    master = PtyMaster()
+    peer = Peer(adapter or SlcanAdapter(), f"can://slcan{master.slave_name}")
+    peer.write = master.write
+
+    def hear() -> bool:
+        peer.hear(master.read())
+        return True
+
+    try:
+        with serving(master, hear):
+            yield peer
+    finally:
+        master.close()
+
+
+@contextlib.contextmanager
+def on_socket(make: Callable[[], Adapter], url: str) -> Iterator[Peer]:
+    """An adapter for each that connects; `peer` speaks to the last. `url` has a place for the TCP port."""
+    with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as ends:
+        peer = Peer(make(), url.format(server.getsockname()[1]))
+
+        def accept() -> bool:
+            connection = ends.enter_context(server.accept()[0])
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            peer.adapter = make()
+            peer.write = connection.sendall
+            peer.write(peer.adapter.greet())
+            ends.enter_context(serving(connection, lambda: _hear(peer, connection)))
+            return True
+
+        with serving(server, accept):
+            yield peer
+        ends.close()
+
+
+def _hear(peer: Peer, connection: socket.socket) -> bool:
+    try:
+        data = connection.recv(4096)
+    except OSError:
+        return False
+    if data:
+        peer.hear(data)
+    return bool(data)
+
+
+@contextlib.contextmanager
+def slcan_server() -> Iterator[Peer]:
+    with on_socket(SlcanAdapter, "can://slcan/socket://127.0.0.1:{}") as peer:
+        yield peer
+
+
+@contextlib.contextmanager
+def socketcand_server() -> Iterator[Peer]:
+    with on_socket(SocketcandAdapter, "can://socketcand/127.0.0.1:{}/can0") as peer:
+        yield peer
+
+
+def open_can(peer: Peer | str, rate: int = 0, **options: object) -> CanLink:
+    """As a session opens it."""
+    return CanLink(peer if isinstance(peer, str) else peer.url, rate=rate, usual=500_000, options=options)
+
+
+def some(link: CanLink, count: int = 1, seconds: float = 30.0) -> list[Data]:
+    """The next frames, however long they take within reason."""
+    end = link.now() + seconds
+    frames: list[Data] = []
+    while len(frames) < count and link.now() < end:
+        frames += link.read(end)
+    return frames
+
+
+def remote(id: int, count: int = 0, *, extended: bool = False) -> CanFrame:
+    return CanFrame(id | REMOTE_FLAG, bytes(count), extended)

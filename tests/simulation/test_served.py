@@ -1,0 +1,147 @@
+"""A simulated bus at work on somebody else's CAN channel, in a thread: what it hears, says, and leaves behind."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import closing
+
+import pytest
+
+from motorbus.core.operation import ERROR_FLAG, CanFrame
+from motorbus.errors import LinkLost, MotorbusError, RequestError
+from motorbus.link.base import Line
+from motorbus.link.can import CanLink
+from motorbus.link.memory import NoisyLine
+from motorbus.simulation.served import LinkClient, Served, join
+from tests.simulation.links import QueueLink
+from tests.simulation.parrots import ANSWER, Parrots
+
+FRAME = CanFrame(0x601, b"\1\2")
+REPLY = CanFrame(0x601 ^ ANSWER, b"\1\2")
+
+
+@pytest.mark.parametrize("descriptor", [False, True])
+def test_devices_answer_on_the_channel(descriptor: bool) -> None:
+    link = QueueLink(descriptor=descriptor)
+    with Served(Parrots(), LinkClient(link)):
+        for _ in range(3):
+            link.arrive(FRAME)
+            assert link.next_sent() == REPLY
+    assert link.closed
+
+
+def test_what_nobody_asked_for_is_said_too() -> None:
+    bus, link = Parrots(), QueueLink()
+    bus.say(REPLY, time.monotonic())
+    with Served(bus, LinkClient(link)):
+        assert link.next_sent() == REPLY
+
+
+def test_an_adapter_finds_its_own_errors() -> None:
+    link = QueueLink()
+    client = LinkClient(link)
+    client.tell(CanFrame(ERROR_FLAG | 0x80, bytes(8)), 0.0)
+    assert link.nothing_sent()
+
+
+def test_what_has_no_room_is_counted() -> None:
+    link = QueueLink()
+    link.is_full = True
+    client = LinkClient(link)
+    client.tell(REPLY, 0.0)
+    client.tell(REPLY, 0.0)
+    assert client.lost == 1
+    assert link.next_sent() == REPLY
+
+
+def test_an_adapter_that_is_lost_is_told_when_the_bus_is_left() -> None:
+    link = QueueLink()
+    served = Served(Parrots(), LinkClient(link))
+    link.is_lost = True
+    link.arrive(FRAME)
+    with served.still():  # returns though the thread has ended
+        pass
+    with pytest.raises(LinkLost):
+        served.close()
+    served.close()
+    assert link.closed
+
+
+def test_nothing_happens_while_it_is_held_still() -> None:
+    bus, link = Parrots(), QueueLink()
+    with Served(bus, LinkClient(link)) as served:
+        with served.still():
+            link.arrive(FRAME)
+            bus.poke()
+            assert bus.heard == []
+        assert link.next_sent() == REPLY
+        with served.still():
+            assert len(bus.heard) == 1
+
+
+def test_the_line_can_be_changed_at_any_time() -> None:
+    link = QueueLink()
+    with Served(Parrots(), LinkClient(link)) as served:
+        line: Line = NoisyLine(1, duplicate=1.0)
+        served.line = line
+        assert served.line is line
+        link.arrive(FRAME)
+        assert [link.next_sent(), link.next_sent()] == [REPLY, REPLY]
+
+
+def test_the_clock_of_the_devices_goes_on_where_it_stood() -> None:
+    bus, link = Parrots(), QueueLink()
+    with Served(bus, LinkClient(link), start=5.0) as served:
+        link.arrive(FRAME)
+        link.next_sent()
+        assert 5.0 <= bus.heard[0][0] <= served.now() < 5.0 + 60.0
+
+
+def test_it_leaves_no_thread_behind() -> None:
+    before = threading.active_count()
+    served = Served(Parrots(), LinkClient(QueueLink()))
+    served.close()
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("port", ["/dev/ttyUSB0", "socket://127.0.0.1:1", "sim", ""])
+def test_only_can_channels_can_be_joined(port: str) -> None:
+    with pytest.raises(RequestError, match="no CAN channel"):
+        join(port)
+
+
+def test_a_channel_is_opened_as_a_host_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+
+    def open_link(port: str, **options: object) -> QueueLink:
+        asked.append((port, options))
+        return QueueLink()
+
+    monkeypatch.setattr("motorbus.simulation.served.CanLink", open_link)
+    with closing(join("can://virtual/here", 250_000, 500_000, fd=False)):
+        pass
+    expected = {"rate": 250_000, "usual": 500_000, "options": {"fd": False}, "shared": True}
+    assert asked == [("can://virtual/here", expected)]
+
+
+@pytest.mark.parametrize(("shared", "locked"), [(True, False), (False, True)])
+def test_a_bus_of_the_system_is_not_locked_by_its_devices(
+    shared: bool, locked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[str] = []
+
+    class Lock:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def acquire(self) -> None:
+            taken.append(self.name)
+
+        def release(self) -> None:
+            pass
+
+    monkeypatch.setattr("motorbus.link.can.PortLock", Lock)
+    with pytest.raises(MotorbusError):  # there is no such interface
+        CanLink("can://socketcan/nocan7", rate=500_000, shared=shared)
+    assert bool(taken) is locked
