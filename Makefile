@@ -34,6 +34,7 @@ bench: $(READY) $(PEERS)
 	$(BIN)/python -m bench $(ARGS)
 
 docs: $(READY)
+	$(BIN)/python -m scripts.coverage
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters

@@ -199,7 +199,9 @@ def _object_row(one: Object, maps: int) -> str:
     row = one.row
     address = str(row.address) if row.subindex is None else f"0x{row.address:04X}:{row.subindex:02X}"
     where = "all" if len(one.maps) == maps else ", ".join(one.maps)
-    cells = [f"`{row.name}`", address, where, row.access.value, _code(one.api), _shell(one.cli)]
+    unwritten = row.writable and len(one.api) == 1 and one.api[0].endswith(".read")
+    access = f"{row.access.value}; no verb writes it yet" if unwritten else row.access.value
+    cells = [f"`{row.name}`", address, where, access, _code(one.api), _shell(one.cli)]
     return f"| {' | '.join([*cells, 'answers', 'names it', _test(one.test)])} |"
 
 

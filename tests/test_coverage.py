@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 import motorbus
+from motorbus import families
 from motorbus.cli import build, parse
 from motorbus.core.family import Family
 from motorbus.core.operation import CanFrame, Data
@@ -33,19 +34,19 @@ OBJECTS = [
     for one in told.objects
     for map_ in one.maps
 ]
-TESTS = sorted({one.test for told in TOLD.values() for one in (*told.commands, *told.objects)})
-NAMES = sorted(
-    {(n, a) for n, told in TOLD.items() for one in (*told.commands, *told.objects) for a in one.api}
-)
-LINES = sorted(
-    {line for told in TOLD.values() for one in (*told.commands, *told.objects) for line in one.cli}
-)
+CLAIMS: list[tuple[str, Command | Object]] = []
+for _name, _told in TOLD.items():
+    CLAIMS += [(_name, command) for command in _told.commands]
+    CLAIMS += [(_name, row) for row in _told.objects]
+TESTS = sorted({one.test for _, one in CLAIMS})
+NAMES = sorted({(name, api) for name, one in CLAIMS for api in one.api})
+LINES = sorted({line for _, one in CLAIMS for line in one.cli})
 PATIENCE = 1.0
 """s in which a device must have answered."""
 
 
 def test_every_family_is_on_the_page() -> None:
-    assert coverage.known() == [name for name in motorbus.families.names() if name != "template"]
+    assert coverage.known() == [name for name in families.names() if name != "template"]
 
 
 def test_the_page_is_the_one_that_would_be_made() -> None:
@@ -67,7 +68,7 @@ def test_an_empty_cell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_row_that_nothing_reaches_is_refused() -> None:
-    row = coverage.families.load("feetech").tables["sts"]["id"]
+    row = families.load("feetech").tables["sts"]["id"]
     told = {"device": "Servo", "tests": {"read": "t"}}
     unreachable = motorbus.core.entry.changed(row, access=motorbus.core.entry.Access.WRITE)
     with pytest.raises(ValueError, match="can be neither read nor written"):

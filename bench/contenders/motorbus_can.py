@@ -22,18 +22,17 @@ class Motorbus:
         values: list[float] = []
         if len(self.servos) == 1:
             position = self.servos[0].position
-            for _ in range(count):
-                values.append(position())
+            values += [position() for _ in range(count)]
         else:
             self._together(count, values)
         return [round(value * COUNTS_PER_RADIAN) for value in values]
 
     def _together(self, count: int, values: list[float]) -> None:
-        verb = kst.Servo.position.function
+        verb, keep = kst.Servo.position.function, values.append
 
         def endless(servo: kst.Servo) -> Operation[None]:
             for _ in range(count):
-                values.append((yield from verb(servo)))
+                keep((yield from verb(servo)))
 
         def together() -> Operation[None]:
             yield from Together([endless(servo) for servo in self.servos])

@@ -24,6 +24,11 @@ RESULTS = Results(
     calls=None,
     starts=[Cost("import motorbus", Spread(0.0123, 0.01, 0.02), 42, ())],
     missing=[],
+    can=[
+        Sample(0, name, load, seconds, seconds)
+        for name, seconds in (("motorbus", 1e-4), ("python-canopen", 2e-4))
+        for load in ("can-read1", "can-read8")
+    ],
 )
 
 
@@ -38,6 +43,9 @@ def test_the_table_has_cost_ratio_and_what_is_missing() -> None:
 def test_the_page_holds_every_table() -> None:
     text = page(RESULTS)
     assert all(f"### {name}:" in text for name in WORKLOADS)
+    assert "## CAN, over slcan" in text
+    assert "2.00 (2.00 – 2.00)" in text
+    assert "CAN" not in page(RESULTS._replace(can=()))
     assert "| import motorbus | 12.3 | 10.0 – 20.0 | 42 | none |" in text
     assert "A processor with 2 cores" in text
 

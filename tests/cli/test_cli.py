@@ -132,9 +132,25 @@ def test_a_wrong_call_is_told_in_json_too(run: Run) -> None:
     assert json.loads(ran.err)["exit"] == 2
 
 
-@pytest.mark.parametrize("words", [["--json", "ports"], ["ports", "--json"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--json", "ports"],
+        ["ports", "--json"],
+        ["ping", "--json", "feetech:sim#1"],
+        ["ping", "feetech:sim#1", "--json", "--baud", "1000000"],
+        ["ping", "-v", "feetech:sim#1", "--json"],
+    ],
+)
 def test_common_flags_may_stand_anywhere(words: list[str], run: Run) -> None:
-    assert run(*words).document["schema"] == "motorbus.ports/1"
+    assert run(*words).document["schema"] in {"motorbus.ports/1", "motorbus.ping/1"}
+
+
+@pytest.mark.parametrize("goal", ["-30deg", "-0.5", "-.5"])
+def test_a_negative_quantity_is_no_flag(goal: str) -> None:
+    _, bound, _ = parse(APP, ["kst", "position", "kst:sim#1", goal, "--wait"])
+    assert bound.arguments["value"] == goal
+    assert bound.arguments["wait"] is True
 
 
 def test_no_words_at_all_show_the_help(run: Run) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 import sys
+from pathlib import Path
 
+import can
 import pytest
 
+from motorbus.link.can_log import parse_word
 from tests.cli.conftest import Run
 
 READ = "FF FF 01 04 02 38 02 BE"
@@ -61,3 +64,78 @@ def test_what_is_no_question_ends_with_2(words: list[str], run: Run) -> None:
 def test_nothing_to_decode_ends_with_2(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO(""))
     assert run("decode", "--family", "feetech").code == 2
+
+
+GOAL, TAKEN = "625#2203600084030000", "5A5#6003600000000000"
+
+
+def test_can_frames_are_written_as_candump_writes_them(run: Run) -> None:
+    ran = run("decode", "--family", "kst", GOAL, TAKEN)
+    assert ran.code == 0, ran.err
+    assert GOAL in ran.out
+    assert "90°" in ran.out
+    document = run("decode", "--family", "kst", "--json", GOAL, TAKEN).document
+    assert [one["frame"] for one in document["frames"]] == [GOAL, TAKEN]
+    assert document["frames"][0]["data"] == "00 00 06 25 08 22 03 60 00 84 03 00 00"
+    assert run("decode", "--family", "kst", "00000625#4000300000000000").code == 0
+    assert run("decode", "--family", "kst", "--json", "0000062508 2203600084030000").document == {
+        **document,
+        "frames": document["frames"][:1],
+    }
+
+
+def test_how_a_bus_is_spoken_to_may_be_said(run: Run) -> None:
+    assert "50°" in run("decode", "--family", "kst", "--profile", "xqpower", GOAL).out
+    ran = run("decode", "--family", "feetech", "--profile", "sts", READ)
+    assert (ran.code, ran.out) == (2, "")
+
+
+@pytest.mark.parametrize("bad", ["625##1AABB", "625#R", "625#22", "123#00"])
+def test_a_can_frame_that_is_none_of_theirs_is_bad(bad: str, run: Run) -> None:
+    ran = run("decode", "--family", "kst", bad)
+    assert ran.code == 1
+    assert "BAD: " in ran.out
+    assert ("not classic CAN" in ran.out) == ("##" in bad)
+
+
+@pytest.mark.parametrize("words", [["kst", "625#2"], ["kst", "625#001122334455667788"], ["feetech", GOAL]])
+def test_what_is_no_can_frame_here_ends_with_2(words: list[str], run: Run) -> None:
+    assert run("decode", "--family", *words).code == 2
+
+
+LOG = f"(1436509052.249713) can0 {GOAL} T\n(1436509052.250000) can0 {TAKEN} R\n"
+
+
+def test_candump_on_a_pipe_is_explained_line_by_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(LOG))
+    ran = run("decode", "--family", "kst", "--json")
+    assert ran.code == 0, ran.err
+    assert [one["schema"] for one in ran.records] == ["motorbus.decode.frame/1"] * 2
+    assert [(one["frame"], one["direction"]) for one in ran.records] == [(GOAL, "tx"), (TAKEN, "rx")]
+    assert (ran.records[0]["time"], ran.records[0]["relative"]) == (1436509052.249713, False)
+
+
+@pytest.mark.parametrize(("suffix", "relative"), [(".log", False), (".blf", False), (".asc", True)])
+def test_recordings_are_read(suffix: str, relative: bool, run: Run, tmp_path: Path) -> None:
+    file = tmp_path / f"trace{suffix}"
+    with can.Logger(str(file)) as writer:
+        for number, word in enumerate((GOAL, TAKEN)):
+            frame = parse_word(word)
+            assert frame is not None
+            at = 1_700_000_000 + number / 2
+            writer(can.Message(timestamp=at, arbitration_id=frame.id, is_extended_id=False, data=frame.data))
+    ran = run("decode", "--family", "kst", "--file", str(file))
+    assert ran.code == 0, ran.err
+    assert ("+0.500000 s" in ran.out) == relative
+    assert ("2023-11-14T22:13:20" in ran.out) != relative
+    assert [
+        one["relative"] for one in run("decode", "--family", "kst", "--file", str(file), "--json").records
+    ] == [relative] * 2
+
+
+def test_a_recording_that_is_empty_or_not_there_is_told(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "empty.log").write_text("")
+    assert run("decode", "--family", "kst", "--file", str(tmp_path / "empty.log")).code == 2
+    assert run("decode", "--family", "kst", "--file", str(tmp_path / "nothing.log")).code == 1
+    assert run("decode", "--family", "kst", GOAL, "--file", str(tmp_path / "empty.log")).code == 2
+    assert run("decode", "--family", "feetech", "--file", str(tmp_path / "empty.log")).code == 2

@@ -53,6 +53,8 @@ FEETECH = [
     "feetech sync-read BUS#1+2 present_position",
     "feetech sync-write BUS goal_position 1=HERE",
     "feetech sync-write BUS goal_position 1=HERE --dry-run",
+    "feetech factory-restore BUS#1 --yes",
+    "feetech factory-restore BUS#1 --dry-run",
 ]
 KST = [
     "ping BUS --broadcast",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import motorbus
 from motorbus.cli import monitor
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
@@ -50,3 +51,13 @@ def test_interrupting_it_is_the_usual_end(run: Run, arm: Simulation, monkeypatch
 )
 def test_what_is_no_order_ends_with_2(words: list[str], run: Run) -> None:
     assert run("monitor", *words).code == 2
+
+
+def test_what_nobody_tells_has_no_column(run: Run) -> None:
+    with motorbus.simulate("kst", ids="1") as simulation:
+        head = run("monitor", f"{simulation.url}#1", "--count", "1").out.splitlines()[1]
+    assert head.split() == ["id", "position", "(rad)", "alarm"]
+    with motorbus.simulate("kst", ids="1", profile="kst-ext") as simulation:
+        out = run("monitor", f"{simulation.url}#1+9", "--count", "1").out
+    assert "current (A)" in out
+    assert "load" not in out

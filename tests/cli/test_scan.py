@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import motorbus
 from motorbus.cli import scan
 from motorbus.errors import RequestError
 from motorbus.families.feetech import FAMILY
@@ -74,3 +75,23 @@ def test_what_was_found_is_told_when_it_is_interrupted(
     ran = run("scan", arm.url, "--ids", "1-3", "--json")
     assert ran.code == 10
     assert [one["id"] for one in ran.document["devices"]] == [1, 2]
+
+
+def test_a_can_bus_has_a_bit_rate(run: Run) -> None:
+    with motorbus.simulate("kst", ids="1+0x25") as simulation:
+        ran = run("scan", simulation.url, "--bitrate", "250000,500000", "--json")
+        assert [(one["id"], one["bitrate"]) for one in ran.document["devices"]] == [
+            (1, 500_000),
+            (37, 500_000),
+        ]
+        assert "37 (0x25)" in run("scan", simulation.url).out
+        assert run("scan", simulation.url, "--baud", "all").code == 2
+        assert "--bitrate all" in run("scan", simulation.url, "--ids", "9").err
+    assert run("scan", "feetech:sim", "--bitrate", "all").code == 2
+
+
+def test_what_a_scan_notices_is_told(run: Run) -> None:
+    with motorbus.simulate("kst", ids="37", duplicate="37", duplicate_delay="0.0005") as simulation:
+        ran = run("scan", simulation.url, "--json")
+        assert "note: #37 at 500000 bit/s: two answers" in run("scan", simulation.url).err
+    assert "two answers to one request" in ran.document["notes"][0]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 import motorbus
+from motorbus import families
 from motorbus.cli import target
+from motorbus.cli.output import Output
 from motorbus.errors import RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.simulation.named import Simulation
@@ -68,3 +70,21 @@ def test_an_option_that_a_verb_lacks_is_refused(arm: Simulation) -> None:
             target.takes(one, "move", ["colour"])
         with pytest.raises(RequestError, match="have no dance"):
             target.takes(one, "dance", [])
+
+
+def test_a_bus_of_can_has_a_bit_rate_and_ids_in_hexadecimal() -> None:
+    serial, on_can = families.load("feetech"), families.load("kst")
+    assert [target.rate_word(one) for one in (serial, on_can)] == ["baud", "bitrate"]
+    assert [target.id_shown(37, one) for one in (serial, on_can)] == ["37", "37 (0x25)"]
+    assert "--bitrate all" in str(target.nobody("kst:can://slcan/dev/ttyACM0"))
+
+
+def test_what_no_device_of_a_family_can_is_known_without_a_bus() -> None:
+    target.offers(families.load("feetech"), "enable_torque")
+    with pytest.raises(RequestError, match="kst devices have no torque switch"):
+        target.offers(families.load("kst"), "enable_torque")
+
+
+def test_an_option_may_be_said_as_a_flag() -> None:
+    with target.opened("kst:sim,ids=1", {"id-format": "ext"}, Output()) as bus:
+        assert bus.family.identify(1) is not None

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from motorbus.bus.pace import SHOWN, Pace
 from motorbus.errors import DeviceError
 from tests.faults.kst_rig import Mischief, Rig
 
@@ -84,6 +85,21 @@ def test_all_of_them_with_four_nodes_in_flight_give_no_wrong_value(rounds: Calla
     assert line.count > total / 100
     assert rig.wrong == 0
     assert rig.good > 0.9 * total
+
+
+def test_a_link_that_only_shows_its_bit_time_takes_no_copy_either(rounds: Callable[[int], int]) -> None:
+    """No CAN adapter says whether there is a real bus behind it; until enough replies have come, there is no copy."""
+    total = rounds(100_000)
+    rig = Rig()
+    rig.bus.turns.pace = Pace(certain=False)
+    for _ in range(SHOWN):
+        rig.read(0x25)
+    line = rig.link.line = Mischief(10, 0.02, "twice", *WRONG, *ABORTS)
+    for _ in range(total):
+        rig.read(0x25)
+    assert line.count > total / 100
+    assert not rig.bus.turns.pace.refuted
+    assert rig.wrong == 0
 
 
 def test_a_copy_that_an_adapter_hands_over_later_is_the_known_limit(rounds: Callable[[int], int]) -> None:

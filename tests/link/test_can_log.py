@@ -9,7 +9,7 @@ import can
 import pytest
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.errors import RequestError
+from motorbus.errors import LinkError, RequestError
 from motorbus.link.can_log import looks_like_can, parse_line, parse_word, read_lines, read_log
 
 DATA = bytes.fromhex("2203600093FF0000")
@@ -164,7 +164,7 @@ def test_without_python_can_the_line_that_installs_it_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "can", None)
-    with pytest.raises(RequestError, match=r'pip install "motorbus\[can\]"'):
+    with pytest.raises(LinkError, match=r'pip install "motorbus\[can\]"'):
         list(read_log(tmp_path / "trace.asc"))
     (tmp_path / "trace.log").write_text("(1.0) can0 5A5#\n")
     assert len(list(read_log(tmp_path / "trace.log"))) == 1

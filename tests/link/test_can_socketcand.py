@@ -16,15 +16,15 @@ from tests.link.can_peer import PING, PONG, open_can, serving, socketcand_server
 
 @contextlib.contextmanager
 def server(*words: bytes) -> Iterator[str]:
-    """It says the first word unasked, and each other one when it has heard something."""
-    with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as ends:
+    """It says the first word unasked, each other one when it has heard something, and hangs up after the last."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def accept() -> bool:
-            connection = ends.enter_context(listener.accept()[0])
-            for number, word in enumerate(words):
-                if number:
-                    connection.recv(256)
-                connection.sendall(word)
+            with listener.accept()[0] as connection, contextlib.suppress(OSError):
+                for number, word in enumerate(words):
+                    if number:
+                        connection.recv(256)
+                    connection.sendall(word)
             return True
 
         with serving(listener, accept):
@@ -40,12 +40,16 @@ def server(*words: bytes) -> Iterator[str]:
         ((b"< hi >", b""), "does not open the channel can0"),
     ],
 )
-def test_a_server_of_another_kind(
-    words: tuple[bytes, ...], complaint: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.05)
+def test_a_server_of_another_kind(words: tuple[bytes, ...], complaint: str) -> None:
     with server(*words) as url, pytest.raises(LinkError, match=complaint):
         open_can(url)
+
+
+def test_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.05)
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        with pytest.raises(LinkError, match="does not greet"):
+            open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
 
 
 def test_a_rate_that_was_said_cannot_be_checked() -> None:

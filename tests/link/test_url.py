@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import PortNotFound, RequestError
+from motorbus.link.can import CanLink
 from motorbus.link.pty import PtyMaster
 from motorbus.link.serial import SerialLink
 from motorbus.link.tcp import TcpLink
@@ -47,10 +48,35 @@ def test_an_unknown_scheme_comes_with_those_that_exist(port: str) -> None:
         open_link(port, rate=1_000_000)
 
 
-@pytest.mark.parametrize(("port", "kind"), [("can://socketcan/can0", "bytes"), ("/dev/ttyACM0", "frames")])
-def test_can_is_still_to_come(port: str, kind: str) -> None:
-    with pytest.raises(RequestError, match="KST"):
+def test_a_can_channel_is_opened_with_its_options() -> None:
+    link = open_link(
+        "CAN://virtual/a",
+        usual=500_000,
+        kind="frames",
+        options={"receive_own_messages": "yes", "listen_only": "no"},
+    )
+    assert isinstance(link, CanLink)
+    assert (link.name, link.rate) == ("CAN://virtual/a", 500_000)
+    link.close()
+
+
+@pytest.mark.parametrize(
+    ("port", "kind", "words"),
+    [
+        ("can://socketcan/can0", "bytes", "speak on a serial line"),
+        ("/dev/ttyACM0", "frames", r"speak CAN\n.*can://slcan/dev/ttyACM0"),
+        ("socket://127.0.0.1:4000", "frames", "speak CAN"),
+    ],
+)
+def test_a_port_of_the_other_kind(port: str, kind: str, words: str) -> None:
+    with pytest.raises(RequestError, match=words):
         open_link(port, rate=500_000, kind=kind)
+
+
+@pytest.mark.parametrize("port", ["can://slcan/dev/tty\0ACM0", "can://virtual/\0"])
+def test_what_is_no_channel(port: str) -> None:
+    with pytest.raises(RequestError, match="is not a port"):
+        open_link(port, rate=500_000, kind="frames")
 
 
 @pytest.mark.parametrize("port", ["", "   ", "/dev/tty\0ACM0"])

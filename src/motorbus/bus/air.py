@@ -12,6 +12,7 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
+from motorbus.bus.pace import Pace
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
@@ -38,18 +39,17 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
     Timeout.STORE: 0.02,
 }
 SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
-EARLY = 0.9  # of the air time: a reply sooner than this on a paced link answers an older request
 
 
 class Air:
     """The exchanges in flight on one bus, one per lane. `rate` in bit/s, `latency` in seconds, of the link."""
 
-    def __init__(self, family: Family, *, rate: int, latency: float, paced: bool) -> None:
+    def __init__(self, family: Family, *, rate: int, latency: float, pace: Pace | None) -> None:
         self.family = family
         self.window = family.link.window
         self.rate = rate
         self.latency = latency
-        self.paced = paced
+        self.pace = pace
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notice] = Feed()
         self.statistics = Statistics()
@@ -260,12 +260,34 @@ class Air:
                 continue
             for event in self.receiver.flush():  # all replies are in, so what is held is surplus
                 self._take(event, now)
-            if self.paced and now < flight.sent_at + EARLY * self._least_time(flight.exchange):
-                flight.spoiled = "early"
+            if self.pace is not None and self._is_early(flight, self.pace, now):
+                continue
             if flight.spoiled or flight.surplus:
                 self._lost_try(lane, flight, now)
             else:
                 self._accepted(lane, flight, now)
+
+    def _is_early(self, flight: Flight, pace: Pace, now: float) -> bool:
+        """Put this reply aside: it came sooner than it can travel, so the true one is still to come.
+
+        On a byte line both would be the same bytes in one stream, so there the try is lost at once.
+        """
+        if not pace.suspects(now - flight.sent_at, self._least_time(flight.exchange)):
+            return False
+        if not isinstance(flight.exchange.request, CanFrame) or len(flight.got) != 1:
+            flight.spoiled = "early"
+            return False
+        self.statistics.other["early"] += 1
+        flight.put_reply_aside()
+        return True
+
+    def _take_back(self, flight: Flight, pace: Pace) -> None:
+        """Nothing came behind an early reply: where bit time was only presumed, it was the true one after all."""
+        if pace.certain:
+            flight.spoiled = flight.spoiled or "early"
+        else:
+            pace.refute()
+            flight.take_back()
 
     def _least_time(self, exchange: Exchange[Any]) -> float:
         """The least time in which an answer can be here; a family's air time of frames may count the most bits."""
@@ -286,6 +308,8 @@ class Air:
             self._take(event, now)
         if self._flying.get(lane) is not flight:
             return
+        if flight.put_aside is not None and not flight.complete and self.pace is not None:
+            self._take_back(flight, self.pace)
         if flight.done and not flight.abandoned:  # an interrupt fell between settling it and forgetting it
             del self._flying[lane]
         elif flight.exchange.replies is ANY:

@@ -40,7 +40,7 @@ class BusFace:
             family,
             rate=link.rate,
             latency=link.latency,
-            paced=link.paced,
+            paced=link.paced or (None if family.link.kind == "frames" and not link.simulated else False),
             listen_only=bool(getattr(link, "listen_only", False)),
             admit=self._armed(admit) if admit is not None else None,
         )

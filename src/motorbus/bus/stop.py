@@ -26,7 +26,7 @@ from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.family import Stop
 from motorbus.core.operation import ANY, Answer, Exchange, Timeout, Tune
-from motorbus.errors import LinkError, LinkLost, PortNotFound
+from motorbus.errors import DeviceError, LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
 
 ROUNDS = 5
@@ -179,7 +179,7 @@ class Stopper:
             if not flight.done:
                 self.turns.abandon(flight)
         exchange = flight.exchange
-        if flight.error is not None or not _nodes(exchange):
+        if flight.error is not None or not _nodes(exchange) or _refused(flight):
             return False
         if exchange.effect in GATED:  # what only asks stops nobody
             acknowledged += [node for node in _nodes(exchange) if node not in acknowledged]
@@ -245,6 +245,16 @@ class Stopper:
 def _nodes(exchange: Exchange[Answer]) -> list[int]:
     """Who acknowledges this."""
     return [] if exchange.replies is ANY else [due.node for due in exchange.replies]
+
+
+def _refused(flight: Flight) -> bool:
+    """Did the device answer, and say no?"""
+    try:
+        if flight.exchange.read is not None:
+            flight.exchange.read(flight.value)
+    except DeviceError:
+        return True
+    return False
 
 
 def _answered(exchanges: Iterable[Exchange[Answer]]) -> bool:

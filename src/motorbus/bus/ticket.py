@@ -95,6 +95,7 @@ class Flight(Ticket):
         "left",
         "noise",
         "parent",
+        "put_aside",
         "sent_at",
         "settling",
         "spoiled",
@@ -125,6 +126,7 @@ class Flight(Ticket):
         self.sent_at = 0.0
         self.got: dict[int, Reply] = {}
         self.last: Reply | None = None
+        self.put_aside: Reply | None = None
         self.noise: list[tuple[str, bytes]] = []
         self.spoiled = ""
         self.surplus = False
@@ -148,6 +150,16 @@ class Flight(Ticket):
                 self.complete = len(self.got) == len(dues) or self._all_believed_here()
                 return True
         return False
+
+    def put_reply_aside(self) -> None:
+        """The one reply is suspect: wait for another, but keep it."""
+        ((_, self.put_aside),) = self.got.items()
+        self.got, self.last, self.complete = {}, None, False
+
+    def take_back(self) -> None:
+        """The reply put aside is the answer after all."""
+        if self.put_aside is not None:
+            self.take(self.put_aside)
 
     def _all_believed_here(self) -> bool:
         """A group does not wait for a node that is known to be silent."""

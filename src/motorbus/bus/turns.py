@@ -19,6 +19,7 @@ from typing import Any
 
 from motorbus.bus import verdict
 from motorbus.bus.air import Air
+from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
 from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Timeout
@@ -34,7 +35,8 @@ Admit = Callable[[Exchange[Any]], None]
 class Turns(Air):
     """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link.
 
-    While the link is `listening` every exchange is refused; one that was opened `listen_only` never speaks.
+    `paced` says whether it takes bit time; None: it will show. While the link is `listening` every exchange is
+    refused; one that was opened `listen_only` never speaks.
     """
 
     def __init__(
@@ -43,11 +45,11 @@ class Turns(Air):
         *,
         rate: int,
         latency: float = 0.0,
-        paced: bool = False,
+        paced: bool | None = False,
         listen_only: bool = False,
         admit: Admit | None = None,
     ) -> None:
-        super().__init__(family, rate=rate, latency=latency, paced=paced)
+        super().__init__(family, rate=rate, latency=latency, pace=_pace(paced))
         self.listen_only = self.listening = listen_only
         self.admit = admit
         self.lock = RLock()
@@ -121,6 +123,10 @@ class Turns(Air):
         """Nothing waits, nothing flies, nobody holds the bus."""
         return not (self._flying or self._claims or self._holder or self.latched or any(self._queues))
 
+    @property
+    def _takes_time(self) -> bool:
+        return self.pace is not None and self.pace.certain
+
     # -- what goes out --------------------------------------------------------------------------------------
 
     def send(self, now: float) -> Data | Retune | None:
@@ -128,7 +134,7 @@ class Turns(Air):
         self._look_at = inf
         if len(self._flying) >= self.window:
             return None
-        if self.paced and now < self._free_at:
+        if now < self._free_at and self._takes_time:
             self._look_at = self._free_at
             return None
         for queue in self._queues:
@@ -143,7 +149,7 @@ class Turns(Air):
     def short(self, flight: Flight, now: float) -> Data | None:
         """The short path: launch at once when the bus is idle and the node is clean; None means queue it."""
         exchange = flight.exchange
-        if not self.idle or self.listening or (self.paced and now < self._free_at):
+        if not self.idle or self.listening or (now < self._free_at and self._takes_time):
             return None
         if exchange.replies is not ANY:
             nodes = self.trust.nodes
@@ -378,3 +384,7 @@ class Turns(Air):
         self._claims.clear()
         for ticket in waiting:
             self._settle(ticket, error=error)
+
+
+def _pace(paced: bool | None) -> Pace | None:
+    return None if paced is False else Pace(certain=bool(paced))

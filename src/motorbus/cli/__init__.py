@@ -1,8 +1,8 @@
 """The shell's face: thin commands that parse, ask, call the floors below and print. No logic of their own.
 
 One file per command, file name = command name, each loaded when it is called, so that `--help`, `--version` and
-completion import no family, no serial port and no plotting. What only one family has lives in a module of that
-family's name.
+completion import no family, no serial port and no plotting. What only one family has lives in a module, or a package,
+of that family's name.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What one family can do beyond the common verbs, for common commands that use it where it is there.
 
-A family's face is the module of its name in this folder. Apart from its own commands it may offer
+A family's face is the module (or package) of its name in this folder. Apart from its own commands it may offer
 
     move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, all begun in the same instant
     Train(bus, nodes)                                          what a control loop of several nodes does each cycle

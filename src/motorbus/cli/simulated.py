@@ -18,6 +18,8 @@ PATIENCE = 10.0  # s that it may take to end when asked
 class Simulated:
     """`motorbus simulate` as a child; use it in a `with`. `bus` is its address once it is ready.
 
+    `more` are further flags by name: `control`, `socketcand`, or a switch of the family.
+
     Raises MotorbusError with what it said when it ends before it is ready.
     """
 

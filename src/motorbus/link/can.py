@@ -58,8 +58,10 @@ class CanLink:
     """An open CAN channel. `rate` in bit/s is what the user said (0: nothing), `usual` what the family expects.
 
     `options`: `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and whatever the
-    back end's constructor takes. Raises RequestError for an unknown interface or option, PortNotFound, PortBusy, or
-    LinkError: for a bit rate that this adapter does not really have, a missing driver, a refusal.
+    back end's constructor takes. `shared`: takes part beside a host of this machine, as simulated devices on a
+    SocketCAN interface do, so that one is not locked. Raises RequestError for an unknown interface or option,
+    PortNotFound, PortBusy, or LinkError: for a bit rate that this adapter does not really have, a missing driver, a
+    refusal.
     """
 
     paced = False  # adapters say nothing of when a frame was on the wire
@@ -67,7 +69,13 @@ class CanLink:
     simulated = False
 
     def __init__(
-        self, port: str, *, rate: int = 0, usual: int = 0, options: Mapping[str, object] | None = None
+        self,
+        port: str,
+        *,
+        rate: int = 0,
+        usual: int = 0,
+        options: Mapping[str, object] | None = None,
+        shared: bool = False,
     ) -> None:
         self.name = port
         self._can = python_can(port)
@@ -79,7 +87,7 @@ class CanLink:
         self.listen_only = self._config.listen_only
         self._tuning = False
         self._lock = PortLock(_lock_name(self._config))
-        if self._config.interface not in NO_WIRE:
+        if self._config.interface not in NO_WIRE and not (shared and self._config.interface == "socketcan"):
             self._lock.acquire()
         try:
             self._wire: Wire = self._opened(self.rate, self.listen_only)

@@ -1,7 +1,7 @@
 """CAN traffic that somebody has recorded: candump text read here, ASC, BLF and TRC by python-can's readers.
 
-Text needs nothing installed, so a line of candump can be explained anywhere. The other formats are read by python-can,
-which is imported here only when such a file is opened. What is no classic CAN frame is told as such, never dropped.
+Text needs nothing installed, so a line of candump can be explained anywhere; the other formats need python-can. What
+is no classic CAN frame is told as such, never dropped.
 """
 
 from __future__ import annotations
@@ -9,13 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.errors import LinkError, RequestError
-
-if TYPE_CHECKING:
-    from types import ModuleType
+from motorbus.errors import RequestError
 
 MOST: Final = 8
 """Data bytes of a classic CAN frame."""
@@ -115,8 +112,8 @@ def read_lines(lines: Iterable[str]) -> Iterator[Logged]:
 def read_log(path: Path) -> Iterator[Logged]:
     """Every frame in a file of candump (`.log`), ASC, BLF or TRC, in order.
 
-    Raises RequestError for a file that is none of these, or whose format needs python-can where that is missing;
-    OSError where the file cannot be read.
+    Raises RequestError for a file that is none of these, LinkError where its format needs python-can and that is
+    missing, OSError where it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in _TEXT:
@@ -132,7 +129,9 @@ def read_log(path: Path) -> Iterator[Logged]:
 
 
 def _by_python_can(path: Path) -> Iterator[Logged]:
-    can = _python_can(path)
+    from motorbus.link.can import python_can  # the one place where it is imported
+
+    can = python_can(f"reading {path}")
     reader = {".asc": can.ASCReader, ".blf": can.BLFReader, ".trc": can.TRCReader}[path.suffix.lower()]
     how: dict[str, Any] = (
         {"mode": "rb"} if reader is can.BLFReader else {"encoding": "utf-8", "errors": "replace"}
@@ -144,18 +143,6 @@ def _by_python_can(path: Path) -> Iterator[Logged]:
             raise
         except Exception as error:  # what its readers raise for a broken file is theirs to choose
             raise RequestError(f"{path}: cannot be read as {path.suffix}: {error}") from error
-
-
-def _python_can(path: Path) -> ModuleType:
-    from motorbus.link.can import python_can  # the one file that imports it
-
-    try:
-        return python_can(str(path))
-    except LinkError:
-        raise RequestError(
-            f"{path}: reading {path.suffix} needs python-can, which is not installed",
-            advice='pip install "motorbus[can]", or give the log as candump text',
-        ) from None
 
 
 def _from_message(message: Any) -> Logged:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import socket
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -131,8 +132,19 @@ def open_slcan(config: CanConfig, back_end: Any) -> tuple[SlcanWire, float, tupl
         if os.name != "nt" and has_descriptor(bus)
         else SerialObject(bus.serialPortOrig)
     )
-    wire = SlcanWire(config.name, port, lambda: quietly(bus.shutdown), listening=listening)
+    wire = SlcanWire(config.name, port, lambda: _shut(bus), listening=listening)
     return wire, latency, warnings
+
+
+def _shut(bus: Any) -> None:
+    """pyserial sleeps for 0.3 s when it closes a socket, unless that is closed already."""
+    connection = getattr(bus.serialPortOrig, "_socket", None)
+    if isinstance(connection, socket.socket):
+        with contextlib.suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)
+        connection.close()
+        bus.serialPortOrig.is_open = False
+    quietly(bus.shutdown)
 
 
 def has_descriptor(bus: Any) -> bool:

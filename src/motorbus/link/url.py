@@ -49,7 +49,7 @@ def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:
             else f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",
             advice="a simulated bus needs no port: write sim in its place",
         )
-    if scheme not in (None, "socket", "rfc2217"):
+    if scheme not in (None, "socket", "rfc2217", "can"):
         raise RequestError(
             f"{port!r}: unknown scheme {scheme!r}",
             expected=f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",

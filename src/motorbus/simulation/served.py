@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Final, Self
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, Link
-from motorbus.link.url import open_link
 from motorbus.simulation.clients import Participant
 from motorbus.simulation.mount import Mount
 
@@ -63,7 +62,9 @@ def join(port: str, rate: int = 0, usual: int = 0, **options: object) -> LinkCli
     """
     if not port.startswith(_CAN):
         raise RequestError(f"{port!r} is no CAN channel", expected="can://INTERFACE/CHANNEL")
-    return LinkClient(open_link(port, rate=rate, usual=usual, kind="frames", options=options))
+    from motorbus.link.can import CanLink
+
+    return LinkClient(CanLink(port, rate=rate, usual=usual, options=options, shared=True))
 
 
 class Served:

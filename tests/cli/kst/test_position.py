@@ -11,7 +11,7 @@ from tests.cli.conftest import Run
 
 
 def goal(servos: Simulation) -> int:
-    return servos[37].memory["goal_position"]
+    return int(servos[37].memory["goal_position"])
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import motorbus
 from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
@@ -64,8 +66,10 @@ def test_an_id_that_is_taken_is_refused(servos: Simulation, run: Run) -> None:
     assert "#22" not in ran.err
 
 
-def test_two_servos_with_one_id_are_told_and_nothing_is_written(run: Run) -> None:
-    with motorbus.simulate("kst", ids="0x25", duplicate="0x25") as simulation:
+@pytest.mark.parametrize("delay", ["0", "0.0005"])
+def test_two_servos_with_one_id_are_told_and_nothing_is_written(delay: str, run: Run) -> None:
+    with motorbus.simulate("kst", ids="0x25", duplicate="0x25", duplicate_delay=delay) as simulation:
+        simulation[1002].raw_position = 5
         ran = run("kst", "provision", f"{simulation.url}#37", "--new-id", "39", "--yes", "-vv")
     assert ran.code == 2
     assert "two servos answer as 0x25" in ran.err

@@ -6,7 +6,7 @@ import pytest
 
 from motorbus.errors import DeviceError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import driver
-from motorbus.families.kst.driver.identity import code_of
+from motorbus.families.kst.driver.identity import code_of, write_node_id
 from motorbus.families.kst.table import BIT_RATES
 from tests.families.kst.bench import abort, bench, node, play
 
@@ -63,8 +63,17 @@ def test_an_id_is_in_force_after_save_and_restart_only(pending: str) -> None:
 def test_an_id_that_reads_back_as_neither_is_told() -> None:
     write = ("605#2200300009000000", "6000300000000000")
     with pytest.raises(VerificationFailed, match="reads back 7"):
-        play(driver.set_node_id(node(), 9), write, (ID, "4f00300007000000"))
-    play(driver.set_node_id(node(), 9), write, (ID, abort(0x3000, 0x0601_0001)))
+        play(write_node_id(node(), 9), write, (ID, "4f00300007000000"))
+    play(write_node_id(node(), 9), write, (ID, abort(0x3000, 0x0601_0001)))
+
+
+def test_two_servos_with_one_id_are_given_no_other() -> None:
+    with bench(duplicate="5", duplicate_delay=0.0003) as there:
+        with pytest.raises(RequestError, match="two servos answer"):
+            there.servo().set_node_id(9)
+        with pytest.raises(NoReply):
+            there.servo(6).set_node_id(9)
+        assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}
 
 
 def test_a_rate_is_in_force_after_save_and_restart_only() -> None:

@@ -113,6 +113,15 @@ def test_a_refused_stop_is_no_acknowledgement() -> None:
         hold.read(answer(abort(0x6003, 0x0609_0031)))
 
 
+def test_a_servo_that_refuses_to_be_held_is_not_said_to_have_acknowledged() -> None:
+    with bench(ids=(5, 6)) as there:
+        for node_ in (5, 6):
+            there.servo(node_).ping()
+        there.sim(6).raw_position = 950  # turned by hand beyond its range, so it refuses to hold there
+        outcome = there.estop()
+        assert (outcome.acknowledged, outcome.silent) == ((5,), (6,))
+
+
 def test_stop_speaks_as_the_bus_does() -> None:
     stop = line.stop({5: answer("4b02600084030000")}, Dialect(id_format="ext", sized="yes"))
     assert str(stop.exchanges[0].request) == "00000605#2B03600084030000"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from math import inf
 from typing import Any
 
@@ -13,6 +14,7 @@ from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationF
 from motorbus.families.kst import PowerCycleNeeded, Provisioned
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, bench
+from tests.families.kst.test_driver_scanning import Deaf
 
 SAVE = "605#2210100173617665"
 
@@ -36,7 +38,7 @@ WAYS = [{"new_id": 9}, {"new_rate": 250_000}, {"new_id": 9, "new_rate": 1_000_00
 def test_from_the_first_look_to_the_proof(wanted: dict[str, int], pending: str, profile: str) -> None:
     with bench(profile=profile, pending_id=pending) as there:
         cycling(there)
-        done = there.servo().provision(**wanted)  # type: ignore[arg-type]
+        done = there.servo().provision(**wanted)
         there.on = lambda event: None
         node, rate = wanted.get("new_id", 5), wanted.get("new_rate", 500_000)
         assert done == Provisioned(node, rate, "1.00", False)
@@ -45,7 +47,7 @@ def test_from_the_first_look_to_the_proof(wanted: dict[str, int], pending: str, 
         assert [event.done for event in there.of(Progress)] == [0, 1, 2, 3, 4]
         assert (there.bus.rate, there.link.rate, there.bus.turns.listening) == (500_000, 500_000, False)
         there.sent()
-        assert there.servo().provision(**wanted) == done._replace(resumed=True)  # type: ignore[arg-type]
+        assert there.servo().provision(**wanted) == done._replace(resumed=True)
         assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}, "nothing is written again"
 
 
@@ -73,16 +75,16 @@ def test_killed_at_any_point_it_goes_on_from_where_things_stand(
             there.simulator.servos[0].power_cycle() if isinstance(event, PowerCycleNeeded) else cycle(event)
         )
         with pytest.raises(Gone):
-            there.servo().provision(**wanted)  # type: ignore[arg-type]
+            there.servo().provision(**wanted)
         assert there.bus.rate == 500_000
         if cut:
             there.simulator.servos[0].power_cycle()
         cycling(there)
-        result = there.servo().provision(**wanted)  # type: ignore[arg-type]
+        result = there.servo().provision(**wanted)
         assert (result.node, result.rate) == (wanted.get("new_id", 5), wanted.get("new_rate", 500_000))
         there.simulator.servos[0].power_cycle()
         there.on = lambda event: None
-        assert there.servo().provision(**wanted).resumed is True  # type: ignore[arg-type]
+        assert there.servo().provision(**wanted).resumed is True
 
 
 class Timed(MemoryLink):
@@ -116,7 +118,7 @@ def test_power_that_goes_during_the_save_is_told_and_never_called_saved(
 
         there.on = on
         with pytest.raises(VerificationFailed, match="came back as it was") as raised:
-            there.servo().provision(**wanted)  # type: ignore[arg-type]
+            there.servo().provision(**wanted)
         assert "call provision again" in raised.value.advice
         assert (servo.node, servo.bit_rate) == (5, 500_000)
 
@@ -170,6 +172,40 @@ def test_what_it_asks_for_says_all_that_a_person_needs() -> None:
         assert needed == PowerCycleNeeded(5, 9, 500_000)
         assert SAVE in there.sent()
         assert raised.value.node == 5
+
+
+class Interrupting(MemoryLink):
+    """Ctrl-C at one call of `read`."""
+
+    countdown = 0
+
+    def read(self, until: float) -> list[Data]:
+        self.countdown -= 1
+        if not self.countdown:
+            raise KeyboardInterrupt
+        return super().read(until)
+
+
+@pytest.mark.parametrize("wanted", WAYS[1:], ids=str)
+def test_interrupted_at_any_moment_the_rate_of_the_bus_is_set_again(wanted: dict[str, int]) -> None:
+    for countdown in range(1, 400, 7):
+        with bench(link=Interrupting) as there:
+            cycling(there)
+            link = there.link
+            assert isinstance(link, Interrupting)
+            link.countdown = countdown
+            with suppress(KeyboardInterrupt):
+                there.servo().provision(**wanted)
+            assert (there.bus.rate, link.rate, link.listen_only) == (500_000, 500_000, False), countdown
+            link.countdown = 0
+            assert there.servo().provision(**wanted).rate == wanted["new_rate"]
+
+
+def test_an_adapter_that_cannot_listen_provisions_all_the_same() -> None:
+    with bench(link=Deaf) as there:
+        cycling(there)
+        assert there.servo().provision(new_rate=250_000).rate == 250_000
+        assert there.servo().provision(new_rate=250_000).resumed is True
 
 
 def test_in_either_id_format() -> None:

@@ -104,7 +104,7 @@ def test_a_silent_bus_at_another_rate_loses_one_frame_for_each_rate_that_was_nam
         wrong = tuple(rate for rate in RATES if rate not in (250_000, 500_000))
         found = there.run(there.family.scan((5,), (*wrong, 250_000)))
         assert [(one.node, one.rate) for one in found] == [(5, 250_000)]
-        assert [one.why for one in there.of(Skipped)] == [BROKEN] * len(wrong)
+        assert there.of(Suspicion) == [Suspicion(0, rate, BROKEN) for rate in wrong]
         assert there.sim().errors == len(wrong)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Identity
-from motorbus.core.operation import Operation, Rank, outcome
+from motorbus.core.operation import Alone, Operation, Rank, outcome
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
@@ -23,6 +23,7 @@ from motorbus.families.kst.driver.exchanges import (
     whole,
 )
 from motorbus.families.kst.driver.node import Node, checked_id
+from motorbus.families.kst.driver.presence import single
 from motorbus.families.kst.table import BIT_RATES
 
 UNKNOWN = "unknown"
@@ -79,9 +80,17 @@ def node_id(node: Node) -> Operation[int]:
 def set_node_id(node: Node, new: int) -> Operation[None]:
     """Give it another id, 1 to 127; in force after save() and a restart, lost at a restart without.
 
-    Raises RequestError for any other id (nothing is sent), VerificationFailed when it reads back neither.
+    Looks first whether it is alone with its id. Raises RequestError for any other new id (nothing is sent) and for two
+    servos with one id (nothing is written), NoReply for nobody, VerificationFailed when it reads back neither.
     """
     checked_id(new)
+    if not (yield from Alone(single(node))):
+        yield from answers(node)  # which tells best that nobody is there
+    yield from write_node_id(node, new)
+
+
+def write_node_id(node: Node, new: int) -> Operation[None]:
+    """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
     row = node.table["node_id"]
     yield from order(node, row, new, rank=Rank.CONFIGURATION)
     found = yield from _if_told(node, row)

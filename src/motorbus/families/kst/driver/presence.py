@@ -25,7 +25,7 @@ from motorbus.families.kst.driver.dialect import Dialect
 from motorbus.families.kst.driver.exchanges import NODE_ID, POSITION, decided, listening
 from motorbus.families.kst.driver.line import FIRMWARE
 from motorbus.families.kst.driver.listening import GLANCE, Heard, heard
-from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.node import Node, hexadecimal
 from motorbus.families.kst.wire import SdoReply
 
 ROUNDS: Final = 3
@@ -110,6 +110,25 @@ def glance_at(dialect: Dialect, rate: int) -> Operation[None]:
             advice="connect this servo alone, and call again; nothing was written",
         )
     yield from Tune(rate)
+
+
+def single(node: Node) -> Operation[bool]:
+    """Is one servo there under this id? To be asked with the bus alone. Raises RequestError when there are two."""
+    yield from settle_format(node)
+    found = yield from survey(node)
+    if found.several:
+        raise _two(node, found)
+    return found.there
+
+
+def _two(node: Node, found: Presence) -> RequestError:
+    signs = f"{found.most} answers to one request" if found.most > 1 else "bus errors whenever it is asked"
+    return RequestError(
+        f"two servos answer as {hexadecimal(node.node)}: {signs}",
+        cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
+        advice="connect one servo at a time, provision it, then the next; nothing was written",
+        node=node.node,
+    )
 
 
 def _is_error(notice: Notice) -> bool:

@@ -23,10 +23,10 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.exchanges import order
-from motorbus.families.kst.driver.identity import code_of, identify, set_node_id
+from motorbus.families.kst.driver.identity import code_of, identify, write_node_id
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
-from motorbus.families.kst.driver.presence import Presence, glance, glance_at, settle_format, survey
+from motorbus.families.kst.driver.presence import Presence, glance, glance_at, single
 
 PATIENCE: Final = 120.0
 """s to wait for the power cycle."""
@@ -119,7 +119,7 @@ def _changed(job: Job) -> Operation[Place | None]:
     dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
     yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
     if where.node.node != job.new.node:
-        yield from set_node_id(where.node, job.new.node)
+        yield from write_node_id(where.node, job.new.node)
     if where.rate != job.new_rate:
         row = where.node.table["bit_rate_code"]
         yield from order(where.node, row, code_of(job.new_rate), rank=Rank.CONFIGURATION)
@@ -147,10 +147,10 @@ def _found(job: Job) -> Operation[Place]:
 
 
 def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
-    old = yield from _single(job.old)
+    old = yield from single(job.old)
     if job.new.node == job.old.node:
         return Place(job.old, rate) if old else None
-    new = yield from _single(job.new)
+    new = yield from single(job.new)
     if old and new:
         raise RequestError(
             f"the id {hexadecimal(job.new.node)} is taken: a servo answers as it beside {hexadecimal(job.old.node)}",
@@ -160,25 +160,6 @@ def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
     if new:
         return Place(job.new, rate)
     return Place(job.old, rate) if old else None
-
-
-def _single(node: Node) -> Operation[bool]:
-    """Is one servo there under this id? Raises RequestError when there are two."""
-    yield from settle_format(node)
-    found = yield from survey(node)
-    if found.several:
-        raise _two(node, found)
-    return found.there
-
-
-def _two(node: Node, found: Presence) -> RequestError:
-    signs = f"{found.most} answers to one request" if found.most > 1 else "bus errors whenever it is asked"
-    return RequestError(
-        f"two servos answer as {hexadecimal(node.node)}: {signs}",
-        cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
-        advice="connect one servo at a time, provision it, then the next; nothing was written",
-        node=node.node,
-    )
 
 
 def _ids(job: Job) -> str:

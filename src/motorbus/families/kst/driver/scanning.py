@@ -38,7 +38,9 @@ from motorbus.families.kst.driver.node import Node, checked_ids
 from motorbus.families.kst.driver.presence import glance
 from motorbus.families.kst.wire import SdoReply
 
-BROKEN: Final = "the first frame was broken and nobody answered it: somebody on this bus uses another rate"
+BROKEN: Final = (
+    "the first frame was broken and nobody answered it, so no more were sent: this bus uses another rate"
+)
 PASSES: Final = 2
 """Whoever is silent is asked once more: the first frame after power-up may be missed."""
 
@@ -126,7 +128,7 @@ def at_one_rate(
     errors = dialect.memory.errors if dialect.memory else 0
     there = (yield from _called(dialect, asked, rate)) if broadcast else []
     if careful and not there and dialect.memory and dialect.memory.errors > errors:
-        yield from Report(Skipped(rate, BROKEN))
+        yield from Report(Suspicion(0, rate, BROKEN))
         return []
     total = PASSES * part[1] * len(asked)
     for number in range(PASSES):

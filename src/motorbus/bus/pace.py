@@ -1,0 +1,42 @@
+"""Does this link take its bit time? Then a reply that comes sooner than frames can travel answers an older request.
+
+A link may say so by itself. A CAN adapter says nothing: behind it may be a real bus, or a simulator that answers at
+once. It shows: when so many replies in a row have taken their time, the next one that does not is suspect. It is put
+aside until the deadline; if the true one follows, it was a copy, and if nothing follows, the link has no bit time.
+"""
+
+from __future__ import annotations
+
+SHOWN = 32  # replies in a row, none of them too early
+EARLY = 0.9  # of the least time; clocks differ, and so do bit rates by their tolerance
+
+
+class Pace:
+    """What is known of one link; `certain` where it says itself that it takes bit time."""
+
+    __slots__ = ("certain", "seen")
+
+    def __init__(self, certain: bool) -> None:
+        self.certain = certain
+        self.seen = 0
+
+    @property
+    def refuted(self) -> bool:
+        """A reply was there sooner than it could travel, and it was the true one."""
+        return self.seen < 0
+
+    def refute(self) -> None:
+        """Replies need no time here: none is ever suspect again."""
+        if not self.certain:
+            self.seen = -1
+
+    def suspects(self, took: float, least: float) -> bool:
+        """A reply took so long (s) where `least` is what its bits take: is it one to be put aside?"""
+        early = took < EARLY * least
+        if self.certain or self.refuted:
+            return early and self.certain
+        if early and self.seen < SHOWN:
+            self.refute()
+            return False
+        self.seen += not early
+        return early

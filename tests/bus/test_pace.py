@@ -1,0 +1,37 @@
+"""What a link shows of its bit time: certain, shown by many replies, or refuted by one."""
+
+from __future__ import annotations
+
+from motorbus.bus.pace import EARLY, SHOWN, Pace
+
+LEAST = 0.0005
+
+
+def test_where_it_is_certain_an_early_reply_is_always_suspect() -> None:
+    pace = Pace(certain=True)
+    for _ in range(3):
+        assert pace.suspects(0.8 * EARLY * LEAST, LEAST)
+        assert not pace.suspects(LEAST, LEAST)
+        pace.refute()
+    assert not pace.refuted
+
+
+def test_where_it_is_not_one_early_reply_refutes_it() -> None:
+    pace = Pace(certain=False)
+    for _ in range(SHOWN - 1):
+        assert not pace.suspects(LEAST, LEAST)
+    assert not pace.suspects(0.1 * LEAST, LEAST)
+    assert pace.refuted
+    for _ in range(2 * SHOWN):
+        assert not pace.suspects(LEAST, LEAST)
+    assert not pace.suspects(0.1 * LEAST, LEAST)
+
+
+def test_many_replies_show_it() -> None:
+    pace = Pace(certain=False)
+    for _ in range(SHOWN):
+        assert not pace.suspects(LEAST, LEAST)
+    assert pace.suspects(0.1 * LEAST, LEAST)
+    assert not pace.suspects(EARLY * LEAST, LEAST)
+    pace.refute()
+    assert not pace.suspects(0.1 * LEAST, LEAST)
