@@ -18,7 +18,7 @@ from motorbus.errors import (
     RequestError,
 )
 from motorbus.link.memory import NoisyLine
-from motorbus.session import Address, parse_address, parse_ids
+from motorbus.session import Address, lock_name, parse_address, parse_ids
 
 
 @pytest.mark.parametrize(
@@ -221,3 +221,19 @@ def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.Mo
         monkeypatch.undo()
         with motorbus.open(sim.url) as bus, pytest.raises(NoReply):
             motorbus.feetech.Servo(bus, 9).position()
+
+
+@pytest.mark.parametrize(
+    ("bus", "name"),
+    [
+        ("feetech:/dev/ttyACM0,baud=500000", "/dev/ttyACM0"),
+        ("feetech:socket://10.0.0.7:4000", "socket://10.0.0.7:4000"),
+        ("kst:can://slcan/dev/ttyACM0", "/dev/ttyACM0"),
+        ("kst:can://slcan/dev/ttyACM0@1000000", "/dev/ttyACM0"),
+        ("kst:can://socketcan/can0", "can://socketcan/can0"),
+        ("kst:can://socketcand/localhost/can0", "can://socketcand/localhost:29536/can0"),
+        ("kst:can://virtual/anything", ""),
+    ],
+)
+def test_a_port_is_locked_under_one_name(bus: str, name: str) -> None:
+    assert lock_name(bus, {}) == name

@@ -214,12 +214,19 @@ def _link(opening: Opening) -> Link:
     if opening.port.startswith("sim:"):
         return find(opening.port.removeprefix("sim:"), family.name).link(rate)
     return open_link(
-        opening.port, rate=opening.rate, usual=family.link.rate, kind=family.link.kind, options=opening.options
+        opening.port,
+        rate=opening.rate,
+        usual=family.link.rate,
+        kind=family.link.kind,
+        options=opening.options,
     )
 
 
 def _stop_socket(opening: Opening, link: Link) -> Path | None:
-    return None if opening.port == "sim" or opening.port.startswith("sim:") else socket_path(opening.port)
+    if opening.port == "sim" or opening.port.startswith("sim:"):
+        return None
+    name = lock_name(opening.port)
+    return socket_path(name) if name else None
 
 
 def _echo_test(bus: BusFace) -> Exchange[Any] | None:

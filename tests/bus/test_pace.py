@@ -35,3 +35,19 @@ def test_many_replies_show_it() -> None:
     assert not pace.suspects(EARLY * LEAST, LEAST)
     pace.refute()
     assert not pace.suspects(0.1 * LEAST, LEAST)
+
+
+def test_nothing_behind_two_running_refutes_it_and_behind_one_does_not() -> None:
+    pace = Pace(certain=False)
+    for _ in range(SHOWN):
+        pace.suspects(LEAST, LEAST)
+    assert not pace.nothing_behind()
+    assert not pace.suspects(LEAST, LEAST)
+    assert not pace.nothing_behind(), "one that took its time came in between"
+    assert pace.nothing_behind()
+    assert pace.refuted
+
+
+def test_where_it_is_certain_nothing_refutes_it() -> None:
+    pace = Pace(certain=True)
+    assert not any(pace.nothing_behind() for _ in range(5))

@@ -25,7 +25,7 @@ def test_sixteen_servos_at_50_hz_take_39_percent_for_their_goals(run: Run) -> No
 
 
 def test_a_read_is_242_to_243_bits_in_the_mean(run: Run) -> None:
-    costs = run("budget", BUS, "--ids", "1-127", "--loop", "read", "--json").document["transfers"]
+    costs = run("budget", BUS, "--ids", "1-32", "--loop", "read", "--json").document["transfers"]
     means = [one["bits"]["mean"] for one in costs]
     assert sum(means) / len(means) == pytest.approx(243, abs=1)
 
@@ -57,9 +57,9 @@ def test_a_latency_decides_how_many_must_be_under_way(run: Run) -> None:
     assert document["in_flight"] == pytest.approx(3.3, abs=0.1)
 
 
-def test_what_the_bus_cannot_carry_ends_with_8_and_is_told(run: Run) -> None:
+def test_what_the_bus_cannot_carry_ends_with_1_and_is_told(run: Run) -> None:
     ran = run("budget", BUS, "--ids", "1-16", "--rate", "500")
-    assert ran.code == 8
+    assert ran.code == 1
     assert "the bus cannot carry 500 Hz" in ran.err
     assert "load at 500 Hz" in ran.out
 

@@ -10,6 +10,7 @@ import motorbus
 from motorbus.cli.consent import consent_to_ways, goals_among
 from motorbus.cli.exits import NeedsConsent
 from motorbus.cli.output import Output
+from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import Servo
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
@@ -61,3 +62,15 @@ def test_the_border_is_half_a_turn(arm: Simulation) -> None:
         consent_to_ways([(one, here + 4.0)], Output(), yes=True)
         with pytest.raises(NeedsConsent, match="#1 by 229 degrees"):
             consent_to_ways([(one, here + 4.0)], Output(), yes=False)
+
+
+def test_what_would_be_refused_anyway_is_told_before_anybody_is_asked(arm: Simulation) -> None:
+    def rehearse() -> None:
+        raise LimitExceeded("too far")
+
+    with motorbus.open(arm.url) as bus:
+        one = Servo(bus, 1)
+        here = one.position()
+        with pytest.raises(LimitExceeded):
+            consent_to_ways([(one, here + 4.0)], Output(), yes=False, rehearse=rehearse)
+        consent_to_ways([(one, here + 1.0)], Output(), yes=False, rehearse=rehearse)

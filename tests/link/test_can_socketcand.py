@@ -47,9 +47,8 @@ def test_a_server_of_another_kind(words: tuple[bytes, ...], complaint: str) -> N
 
 def test_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.05)
-    with socket.create_server(("127.0.0.1", 0)) as mute:
-        with pytest.raises(LinkError, match="does not greet"):
-            open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
+    with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(LinkError, match="does not greet"):
+        open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
 
 
 def test_a_rate_that_was_said_cannot_be_checked() -> None:

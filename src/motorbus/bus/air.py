@@ -260,7 +260,11 @@ class Air:
                 continue
             for event in self.receiver.flush():  # all replies are in, so what is held is surplus
                 self._take(event, now)
-            if self.pace is not None and self._is_early(flight, self.pace, now):
+            if (
+                self.pace is not None
+                and flight.last is not flight.put_aside
+                and self._is_early(flight, self.pace, now)
+            ):
                 continue
             if flight.spoiled or flight.surplus:
                 self._lost_try(lane, flight, now)
@@ -282,12 +286,11 @@ class Air:
         return True
 
     def _take_back(self, flight: Flight, pace: Pace) -> None:
-        """Nothing came behind an early reply: where bit time was only presumed, it was the true one after all."""
-        if pace.certain:
-            flight.spoiled = flight.spoiled or "early"
-        else:
-            pace.refute()
+        """Nothing came behind an early reply: ask again, unless there is no bit time and it was the true one."""
+        if pace.nothing_behind() or not (pace.certain or flight.exchange.repeatable):
             flight.take_back()
+        else:
+            flight.spoiled = flight.spoiled or "early"
 
     def _least_time(self, exchange: Exchange[Any]) -> float:
         """The least time in which an answer can be here; a family's air time of frames may count the most bits."""

@@ -2,23 +2,26 @@
 
 A link may say so by itself. A CAN adapter says nothing: behind it may be a real bus, or a simulator that answers at
 once. It shows: when so many replies in a row have taken their time, the next one that does not is suspect. It is put
-aside until the deadline; if the true one follows, it was a copy, and if nothing follows, the link has no bit time.
+aside until the deadline; if the true one follows, it was a copy, and if twice running nothing follows, the link has
+no bit time. (Once, the true one may have been lost.)
 """
 
 from __future__ import annotations
 
 SHOWN = 32  # replies in a row, none of them too early
+MISSED = 2  # replies in a row that were put aside and had none behind them
 EARLY = 0.9  # of the least time; clocks differ, and so do bit rates by their tolerance
 
 
 class Pace:
     """What is known of one link; `certain` where it says itself that it takes bit time."""
 
-    __slots__ = ("certain", "seen")
+    __slots__ = ("certain", "missed", "seen")
 
     def __init__(self, certain: bool) -> None:
         self.certain = certain
         self.seen = 0
+        self.missed = 0
 
     @property
     def refuted(self) -> bool:
@@ -38,5 +41,14 @@ class Pace:
         if early and self.seen < SHOWN:
             self.refute()
             return False
-        self.seen += not early
+        if not early:
+            self.seen += 1
+            self.missed = 0
         return early
+
+    def nothing_behind(self) -> bool:
+        """No reply came behind one that was put aside; True when that shows that it was the true one."""
+        self.missed += 1
+        if self.missed >= MISSED:
+            self.refute()
+        return self.refuted

@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
-from motorbus.cli.target import target
+from motorbus.cli.target import said, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -28,7 +28,7 @@ load is that of a loop which once a cycle sends each device its goal, takes the
 acknowledgement, and reads its position. --latency is what adapter and host
 need for one exchange, --turnaround what a device needs before it answers: they
 do not load the bus, but decide how many exchanges must be under way at once to
-fill it. Ends with exit code 8 when the bus cannot carry the loop.
+fill it. Ends with exit code 1 when the bus cannot carry the loop.
 
 Examples:
 
@@ -81,15 +81,14 @@ def budget(
 
     wanted = target(bus)
     nodes = _nodes(wanted.nodes, ids, wanted.family)
-    said = {name.replace("-", "_"): value for name, value in options.items()}
-    opening = session.prepare(wanted.bus, dict(said))
+    opening = session.prepare(wanted.bus, {**said(options)})
     bitrate = opening.rate or opening.family.link.rate
     times = {"latency": units.parse(latency, "time"), "turnaround": units.parse(turnaround, "time")}
     besides = _reports(opening.family, nodes, units.parse(reports, "time")) if reports else []
     cycle = _cycle(opening.family, nodes, loop)
     found = count(cycle, bitrate, loop_rate=rate, besides=besides, **times)
     _show(wanted.bus, nodes, found, output)
-    return Exit.OK if found.fits() else Exit.UNSAFE
+    return Exit.OK if found.fits() else Exit.FAILURE
 
 
 def _nodes(named: tuple[int, ...], ids: str, family: Family) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from motorbus import families
 from motorbus.cli import frame
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
+from motorbus.cli.target import said
 from motorbus.core.family import Explanation
 from motorbus.errors import RequestError
 from motorbus.link import can_log
@@ -82,12 +83,12 @@ def decode(
 
 
 def _spoken(family: Family, options: Mapping[str, str]) -> Family:
-    said = {name.replace("-", "_"): value for name, value in options.items()}
+    settings = said(options)
     known = {option.name for option in family.link.settings}
-    if unknown := sorted(said.keys() - known):
+    if unknown := sorted(settings.keys() - known):
         there = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(known)) or "none"
         raise RequestError(f"--{unknown[0]}: {family.name} has no such option", expected=there)
-    return family.configured(**said)
+    return family.configured(**settings)
 
 
 def _bytes_or_frames(texts: Sequence[str], family: Family, output: Output) -> Exit:

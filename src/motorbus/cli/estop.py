@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, everyone, opened, target
@@ -80,7 +81,9 @@ def _stop(bus: str, options: dict[str, str], output: Output) -> dict[str, Any]:
     from motorbus.link.lock import PortLock
 
     wanted = target(bus)
-    port = session.parse_address(bus).port
+    port = session.lock_name(wanted.bus, options)
+    if not port:  # a channel of this process's own
+        return _stop_ourselves(wanted, options, output)
     owner = PortLock(port).owner()
     try:
         outcome = _ask(port)
@@ -119,7 +122,9 @@ def _meet(opening: Bus, wanted: Target, output: Output) -> None:
     needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
     if not needs or not all(needs):
         return
-    for node in everyone(wanted.bus, opening, wanted.nodes, output):
+    called = faces.offer(opening.family.name, "ping_everyone")
+    nodes = wanted.nodes or (called(opening) if called else ()) or everyone(wanted.bus, opening, (), output)
+    for node in nodes:
         for exchange in opening.family.stop({node: None}).exchanges:
             with suppress(MotorbusError):  # the stop itself will say who is silent
                 opening.run(exchange)

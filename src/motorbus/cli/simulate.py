@@ -37,8 +37,8 @@ pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, help.
 
-A CAN bus is served by the slcan protocol on --link and --tcp, and may be served
-in several ways at once: what one program sends, the others see.
+A CAN bus is served by the slcan protocol on --link and --tcp, and may be
+served in several ways at once: what one program sends, the others see.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 

@@ -74,8 +74,7 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
     """An open bus, closed at the end; says what the user ought to know about the port."""
     from motorbus import session
 
-    said = {name.replace("-", "_"): value for name, value in options.items()}
-    with session.open(bus, report=None, **said) as found:
+    with session.open(bus, report=None, **said(options)) as found:
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         if LOG.isEnabledFor(logging.DEBUG):
@@ -87,6 +86,11 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
+
+
+def said(options: Mapping[str, str]) -> dict[str, str]:
+    """Options of the bus string as they were said by flags: --id-format is id_format."""
+    return {name.replace("-", "_"): value for name, value in options.items()}
 
 
 class _Told(Subscription[TraceRecord]):

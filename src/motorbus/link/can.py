@@ -87,7 +87,7 @@ class CanLink:
         self.listen_only = self._config.listen_only
         self._tuning = False
         self._lock = PortLock(_lock_name(self._config))
-        if self._config.interface not in NO_WIRE and not (shared and self._config.interface == "socketcan"):
+        if _lock_name(self._config) and not (shared and self._config.interface == "socketcan"):
             self._lock.acquire()
         try:
             self._wire: Wire = self._opened(self.rate, self.listen_only)
@@ -290,7 +290,9 @@ class CanLink:
 
 
 def _lock_name(config: CanConfig) -> str:
-    """One name for one adapter, whatever it was called."""
+    """One name for one adapter, whatever it was called; "" where any number of programs meet."""
+    if config.interface in NO_WIRE:
+        return ""
     if config.interface == "slcan":
         return device_of(config) or str(config.channel)
     if config.interface == "socketcand":

@@ -21,37 +21,48 @@ def ping(id: int) -> Line:
     return Line(packet(id, 1), packet(id, 0))
 
 
+NOBODY = unheard(ping(1))
+WHOLE = (NOBODY, OFF, RESET, ping(3), NOBODY, NOBODY, HEAD)
+
+
 def test_torque_goes_off_and_nobody_else_is_on_the_bus() -> None:
-    played = watch(factory_restore(prepared()), OFF, RESET, ping(3), unheard(ping(1)), unheard(ping(1)), HEAD)
+    played = watch(factory_restore(prepared()), *WHOLE)
     assert played.alone == 1
-    assert played.exchanges[1].effect is Effect.PERSISTENT
-    assert played.exchanges[1].rank is Rank.CONFIGURATION
-    assert played.exchanges[1].timeout is Timeout.STORE
-    assert not played.exchanges[1].repeatable
+    assert played.exchanges[2].effect is Effect.PERSISTENT
+    assert played.exchanges[2].rank is Rank.CONFIGURATION
+    assert played.exchanges[2].timeout is Timeout.STORE
+    assert not played.exchanges[2].repeatable
 
 
 def test_it_is_told_where_it_is_now() -> None:
-    found = play(factory_restore(prepared()), OFF, RESET, ping(3), unheard(ping(1)), unheard(ping(1)), HEAD)
+    found = play(factory_restore(prepared()), *WHOLE)
     assert found.node == 3
     assert found.identity is not None
 
 
 def test_what_was_known_of_it_is_forgotten() -> None:
     node = prepared()
-    play(factory_restore(node), OFF, RESET, ping(3), unheard(ping(1)), unheard(ping(1)), HEAD)
+    play(factory_restore(node), *WHOLE)
     assert node.settings is None
 
 
 def test_without_an_acknowledgement_the_outcome_is_unknown() -> None:
-    lines = (OFF, unheard(RESET), ping(3), unheard(ping(1)), unheard(ping(1)), HEAD)
+    lines = (NOBODY, OFF, unheard(RESET), *WHOLE[3:])
     with pytest.raises(OutcomeUnknown, match="has not acknowledged"):
         play(factory_restore(prepared()), *lines)
 
 
 def test_one_that_does_not_come_back_is_told() -> None:
-    lines = (OFF, RESET, *(unheard(ping(id)) for id in (3, 1, 3, 1)))
+    lines = (NOBODY, OFF, RESET, *(unheard(ping(id)) for id in (3, 1, 3, 1)))
     with pytest.raises(NoReply, match="does not answer after"):
         play(factory_restore(prepared()), *lines)
+
+
+def test_another_servo_with_the_id_as_shipped_is_not_taken_for_it() -> None:
+    found = play(factory_restore(prepared()), ping(1), OFF, RESET, ping(3), HEAD)
+    assert found.node == 3
+    with pytest.raises(NoReply, match="the id of another servo"):
+        play(factory_restore(prepared()), ping(1), OFF, RESET, unheard(ping(3)), unheard(ping(3)))
 
 
 def restored(simulation: Simulation) -> tuple[int, int]:

@@ -11,10 +11,10 @@ from typing import Final
 
 from motorbus.core.family import Found
 from motorbus.core.operation import Alone, Effect, Operation, Pause, Rank, Timeout, Tune
-from motorbus.errors import NoReply, OutcomeUnknown
+from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, acknowledged
-from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.identity import ping, writable
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.scanning import scan
 from motorbus.families.feetech.driver.torque import disable_torque
@@ -39,6 +39,7 @@ def factory_restore(node: Node) -> Operation[Found]:
 
 
 def _restored(node: Node) -> Operation[Found]:
+    others = set((yield from _others(node)))
     yield from disable_torque(node)
     doubt: BaseException | None = None
     try:
@@ -48,12 +49,23 @@ def _restored(node: Node) -> Operation[Found]:
     yield from Pause(DEAF)
     present = yield from Tune(0)
     rates = () if present == BAUD_CODES[0] else (present, BAUD_CODES[0])
-    found = yield from scan(tuple(dict.fromkeys((node.node, _SHIPPED_ID))), rates)
+    found = yield from scan([id for id in dict.fromkeys((node.node, _SHIPPED_ID)) if id not in others], rates)
     if not found:
-        raise _gone(node) from doubt
+        raise _gone(node, others) from doubt
     if doubt is not None and (found[0].node, found[0].rate) == (node.node, present):
         raise _unacknowledged(node, found[0]) from doubt
     return found[0]
+
+
+def _others(node: Node) -> Operation[list[int]]:
+    """Another servo that has the id as shipped: it must not be taken for this one afterwards."""
+    if node.node == _SHIPPED_ID:
+        return []
+    try:
+        there = yield from ping(Node(_SHIPPED_ID))
+    except WireError:
+        there = True
+    return [_SHIPPED_ID] if there else []
 
 
 def _reset(node: Node) -> Operation[None]:
@@ -62,10 +74,11 @@ def _reset(node: Node) -> Operation[None]:
     yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
-def _gone(node: Node) -> NoReply:
+def _gone(node: Node, others: set[int]) -> NoReply:
+    now = "the id of another servo" if others else "another id or rate"
     return NoReply(
         f"node {node.node} does not answer after its factory values were restored",
-        cause="it may have another id or rate now, or take longer to start",
+        cause=f"it may have {now} now, or take longer to start",
         advice="scan all ids at all rates",
         node=node.node,
     )
