@@ -11,7 +11,7 @@ Opening writes nothing to any device: one read is sent, to learn whether the ada
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -143,6 +143,19 @@ def _number(name: str, value: object) -> int:
     return rate
 
 
+def lock_name(address: str, options: Mapping[str, object]) -> str:
+    """What names the port of this bus where it is locked and listens for an emergency stop, however it was written.
+
+    "" for a channel on which any number of programs meet, so that nobody owns it. Raises RequestError.
+    """
+    opening = prepare(address, dict(options))
+    if not opening.port.startswith(ADAPTER):
+        return opening.port
+    from motorbus.link import can
+
+    return can.lock_name(opening.port, opening.options)
+
+
 def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
     """Open a bus, blocking; use it in a `with`.
 
@@ -225,7 +238,7 @@ def _link(opening: Opening) -> Link:
 def _stop_socket(opening: Opening, link: Link) -> Path | None:
     if opening.port == "sim" or opening.port.startswith("sim:"):
         return None
-    name = lock_name(opening.port)
+    name: str = getattr(link, "lock_name", opening.port)
     return socket_path(name) if name else None
 
 

@@ -61,7 +61,7 @@ class CanLink:
     back end's constructor takes. `shared`: takes part beside a host of this machine, as simulated devices on a
     SocketCAN interface do, so that one is not locked. Raises RequestError for an unknown interface or option,
     PortNotFound, PortBusy, or LinkError: for a bit rate that this adapter does not really have, a missing driver, a
-    refusal.
+    refusal. `lock_name` is the name of the adapter by which it is locked and listens for an emergency stop.
     """
 
     paced = False  # adapters say nothing of when a frame was on the wire
@@ -86,8 +86,9 @@ class CanLink:
         self.rate = self._settled_rate(usual)
         self.listen_only = self._config.listen_only
         self._tuning = False
-        self._lock = PortLock(_lock_name(self._config))
-        if _lock_name(self._config) and not (shared and self._config.interface == "socketcan"):
+        self.lock_name = _lock_name(self._config)
+        self._lock = PortLock(self.lock_name or port)
+        if self.lock_name and not (shared and self._config.interface == "socketcan"):
             self._lock.acquire()
         try:
             self._wire: Wire = self._opened(self.rate, self.listen_only)
@@ -287,6 +288,11 @@ class CanLink:
     def close(self) -> None:
         self._wire.close()
         self._lock.release()
+
+
+def lock_name(port: str, options: Mapping[str, object]) -> str:
+    """The `CanLink.lock_name` of a port that need not be open. Raises as `CanLink` does for what is no port."""
+    return _lock_name(configured(python_can(port), port, 0, options))
 
 
 def _lock_name(config: CanConfig) -> str:
