@@ -10,7 +10,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import Target, everyone, opened, target
+from motorbus.cli.target import Target, everyone, opened, said, target
 from motorbus.core.operation import Effect
 from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
@@ -81,7 +81,7 @@ def _stop(bus: str, options: dict[str, str], output: Output) -> dict[str, Any]:
     from motorbus.link.lock import PortLock
 
     wanted = target(bus)
-    port = session.lock_name(wanted.bus, options)
+    port = session.lock_name(wanted.bus, said(options))
     if not port:  # a channel of this process's own
         return _stop_ourselves(wanted, options, output)
     owner = PortLock(port).owner()

@@ -51,7 +51,10 @@ def test_who_is_silent_is_told(servos: Simulation, run: Run) -> None:
     assert (stop["acknowledged"], stop["silent"]) == ([37], [38])
 
 
-def test_a_program_that_moves_is_stopped_from_another_shell(on_slcan: Simulated, run: Run) -> None:
+@pytest.mark.parametrize("named", [True, False])
+def test_a_program_that_moves_is_stopped_from_another_shell(
+    named: bool, on_slcan: Simulated, run: Run
+) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", MOVING, on_slcan.bus],
         stdout=subprocess.PIPE,
@@ -60,7 +63,7 @@ def test_a_program_that_moves_is_stopped_from_another_shell(on_slcan: Simulated,
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline()
-        (stop,) = run("estop", on_slcan.bus, "--json").document["buses"]
+        (stop,) = run("estop", *([on_slcan.bus] if named else []), "--json").document["buses"]
         out, err = process.communicate(timeout=30)
     assert stop["acknowledged"] == [37]
     assert str(process.pid) in stop["by"]
