@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from motorbus.bus.trust import FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
+from motorbus.bus.trust import EQUAL_RUN, FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
 from motorbus.core.operation import Due, Exchange
 from motorbus.families.feetech import FAMILY
+from motorbus.families.kst import FAMILY as KST
+from motorbus.families.kst.wire import encode_upload, upload_due
 from tests.bus.script import position
 
 DUE = Due(1, 1, 8)
@@ -98,3 +100,18 @@ def test_a_silent_node_is_probed_ever_less_often() -> None:
         waits.append(trust.of(1).probe_at - 10.0)
     assert waits == sorted(waits)
     assert waits[-1] == LONGEST_BACK_OFF
+
+
+def test_many_equal_replies_on_can_must_be_vouched_for_by_a_probe() -> None:
+    trust = Trust(KST)
+    due = upload_due(0x25, 0x6002)
+    exchange: Exchange[object] = Exchange(encode_upload(0x25, 0x6002), (due,), lane=0x25)
+    for _ in range(EQUAL_RUN - 1):
+        trust.ask(exchange, 1.0)
+        trust.believe(due, barrier=False)
+        assert not trust.of(0x25).tainted
+    trust.ask(exchange, 1.0)
+    trust.believe(due, barrier=False)
+    assert trust.of(0x25).tainted
+    trust.believe(upload_due(0x25, 0x3000), barrier=True)
+    assert not trust.of(0x25).tainted

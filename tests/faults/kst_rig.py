@@ -179,4 +179,4 @@ class Mischief:
         if name == "kind":
             return frame._replace(data=b"\x60" + data[1:4] + bytes(4))
         code = {"abort": NOT_THERE, "swapped": SWAPPED}[name]
-        return encode_abort_reply(frame.id - 0x580, INDEX, 0, code)
+        return encode_abort_reply(frame.id - 0x580, int.from_bytes(data[1:3], "little"), data[3], code)

@@ -7,7 +7,10 @@ from collections.abc import Callable
 import pytest
 
 from motorbus.bus.pace import SHOWN, Pace
+from motorbus.bus.trust import EQUAL_RUN
+from motorbus.core.operation import Data
 from motorbus.errors import DeviceError
+from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.faults.kst_rig import Mischief, Rig
 
 NODES = (0x25, 0x26, 0x27, 0x28)
@@ -29,7 +32,8 @@ def test_reports_500_times_a_second_on_the_reply_identifier_fail_no_read(
     assert (rig.good, rig.failed, rig.wrong) == (total, 0, 0)
     assert reports >= 500 * (rig.link.now() - 0.01)
     ledger = rig.bus.statistics.of(0x25)
-    assert (ledger.sent, ledger.ok, ledger.retries) == (total, total, 0)
+    assert (ledger.ok, ledger.retries) == (ledger.sent, 0)
+    assert ledger.sent - total == (total - 1) // (EQUAL_RUN - 1), "a run of equal answers ends in a probe"
 
 
 @pytest.mark.timeout(900)
@@ -115,3 +119,26 @@ def test_a_copy_that_an_adapter_hands_over_later_is_the_known_limit(rounds: Call
     print(f"\n{total} reads, {line.count} copies held back by 0.2 ms, {rig.wrong} stale values")
     assert line.count > total / 100
     assert 0 < rig.wrong <= line.count, "a copy is believed once and never shifts the answers behind it"
+
+
+class OneCopy(PerfectLine):
+    """Hands the third answer over twice, the copy when the question after it has long been under way."""
+
+    def __init__(self) -> None:
+        self.answers = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        whole = super().carry(sender, data, at)
+        self.answers += sender is Side.DEVICE
+        if sender is Side.DEVICE and self.answers == 3:
+            whole += super().carry(sender, data, at + 0.0015)
+        return whole
+
+
+def test_answers_that_are_all_one_question_old_are_found_out() -> None:
+    """A servo that thinks for 2 ms leaves room for a copy to be believed, and for every answer behind it to shift."""
+    rig = Rig(line=OneCopy(), turnaround=0.002)
+    for _ in range(2000):
+        rig.read(0x25)
+    assert 2 < rig.wrong <= EQUAL_RUN
+    assert rig.failed == 0

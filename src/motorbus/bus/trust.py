@@ -18,6 +18,7 @@ FORGOTTEN_AFTER = 5.0  # s; no device of any family answers this late, so the me
 LONGEST_BACK_OFF = 1.0  # s between probes of a node that stays silent while a group is read
 OUTSTANDING = 256  # kinds of reply remembered for a node that answers nothing
 GROUP_RUN = 8  # group replies of one length in a row; another length costs a byte for each node
+EQUAL_RUN = 128  # equal replies in a row from a node on CAN, where nothing but a probe shows that they are all one old
 ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding replies
 
 
@@ -27,6 +28,8 @@ class NodeTrust:
     __slots__ = (
         "asked_at",
         "attempt",
+        "equal",
+        "key",
         "lane",
         "length",
         "outstanding",
@@ -42,6 +45,8 @@ class NodeTrust:
         self.lane = 0
         self.length = 0
         self.run = 0
+        self.key: Key = None
+        self.equal = 0
         self.asked_at = 0.0
         self.quiet_until = 0.0
         self.probe_at = 0.0
@@ -55,6 +60,7 @@ class Trust:
 
     def __init__(self, family: Family) -> None:
         self.family = family
+        self.frames = family.link.kind == "frames"
         self.nodes: dict[int, NodeTrust] = {}
 
     def of(self, node: int) -> NodeTrust:
@@ -82,15 +88,25 @@ class Trust:
         trust.quiet_until = now + quiet
 
     def believe(self, due: Due, barrier: bool) -> None:
-        """This reply is accepted. Only a probe (`barrier`) vouches for a node with replies outstanding."""
+        """This reply is accepted. Only a probe (`barrier`) vouches for a node with replies outstanding.
+
+        Nor does a long run of equal replies vouch for itself on CAN, where they have one length only: each might be
+        the answer to the question before. So a run ends in a probe, which no older reply can answer.
+        """
         trust = self.nodes[due.node]
         trust.run = trust.run + 1 if trust.length == due.length else 1
         trust.length = due.length
         if barrier:
             trust.outstanding.clear()
-        if not trust.outstanding:
+        if not trust.outstanding and not (self.frames and self._monotonous(trust, due, barrier)):
             trust.tainted = False
             trust.silent = 0
+
+    def _monotonous(self, trust: NodeTrust, due: Due, barrier: bool) -> bool:
+        """Has this node given the same kind of reply so often that it must be probed?"""
+        trust.equal = trust.equal + 1 if trust.key == due.key and not barrier else 1
+        trust.key = due.key
+        return trust.equal >= EQUAL_RUN
 
     def alike(self, exchange: Exchange[Any]) -> bool:
         """Would the reply due look just like the last one? In a group that is let pass a few times, for its cost."""
