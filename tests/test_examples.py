@@ -13,6 +13,7 @@ ROOT = Path(__file__).parent.parent
 EXPECTED = {
     "one_servo.py": ["STS3215 simulated", "3.142 rad, 7.4 V", "now at 3.44"],
     "async_servos.py": ["1: 3.142 rad", "6: 3.142 rad", "7: no reply"],
+    "can_servo.py": ["simulated", "at 10.9°", "at -0.8°", "at 0.0°"],
     "control_loop.py": ["cycles/s, simulated"],
     "test_of_my_robot.py": ["1 passed"],
 }
