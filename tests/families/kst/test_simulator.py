@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from motorbus.core.operation import CanFrame
+from motorbus.core.switches import options as options_of
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import OPTIONS, KstBus, simulate
-from motorbus.families.kst.simulator.switches import options
+from motorbus.families.kst.simulator.switches import Switches
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.control import obey
 
@@ -36,7 +37,7 @@ def test_a_profile_may_be_said_as_option_or_as_model(profile: str) -> None:
 
 
 def test_every_option_has_a_default_of_its_kind_and_can_be_said_in_text() -> None:
-    assert [option.name for option in OPTIONS] == ["profile", *(one.name for one in options())]
+    assert [option.name for option in OPTIONS] == ["profile", *(one.name for one in options_of(Switches))]
     assert [one.name for one in OPTIONS if not one.help or not isinstance(one.default, one.kind)] == []
     said = {one.name: str(one.default) for one in OPTIONS}
     assert simulate([1], **said).switches == simulate([1]).switches

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
 
 import pytest
 
+from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator.switches import Switches, options
+from motorbus.families.feetech.simulator.switches import Switches
+
+chosen = partial(switched, Switches, "feetech")
 
 
 def test_text_and_values_mean_the_same() -> None:
-    text = Switches.from_options({"factory_restore": "no", "store_time": "0.05", "id_ack": "old"})
-    values = Switches.from_options({"factory_restore": False, "store_time": 0.05, "id_ack": "old"})
+    text = chosen({"factory_restore": "no", "store_time": "0.05", "id_ack": "old"})
+    values = chosen({"factory_restore": False, "store_time": 0.05, "id_ack": "old"})
     assert text == values == Switches(factory_restore=False, store_time=0.05, id_ack="old")
 
 
@@ -29,13 +33,13 @@ def test_text_and_values_mean_the_same() -> None:
 )
 def test_nonsense_is_refused_by_name(name: str, value: str, says: str) -> None:
     with pytest.raises(RequestError) as caught:
-        Switches.from_options({name: value})
+        chosen({name: value})
     assert says in caught.value.summary
 
 
 def test_a_near_miss_is_told() -> None:
     with pytest.raises(RequestError) as caught:
-        Switches.from_options({"broadcast_pong": "collide"})
+        chosen({"broadcast_pong": "collide"})
     assert "broadcast_ping" in caught.value.expected
 
 
@@ -48,7 +52,7 @@ def test_each_has_a_help_text_a_source_and_a_default_among_its_choices(one: obje
 
 
 def test_every_switch_is_an_option_with_its_choices_in_the_help() -> None:
-    found = {option.name: option for option in options()}
+    found = {option.name: option for option in options(Switches)}
     assert set(found) == {one.name for one in fields(Switches)}
     assert found["id_ack"].help.endswith("(new, old)")
     assert found["store_time"].kind is float

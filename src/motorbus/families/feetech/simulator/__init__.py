@@ -10,13 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from motorbus.core.family import Option
+from motorbus.core.switches import options as switches_of
+from motorbus.core.switches import switched
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator.bus import FeetechBus
 from motorbus.families.feetech.simulator.model import MODELS, Model, model
 from motorbus.families.feetech.simulator.servo import Servo
-from motorbus.families.feetech.simulator.switches import Switches, options
+from motorbus.families.feetech.simulator.switches import Switches
 
-OPTIONS = (Option("position", int, 2048, "where the servos stand at first, in raw counts"), *options())
+OPTIONS = (
+    Option("position", int, 2048, "where the servos stand at first, in raw counts"),
+    *switches_of(Switches),
+)
 """What a bus string may say of a simulated FEETECH bus beside ids and model."""
 
 
@@ -28,7 +33,7 @@ def simulate(ids: Iterable[int], model_name: str = "", /, **options: object) -> 
     or no ids.
     """
     position = _position(options.pop("position", None))
-    switches = Switches.from_options(options)
+    switches = switched(Switches, "feetech", options)
     return FeetechBus(ids, model(model_name), position=position, switches=switches)
 
 
@@ -43,4 +48,4 @@ def _position(position: object) -> int | Mapping[int, int] | None:
         ) from None
 
 
-__all__ = ["MODELS", "OPTIONS", "FeetechBus", "Model", "Servo", "Switches", "model", "options", "simulate"]
+__all__ = ["MODELS", "OPTIONS", "FeetechBus", "Model", "Servo", "Switches", "model", "simulate"]

@@ -13,15 +13,17 @@ from collections.abc import Iterable
 from typing import Final
 
 from motorbus.core.family import Option
+from motorbus.core.switches import options as switches_of
+from motorbus.core.switches import switched
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator.bus import KstBus
 from motorbus.families.kst.simulator.servo import Servo
-from motorbus.families.kst.simulator.switches import Switches, options
+from motorbus.families.kst.simulator.switches import Switches
 from motorbus.families.kst.table import PROFILES, Profile
 
 OPTIONS = (
     Option("profile", str, "kst", f"which relative of the protocol they speak ({', '.join(PROFILES)})"),
-    *options(),
+    *switches_of(Switches),
 )
 """What a bus string may say of a simulated KST bus beside ids."""
 SHORTEST: Final = 0.1
@@ -40,7 +42,9 @@ def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBu
         raise RequestError(
             f"model {model} and profile {named} contradict each other", advice="give one of them"
         )
-    switches = Switches.from_options(options)
+    if options.get("id_format") == "auto":  # of a host, which asks either way
+        options["id_format"] = "asked"
+    switches = switched(Switches, "kst", options)
     twins = [_number(word) for word in switches.duplicate.split("+") if word]
     _check_text("firmware", switches.firmware)
     _check_text("software", switches.software)
@@ -77,4 +81,4 @@ def _check_text(name: str, text: str) -> None:
         )
 
 
-__all__ = ["OPTIONS", "KstBus", "Servo", "Switches", "options", "simulate"]
+__all__ = ["OPTIONS", "KstBus", "Servo", "Switches", "simulate"]

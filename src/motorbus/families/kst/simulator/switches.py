@@ -8,29 +8,16 @@ protocol manual; the public drivers are named by what they drive.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import Field, dataclass, field, fields
-from difflib import get_close_matches
-from math import isfinite
-from typing import Any
+from dataclasses import dataclass
 
-from motorbus.core.family import Option
-from motorbus.errors import RequestError
+from motorbus.core.switches import switch
 from motorbus.families.kst.table import DEFAULT_RATE, RATES
 
-_YES = frozenset({"yes", "true", "on", "1"})
-_NO = frozenset({"no", "false", "off", "0"})
 _BYTE = (0, 255)
 _WORD = (-32768, 32767)
 _ANY = (-273.0, 1e9)
 _POSITIVE = (1e-6, 1e9)
 _ASSUMED = "an assumption, no source"
-
-
-def _switch(
-    default: object, help: str, *choices: object, source: str, span: tuple[float, float] = (0.0, 1e9)
-) -> Any:
-    return field(default=default, metadata={"help": help, "choices": choices, "source": source, "span": span})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,13 +29,13 @@ class Switches:
 
     # -- which bus it is --------------------------------------------------------------------------------------
 
-    bit_rate: int = _switch(
+    bit_rate: int = switch(
         DEFAULT_RATE,
         "the rate they are set to, in bit/s",
         *RATES,
         source="manual, defaults: 500k (provisional)",
     )
-    id_format: str = _switch(
+    id_format: str = switch(
         "asked",
         "they take 11-bit and 29-bit identifiers and answer as they were asked, or take one form only",
         "asked",
@@ -56,65 +43,65 @@ class Switches:
         "ext",
         source="manual prints four bytes and says standard frame; four public drivers use 11 bits, one 29",
     )
-    duplicate: str = _switch(
+    duplicate: str = switch(
         "",
         "ids of which there is one servo more, as 0x25 or 0x25+0x26; its key is 1000 + its number on the bus",
         source="two servos as shipped share 0x25",
     )
-    duplicate_delay: float = _switch(
+    duplicate_delay: float = switch(
         0.0,
         "how much later those servos answer, in s; 0: at the same moment, so unequal answers collide",
         source="two devices never think equally long, but arbitration lets late ones begin together",
     )
-    collision: str = _switch(
+    collision: str = switch(
         "errors",
         "unequal answers of one id end in error frames, or go through one by one once a node turns error passive",
         "errors",
         "passive",
         source="ISO 11898: 16 errors of a transmitter make it error passive; what follows differs by controller",
     )
-    turnaround: float = _switch(
+    turnaround: float = switch(
         0.0001, "s from the end of a request to the beginning of its answer", source=_ASSUMED
     )
 
     # -- the SDO server ---------------------------------------------------------------------------------------
 
-    accept_sized: bool = _switch(
+    accept_sized: bool = switch(
         True,
         "writes that state their length (23, 27, 2B, 2F) are taken, or refused with 05040001",
         source="manual shows 22 only; a public XQPOWER tool sends 2F and 23",
     )
-    out_of_range: str = _switch(
+    out_of_range: str = switch(
         "abort",
         "a position beyond the range is refused with 06090031/32, or taken as the nearest allowed",
         "abort",
         "clamp",
         source="both codes are in the manual's list; it does not say when they come",
     )
-    beyond_limits: str = _switch(
+    beyond_limits: str = switch(
         "clamp",
         "a position in the range but beyond the travel limits goes as far as the limit, or is refused",
         "clamp",
         "abort",
         source="not documented",
     )
-    broadcast_read: bool = _switch(
+    broadcast_read: bool = switch(
         True,
         "a read of node 0 is answered by everyone",
         source="a public demo of a newer protocol finds all servos by one broadcast read of 0x3000",
     )
-    broadcast_ack: bool = _switch(True, "a write to node 0 is answered by everyone", source="not documented")
-    pending_id: str = _switch(
+    broadcast_ack: bool = switch(True, "a write to node 0 is answered by everyone", source="not documented")
+    pending_id: str = switch(
         "pending",
         "before the restart 0x3000 reads the id that was written, or the one in force",
         "pending",
         "active",
         source="not documented",
     )
-    bit_rate_readable: bool = _switch(
+    bit_rate_readable: bool = switch(
         False, "the bit-rate code, 0x3001, can be read", source="manual, command 1, shows the write only"
     )
-    abort_mux: str = _switch(
+    abort_mux: str = switch(
         "echo",
         "a refusal repeats index and sub-index, the index with sub-index 0, or 0:0",
         "echo",
@@ -122,34 +109,34 @@ class Switches:
         "zero",
         source="manual, command 9: index as in the request; the sub-index is not mentioned",
     )
-    abort_order: str = _switch(
+    abort_order: str = switch(
         "little",
         "the code of a refusal stands with its low byte first, or with its high byte first",
         "little",
         "big",
         source="CiA 301: low byte first; the manual prints the high word first",
     )
-    status_6002: str = _switch(
+    status_6002: str = switch(
         "position",
         "0x6002 tells the position, or the two status bytes x1 and x2",
         "position",
         "x1x2",
         source="manual, commands 6 and 7: one frame, two meanings",
     )
-    x1: int = _switch(0, "the first status byte", source="manual, command 7: defined as needed", span=_BYTE)
-    x2: int = _switch(0, "the second status byte", source="manual, command 7: defined as needed", span=_BYTE)
-    firmware: str = _switch(
+    x1: int = switch(0, "the first status byte", source="manual, command 7: defined as needed", span=_BYTE)
+    x2: int = switch(0, "the second status byte", source="manual, command 7: defined as needed", span=_BYTE)
+    firmware: str = switch(
         "1.00",
         "the version string of 0x100A; one of more than four characters is told in segments",
         source="manual, command 8: four characters; CiA 301 makes 0x100A a string of any length",
     )
-    software: str = _switch(
+    software: str = switch(
         "1.00", "the version string of 0x100B, where there is one", source="a public demo of a newer protocol"
     )
 
     # -- what is kept -----------------------------------------------------------------------------------------
 
-    save_reply: str = _switch(
+    save_reply: str = switch(
         "none",
         "a save is not answered, acknowledged, or refused (and then nothing is saved)",
         "none",
@@ -157,45 +144,45 @@ class Switches:
         "abort",
         source="manual, command 3: no reply; CiA 301 demands one",
     )
-    flash_time: float = _switch(
+    flash_time: float = switch(
         0.15, "how long a save takes, in s", source="a public flight-controller driver leaves 150 ms"
     )
-    flash_reads: str = _switch(
+    flash_reads: str = switch(
         "lost",
         "reads during a save are lost, or told in bytes of erased flash (FF); writes are lost",
         "lost",
         "transitional",
         source="the same driver: lost, or with transitional values",
     )
-    flash_cut: str = _switch(
+    flash_cut: str = switch(
         "old",
         "a save cut short by a restart has kept nothing, or everything",
         "old",
         "new",
         source="not documented; nothing is the cruel one",
     )
-    position: int = _switch(0, "where they stand at first, in raw counts", source=_ASSUMED, span=_WORD)
-    default_position: int = _switch(
+    position: int = switch(0, "where they stand at first, in raw counts", source=_ASSUMED, span=_WORD)
+    default_position: int = switch(
         0,
         "the target after a restart, in raw counts",
         source="manual, command 5: back to the default value, which it does not tell",
         span=_WORD,
     )
-    after_restart: str = _switch(
+    after_restart: str = switch(
         "stay",
         "after a restart they stand where they stand, or go to the default position",
         "stay",
         "move",
         source="manual, command 5, tells of the value and not of the shaft",
     )
-    reversed_limits: str = _switch(
+    reversed_limits: str = switch(
         "mirror",
         "in the reversed state a travel limit that is written changes the other one too, or does not",
         "mirror",
         "independent",
         source="a public flight-controller driver: changing one also changes the other; how is not told",
     )
-    reverse_rolls_back: bool = _switch(
+    reverse_rolls_back: bool = switch(
         False,
         "the reverse bit is lost at a restart although it was saved",
         source="a public flight-controller driver: a write can fail or roll back",
@@ -203,7 +190,7 @@ class Switches:
 
     # -- what they say unasked ----------------------------------------------------------------------------------
 
-    nmt: str = _switch(
+    nmt: str = switch(
         "profile",
         "which form of start and stop they obey",
         "profile",
@@ -212,7 +199,7 @@ class Switches:
         "standard",
         source="newer KST: identifier = node; XQPOWER: NMT of CiA 301; manual: none",
     )
-    needs_start: str = _switch(
+    needs_start: str = switch(
         "profile",
         "positions are acknowledged and ignored until a start; by the profile that is so for XQPOWER",
         "profile",
@@ -220,7 +207,7 @@ class Switches:
         "no",
         source="remark in a public XQPOWER module",
     )
-    report_form: str = _switch(
+    report_form: str = switch(
         "sdo",
         "positions are reported on 0x580 + id, on 0x180 + id, or on both",
         "sdo",
@@ -228,87 +215,18 @@ class Switches:
         "both",
         source="newer KST: 0x580 + id; XQPOWER: seen on both",
     )
-    reports_ms: float = _switch(
+    reports_ms: float = switch(
         0.0,
         "report from power-up on every so many milliseconds; 0: only when started, as 0x2200 says",
         source="made for tests of reports that collide with answers",
     )
-    voltage: float = _switch(7.4, "their supply in V", source=_ASSUMED)
-    low_voltage: float = _switch(6.0, "the supply in V below which the alarm comes", source=_ASSUMED)
+    voltage: float = switch(7.4, "their supply in V", source=_ASSUMED)
+    low_voltage: float = switch(6.0, "the supply in V below which the alarm comes", source=_ASSUMED)
 
     # -- how they move --------------------------------------------------------------------------------------------
 
-    speed: float = _switch(
+    speed: float = switch(
         7.0, "top speed in rad/s", source=f"{_ASSUMED}; 0.15 s for 60 degrees is usual", span=_POSITIVE
     )
-    acceleration: float = _switch(100.0, "acceleration in rad/s²", source=_ASSUMED, span=_POSITIVE)
-    temperature: float = _switch(25.0, "temperature of the surroundings in °C", source=_ASSUMED, span=_ANY)
-
-    @staticmethod
-    def from_options(options: Mapping[str, object]) -> Switches:
-        """Switches by name, values also as text. Raises RequestError for an unknown name or an impossible value."""
-        known = {one.name: one for one in fields(Switches)}
-        values: dict[str, Any] = {name: _value(name, known, value) for name, value in options.items()}
-        return Switches(**values)
-
-
-def options() -> tuple[Option, ...]:
-    """Every switch as an option that a bus string may carry."""
-    return tuple(Option(one.name, type(one.default), one.default, _help(one)) for one in fields(Switches))
-
-
-def _help(one: Field[Any]) -> str:
-    choices = ", ".join(map(str, one.metadata["choices"]))
-    return f"{one.metadata['help']}{f' ({choices})' if choices else ''}"
-
-
-def _value(name: str, known: Mapping[str, Field[Any]], value: object) -> object:
-    if name not in known:
-        near = get_close_matches(name, known, n=3)
-        raise RequestError(
-            f"a simulated KST bus has no option {name!r}",
-            expected=f"perhaps {', '.join(near)}" if near else "",
-            advice="`motorbus simulate kst --switches` lists them",
-        )
-    default, choices, span = (
-        known[name].default,
-        known[name].metadata["choices"],
-        known[name].metadata["span"],
-    )
-    if isinstance(default, bool):
-        return _truth(name, value)
-    if isinstance(default, int | float):
-        number = _number(name, value, type(default), span)
-        return number if not choices or number in choices else _refuse(name, value, choices)
-    if (
-        name == "id_format" and value == "auto"
-    ):  # a setting of the host by the same name, which asks either way
-        return "asked"
-    text = str(value)
-    return text if not choices or text in choices else _refuse(name, value, choices)
-
-
-def _refuse(name: str, value: object, choices: tuple[object, ...]) -> object:
-    raise RequestError(
-        f"option {name}: {value!r} is not possible", expected=f"one of {', '.join(map(str, choices))}"
-    )
-
-
-def _truth(name: str, value: object) -> bool:
-    word = str(value).lower()
-    if word not in _YES | _NO:
-        raise RequestError(f"option {name}: {value!r} is neither yes nor no", expected="yes or no")
-    return word in _YES
-
-
-def _number(name: str, value: object, kind: type, span: tuple[float, float]) -> float:
-    try:
-        number = int(str(value), 0) if kind is int else float(str(value))
-    except ValueError:
-        number = float("nan")
-    if not (isfinite(number) and span[0] <= number <= span[1]):
-        what = "whole number" if kind is int else "number"
-        raise RequestError(
-            f"option {name}: {value!r} is not possible", expected=f"a {what}, {span[0]:g} to {span[1]:g}"
-        )
-    return number
+    acceleration: float = switch(100.0, "acceleration in rad/s²", source=_ASSUMED, span=_POSITIVE)
+    temperature: float = switch(25.0, "temperature of the surroundings in °C", source=_ASSUMED, span=_ANY)
