@@ -8,7 +8,7 @@ from motorbus.bus.known import FRESH
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import ROUNDS
 from motorbus.core.operation import Operation, Pause, Tune
-from tests.bus.lanes import Lanes, Nodes, can_bus, move, number, read
+from tests.bus.lanes import Lanes, Nodes, can_bus, everyone, move, number, read
 
 
 def stops(bus: Bus) -> list[dict[int, bool]]:
@@ -206,3 +206,11 @@ def test_twice_is_as_good_as_once(seconds: float) -> None:
         wait(bus, seconds)
         assert bus.estop().acknowledged == (1,)
     assert nodes.orders(1) == [100, 100]
+
+
+def test_who_has_answered_everyone_is_known_to_the_stop() -> None:
+    bus, nodes = can_bus(pace=True)
+    answered = sorted(reply.lane for reply in bus.run(everyone()).replies)
+    assert answered
+    assert sorted(bus.estop().acknowledged) == answered
+    assert all(nodes.orders(node) for node in answered)

@@ -31,6 +31,9 @@ def config(port: str, rate: int = 0, **options: object) -> CanConfig:
     [
         ("can://slcan/dev/ttyACM0", "slcan", {"channel": "/dev/ttyACM0"}),
         ("can://slcan//dev/ttyACM0@1000000", "slcan", {"channel": "/dev/ttyACM0@1000000"}),
+        ("can://serial/dev/ttyACM0", "serial", {"channel": "/dev/ttyACM0"}),
+        ("can://robotell/dev/ttyACM0", "robotell", {"channel": "/dev/ttyACM0"}),
+        ("can://seeedstudio/dev/ttyACM0", "seeedstudio", {"channel": "/dev/ttyACM0"}),
         ("can://SLCAN/COM7", "slcan", {"channel": "COM7"}),
         ("can://slcan/socket://127.0.0.1:4000", "slcan", {"channel": "socket://127.0.0.1:4000"}),
         ("can://socketcan/can0", "socketcan", {"channel": "can0"}),
@@ -60,6 +63,30 @@ def test_what_the_user_says_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     assert config("can://").rate == 250_000
     assert config("can://")[1:3] == ("socketcan", "can7")
     assert config("can://virtual/mine", 125_000)[1:4] == ("virtual", "mine", 125_000)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "bitrate = 5\n",
+        "[default]\nbitrate = 1\nbitrate = 2\n",
+        "[default]\nbitrate = %(x)s\n",
+        "[default]\nfoo\n",
+    ],
+)
+def test_a_file_that_is_no_configuration(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str) -> None:
+    file = tmp_path / "can.conf"
+    file.write_text(text)
+    monkeypatch.setattr(can.util, "CONFIG_FILES", [str(file)])
+    with pytest.raises(RequestError, match="cannot use this configuration"):
+        config("can://virtual/a")
+
+
+@pytest.mark.parametrize("text", ["{not", "[1, 2]", "5", '"fd"', "null"])
+def test_a_variable_that_is_no_configuration(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv("CAN_CONFIG", text)
+    with pytest.raises(RequestError, match="cannot use this configuration"):
+        config("can://virtual/a")
 
 
 def test_the_environment_wins_over_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

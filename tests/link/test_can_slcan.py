@@ -7,11 +7,13 @@ from typing import Any
 import can
 import pytest
 
+from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link import can_slcan
 from motorbus.link.adapters import TERMINAL_LATENCY
 from motorbus.link.can_config import configured
-from motorbus.link.can_slcan import command_of, timing
+from motorbus.link.can_slcan import SlcanWire, command_of, timing
+from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
 from tests.link.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
 
@@ -21,6 +23,26 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine under load must not pass for a mute adapter."""
     monkeypatch.setattr(can_slcan, "LISTENING", 10.0)
     monkeypatch.setattr(can_slcan, "PATIENCE", 10.0)
+
+
+class Cramped:
+    """A port that has room for so many bytes, and later for all."""
+
+    def __init__(self, adapter: SlcanAdapter, room: int) -> None:
+        self.frames: list[CanFrame] = []
+        self._adapter = adapter
+        self._room = room
+
+    def fileno(self) -> None:
+        return None
+
+    def read(self) -> bytes:
+        return b""
+
+    def write(self, data: bytes) -> int:
+        data, self._room = data[: self._room], 1000
+        self.frames += self._adapter.feed(data)
+        return len(data)
 
 
 @pytest.mark.parametrize("strict", [False, True])
@@ -64,6 +86,46 @@ def test_a_refusal_that_comes_late_counts(monkeypatch: pytest.MonkeyPatch) -> No
     with on_terminal(adapter) as peer, pytest.raises(LinkError, match="refuses 500000"):
         open_can(peer, 500_000)
     assert not adapter.open
+
+
+def test_a_refusal_that_comes_after_it_was_opened_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As over Bluetooth: the first answers come when somebody reads already. Nothing goes out at a wrong rate then."""
+    monkeypatch.setattr(can_slcan, "LISTENING", 0.0)
+    monkeypatch.setattr(can_slcan, "MUTE", 0.0)
+    adapter = Mute()
+    with on_terminal(adapter) as peer:
+        link = open_can(peer, 500_000)
+        peer.say(b"\r\a\r")
+        with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
+            link.read(link.now() + 30)
+        with pytest.raises(LinkError, match="channel of the adapter is closed"):
+            link.write(PING)
+        link.close()
+    assert peer.heard == []
+
+
+def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
+    """Two of its frames are still to be answered when we come; the refusal of our rate is the one after ours."""
+    adapter = Picky(b"S6")
+    with on_terminal(adapter) as peer:
+        adapter._answer += b"z\rz\r"
+        with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
+            open_can(peer, 500_000)
+    assert adapter.told == [b"C", b"S6"]
+
+
+@pytest.mark.parametrize("sent", range(1, 22))
+def test_a_line_cut_off_by_closing_is_no_frame(sent: int) -> None:
+    """C, which closes the channel, is a hexadecimal digit as well."""
+    adapter = SlcanAdapter()
+    adapter.feed(b"S6\rO\r")
+    wire = SlcanWire("it", Cramped(adapter, sent), lambda: None)
+    wire._is_open = True
+    with pytest.raises(LinkError, match="no more bytes"):
+        wire.write(PING)
+    wire.close()
+    assert not adapter.open
+    assert wire._port.frames == []  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(("options", "command"), [({}, b"O"), ({"listen_only": "yes"}, b"L")])

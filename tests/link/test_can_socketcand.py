@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -49,6 +50,46 @@ def test_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(LinkError, match="does not greet"):
         open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
+
+
+@pytest.mark.parametrize("word", [b"x", b"x" * 4096])
+def test_a_server_that_talks_without_end(monkeypatch: pytest.MonkeyPatch, word: bytes) -> None:
+    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
+    over = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def accept() -> bool:
+            with listener.accept()[0] as connection, contextlib.suppress(OSError):
+                while not over.wait(0.001):
+                    connection.sendall(word)
+            return True
+
+        with serving(listener, accept):
+            url = f"can://socketcand/127.0.0.1:{listener.getsockname()[1]}/can0"
+            with pytest.raises(LinkError, match="does not greet"):
+                open_can(url)
+            over.set()
+
+
+@pytest.mark.parametrize("words", [(), (b"< hi >",), (b"< hi >", b"< ok >")])
+def test_a_server_that_falls_silent_when_it_was_asked_before(
+    monkeypatch: pytest.MonkeyPatch, words: tuple[bytes, ...]
+) -> None:
+    """It has greeted who knocked; python-can would wait for it without end."""
+    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
+    with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as ends:
+        scripts = iter([(b"< hi >", b"< ok >"), words])
+
+        def accept() -> bool:
+            connection = ends.enter_context(listener.accept()[0])
+            for number, word in enumerate(next(scripts)):
+                if number:
+                    connection.recv(256)
+                connection.sendall(word)
+            return True
+
+        with serving(listener, accept), pytest.raises(LinkError, match="cannot be opened: timed out"):
+            open_can(f"can://socketcand/127.0.0.1:{listener.getsockname()[1]}/can0")
 
 
 def test_a_rate_that_was_said_cannot_be_checked() -> None:

@@ -7,7 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.link.can_text import LONGEST, SlcanReader, SocketcandReader, slcan_line, socketcand_element
+from motorbus.link.can_text import (
+    KEPT,
+    LONGEST,
+    SlcanReader,
+    SocketcandReader,
+    slcan_line,
+    socketcand_element,
+)
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from tests.link.can_peer import LONG_PING, PING, remote
@@ -134,6 +141,14 @@ def test_answers_are_no_frames() -> None:
     assert (reader.refused, reader.answers[-2:]) == (1, [False, True])
     reader.forget()
     assert reader.answers == []
+
+
+def test_answers_are_not_kept_for_ever() -> None:
+    """Every frame that is sent brings one."""
+    reader = SlcanReader()
+    reader.feed(b"\r\a" + b"z\r" * 100_000)
+    assert reader.answers[:3] == [True, False, True]
+    assert len(reader.answers) == KEPT
 
 
 def test_a_refusal_in_the_midst_of_a_line_damages_it() -> None:

@@ -348,6 +348,9 @@ class Air:
     def _believe(self, flight: Flight, answer: Answer, now: float) -> None:
         dues = flight.exchange.replies
         if dues is ANY:
+            if flight.exchange.lane == EVERY_LANE:  # who obeyed everyone's order must be stopped, too
+                for node in dict.fromkeys(reply.lane for reply in answer.replies):
+                    self.known.hear(node, None, self.rate)
             return
         for index, due in enumerate(dues):
             if index in flight.got and due.node not in flight.unbelieved:

@@ -104,7 +104,7 @@ class Stopper:
             wanting = self._wanting(wanting, acknowledged)
         with self.turns.lock:
             self.turns.stopped()
-        silent = tuple(node for node in self.turns.known if node not in acknowledged)
+        silent = tuple(node for node in list(self.turns.known) if node not in acknowledged)
         promise = "nothing: the bus only listens" if self.turns.listening else frames.promise
         return StopOutcome(tuple(acknowledged), silent, rounds, promise)
 
@@ -126,7 +126,7 @@ class Stopper:
         self, before: tuple[Exchange[Answer], ...], acknowledged: list[int]
     ) -> tuple[Exchange[Answer], ...]:
         """What the next round sends: the frames for those who have not acknowledged, and those for everyone."""
-        missing = [node for node in self.turns.known if node not in acknowledged]
+        missing = [node for node in list(self.turns.known) if node not in acknowledged]  # others may add some
         if acknowledged and not missing:
             return ()
         try:

@@ -18,7 +18,7 @@ from typing import Any, Final
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link import adapters
-from motorbus.link.can_config import CanConfig, configured
+from motorbus.link.can_config import SERIAL_PORTS, CanConfig, configured
 from motorbus.link.can_port import ASK_AGAIN
 from motorbus.link.can_rates import check_rate, ip_line, kernel_rate
 from motorbus.link.can_refusal import INSTALL, device_of, refused
@@ -299,8 +299,9 @@ def _lock_name(config: CanConfig) -> str:
     """One name for one adapter, whatever it was called; "" where any number of programs meet."""
     if config.interface in NO_WIRE:
         return ""
-    if config.interface == "slcan":
-        return device_of(config) or str(config.channel)
+    if config.interface in SERIAL_PORTS:  # the name by which anything else locks it
+        channel = str(config.channel)
+        return channel if "://" in channel else channel.partition("@")[0]
     if config.interface == "socketcand":
         return (
             f"can://socketcand/{config.settings.get('host')}:{config.settings.get('port')}/{config.channel}"

@@ -21,6 +21,8 @@ SOCKETCAND_PORT: Final = 29536
 TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
 """A bit timing of python-can: clock of the controller (Hz), prescaler, two segments, jump width, samples."""
 EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
+SERIAL_PORTS: Final = ("slcan", "serial", "robotell", "seeedstudio")
+"""Interfaces whose channel is a serial port."""
 _OURS: Final = ("bitrate", "config_context", "listen_only")
 _WORDS: Final[Mapping[str, object]] = {"yes": True, "no": False, "on": True, "off": False}
 _ELSEWHERE: Final = {"self", "channel", "args", "kwargs", "timing", "bitrate", "timeout", "listen_only"}
@@ -51,14 +53,14 @@ class CanConfig(NamedTuple):
 def split_port(port: str) -> tuple[str, dict[str, Any]]:
     """`can://INTERFACE/CHANNEL` -> interface ("" when not said), and what the address says of the rest.
 
-    CHANNEL is everything after the interface. On POSIX an slcan channel that is neither a URL nor a COM port begins
-    with `/`. Raises RequestError.
+    CHANNEL is everything after the interface. On POSIX a serial port that is neither a URL nor a COM port begins with
+    `/`. Raises RequestError.
     """
     interface, _, channel = port.partition("://")[2].partition("/")
     interface = interface.lower()
     if interface == "socketcand" and channel:
         return interface, _server(port, channel)
-    if interface == "slcan" and channel and os.name != "nt" and not _is_named(channel):
+    if interface in SERIAL_PORTS and channel and os.name != "nt" and not _is_named(channel):
         channel = f"/{channel}"
     if channel and not interface:
         raise RequestError(
@@ -132,7 +134,7 @@ def _load(can: Any, port: str, given: dict[str, Any], context: str | None) -> di
         return dict(can.util.load_config(config=given, context=context))
     except can.CanInterfaceNotImplementedError:
         raise _no_interface(can, port, str(given.get("interface", ""))) from None
-    except (ValueError, TypeError, OSError) as error:
+    except Exception as error:  # whatever its readers of INI and JSON raise for nonsense
         raise RequestError(
             f"{port}: python-can cannot use this configuration: {error}",
             advice="see CAN_INTERFACE, CAN_CHANNEL, CAN_BITRATE, CAN_CONFIG and python-can's configuration files",

@@ -11,9 +11,11 @@ import os
 import socket
 import time
 from collections.abc import Callable
+from math import inf
 from typing import Any, Final
 from urllib.parse import urlsplit
 
+from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkError
 from motorbus.link import adapters
 from motorbus.link.can_config import CanConfig
@@ -30,8 +32,11 @@ FAR: Final = 0.1
 PATIENCE: Final = 0.5
 """s that one which answers may take for the rest."""
 MUTE: Final = 0.003
-"""s between commands to one that does not."""
-
+"""s between commands to one that does not; and of silence, after which nothing is under way any more."""
+LATE: Final = 1.0
+"""s in which one that seemed mute may still say that it refuses the bit rate."""
+MOST: Final = 64
+"""Reads in a row of what is dropped; whoever talks without end must not hold anybody up."""
 
 LINE_BITS: Final = 220
 """Bits of a line that carries an 11-bit frame of 8 bytes, on a serial line."""
@@ -51,6 +56,9 @@ class SlcanWire(TextWire):
         self._listening = LISTENING if listening is None else listening
         super().__init__(name, port, self._lines, slcan_line, MEND, self._end(shut))
         self._is_open = False
+        self._told = ""
+        self._place = 0
+        self._late_until = -inf
 
     def configure(self, command: str, rate: int, *, listen_only: bool) -> None:
         """Close the channel, set the rate (bit/s) by this command, open it. Raises LinkError when that is refused.
@@ -61,20 +69,46 @@ class SlcanWire(TextWire):
             self._check()
             self._drain()
             self._lines.forget()
-            self._is_open = False
-            talks = len(self._ask("C", 1)) == 1  # whether it was open is all the same
-            answers = self._ask(command, 2, talks=talks)
-            if talks and answers[1:] == [False]:
-                raise self._refusal(f"the adapter refuses {rate} bit/s ({command})")
-            answers = self._ask("L" if listen_only else "O", 3, talks=talks)
-            if len(answers) == 3 and not answers[1]:  # they came late
-                self._put(b"C\r")
-                raise self._refusal(f"the adapter refuses {rate} bit/s ({command})")
-            if answers[2:] == [False]:
+            self._is_open, self._late_until = False, -inf
+            talks = bool(self._ask("C", 1))  # whether it was open is all the same
+            if talks:
+                self._settle()
+            self._told = f"{rate} bit/s ({command})"
+            self._place = 0 if talks else 1  # the answer to C may still come
+            self._ask(command, self._place + 1, talks=talks)
+            self._check_rate()
+            self._is_open = True  # from here on it has to be closed, whatever comes of this
+            answers = self._ask("L" if listen_only else "O", self._place + 2, talks=talks)
+            self._check_rate()
+            if answers[self._place + 1 :] == [False]:
                 what = "cannot only listen" if listen_only else "refuses to open its channel"
                 raise self._refusal(f"the adapter {what}")
-            self._is_open = True
+            if len(answers) <= self._place:
+                self._late_until = time.monotonic() + LATE
             self._lines.refused = 0  # that it was not open before is no refusal to tell of
+
+    def _check_rate(self) -> None:
+        """It has not said no to its bit rate. Else it is closed, for it would go on at another."""
+        if self._lines.answers[self._place : self._place + 1] == [False]:
+            if self._is_open:
+                self._is_open, self._late_until = False, -inf
+                self._put(b"C\r")
+            raise self._refusal(f"the adapter refuses {self._told}")
+
+    def _arrived(self, until: float) -> list[CanFrame]:
+        frames = super()._arrived(until)
+        heard = len(self._lines.answers) > self._place
+        if self._late_until > -inf and (heard or time.monotonic() > self._late_until):
+            self._check_rate()
+            self._late_until = -inf
+        return frames
+
+    def write(self, frame: CanFrame) -> None:
+        if not self._is_open and not self._closed:
+            raise LinkError(
+                f"{self.name}: the channel of the adapter is closed", cause=f"it refused {self._told}"
+            )
+        super().write(frame)
 
     def _refusal(self, what: str) -> LinkError:
         return LinkError(
@@ -94,15 +128,31 @@ class SlcanWire(TextWire):
             self._drain()
         return list(self._lines.answers)
 
-    def _drain(self) -> None:
-        while data := self._port.read():
+    def _settle(self) -> None:
+        """Let the answers come that are under way to a program before us, which was killed, and forget them."""
+        end = time.monotonic() + PATIENCE
+        quiet = time.monotonic() + MUTE
+        while (left := min(quiet, end) - time.monotonic()) > 0:
+            self._wait(left)
+            if self._drain():
+                quiet = time.monotonic() + MUTE
+        self._lines.forget()
+
+    def _drain(self) -> bool:
+        """Read what has come, for its answers alone. Was there anything?"""
+        for count in range(MOST):
+            data = self._port.read()
+            if not data:
+                return count > 0
             self._lines.feed(data)
+        return True
 
     def _end(self, shut: Callable[[], None]) -> Callable[[], None]:
         def end() -> None:
+            """A line that went out in part must not swallow the last command, nor become a frame by it."""
             with contextlib.suppress(OSError):  # gone already
                 if self._is_open:
-                    self._port.write(b"C\r")
+                    self._port.write((MEND if self._torn else b"") + b"C\r")
             shut()
 
         return end

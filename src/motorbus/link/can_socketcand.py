@@ -1,13 +1,16 @@
 """A socketcand server: asked first whether it is one and has the channel, then opened by python-can.
 
 python-can tries for ten seconds to reach a server that is not there, and waits without end for one that does not
-greet. So somebody knocks first. Source: protocol description of linux-can socketcand.
+greet. So somebody knocks first, and then each of its waits is given an end. Source: protocol description of linux-can
+socketcand.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
+import time
 from typing import Any, Final
 
 from motorbus.errors import LinkError, PortNotFound, RequestError
@@ -20,6 +23,8 @@ from motorbus.link.tcp import CONNECT_TIME, LOOPBACK_LATENCY, NETWORK_LATENCY
 GREETING: Final = b"< hi >"
 ANSWER_TIME: Final = 2.0
 """s in which a server says each of its words."""
+LONGEST: Final = 256
+"""Characters of a word; the longest that is waited for has six."""
 MEND: Final = b" x >"
 """Ends an element that went out in part, so that it is none."""
 _SOCKET: Final = "_SocketCanDaemonBus__socket"
@@ -30,7 +35,15 @@ def open_socketcand(config: CanConfig, back_end: Any) -> tuple[TextWire, float]:
     """Open the channel, and tell its latency (s). Raises PortNotFound, LinkError, or what python-can raises."""
     settings = {"tcp_tune": os.name != "nt", **config.settings}
     knock(config)
-    bus = build(back_end, config.channel, settings)
+
+    class Patient(back_end):  # type: ignore[misc]
+        """python-can's, which waits for each word of the server without end."""
+
+        def _expect_msg(self, msg: str) -> None:
+            getattr(self, _SOCKET).settimeout(ANSWER_TIME)
+            super()._expect_msg(msg)
+
+    bus = build(Patient, config.channel, settings)
     connection: socket.socket = getattr(bus, _SOCKET)
     near = connection.getpeername()[0].startswith("127.")
     port: Port = SocketObject(connection) if os.name == "nt" else Descriptor(connection.fileno())
@@ -59,7 +72,6 @@ def knock(config: CanConfig) -> None:
                 f"{config.name} cannot be reached: {error}",
                 advice="is the server or the simulator running, the port number right?",
             ) from error
-        connection.settimeout(ANSWER_TIME)
         _expect(config, connection, GREETING, "it does not greet as a socketcand server does")
         connection.sendall(f"< open {config.channel} >".encode())
         _expect(config, connection, b"< ok >", f"it does not open the channel {config.channel}")
@@ -67,11 +79,14 @@ def knock(config: CanConfig) -> None:
 
 def _expect(config: CanConfig, connection: socket.socket, word: bytes, complaint: str) -> None:
     heard = b""
-    try:
-        while b">" not in heard and (more := connection.recv(256)):
+    end = time.monotonic() + ANSWER_TIME
+    with contextlib.suppress(OSError):  # it said nothing, or went away
+        while b">" not in heard and len(heard) < LONGEST and (left := end - time.monotonic()) > 0:
+            connection.settimeout(left)
+            more = connection.recv(LONGEST)
+            if not more:
+                break
             heard += more
-    except OSError:
-        pass  # it said nothing, or went away
     if heard != word:
         raise LinkError(
             f"{config.name}: {complaint}",

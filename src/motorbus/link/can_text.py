@@ -14,6 +14,8 @@ from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
 LONGEST: Final = 512
 """Bytes kept of a line or an element that does not end; the longest has fewer than 60."""
+KEPT: Final = 16
+"""Answers kept; a dialogue has three, and after it every frame that is sent brings one."""
 STAMP: Final = 4
 """Hexadecimal digits of a timestamp that an slcan adapter may append."""
 
@@ -46,7 +48,7 @@ class Reader(Protocol):
 class SlcanReader:
     """What an slcan adapter says, as `Reader`.
 
-    `answers` are its answers since the last `forget`, in order: True for yes (CR), False for no (BEL). Timestamps
+    `answers` are its first answers since `forget`, in order: True for yes (CR), False for no (BEL). Timestamps
     are known by their length. So that a damaged length digit does not pass for one, a frame must have the form of
     the frame before; two in a row of the other form make it the usual one.
     """
@@ -83,15 +85,19 @@ class SlcanReader:
 
     def _no(self, line: bytes) -> None:
         self.refused += 1
-        self.answers.append(False)
+        self._answered(False)
         self.damaged += bool(line)
+
+    def _answered(self, yes: bool) -> None:
+        if len(self.answers) < KEPT:
+            self.answers.append(yes)
 
     def _yes(self, line: bytes) -> CanFrame | None:
         frame = _LINE.fullmatch(line)
         if frame is not None:
             return self._frame(frame)
         if _ANSWERS.fullmatch(line):
-            self.answers.append(True)
+            self._answered(True)
         elif line[:1] in _FLEXIBLE:
             self.foreign += 1
         else:

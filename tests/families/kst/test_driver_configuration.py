@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.errors import RequestError, VerificationFailed
+from motorbus.core.operation import CanFrame, Data
+from motorbus.errors import Interrupted, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst import driver
+from motorbus.families.kst.driver.exchanges import order
+from motorbus.families.kst.table import REVERSED
+from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.families.kst.bench import bench, node, play
 
 SAVE = ("605#2210100173617665", None)
 BITS = "605#400F300000000000"
+MID_POINT_DONE = bytes.fromhex("6009300000000000")
+
+
+class Deafening(PerfectLine):
+    """Loses each acknowledgement of a mid point."""
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if isinstance(data, CanFrame) and data.data == MID_POINT_DONE:
+            return []
+        return super().carry(sender, data, at)
 
 
 def test_reports_are_set_and_started_in_the_form_of_the_profile() -> None:
@@ -42,6 +56,47 @@ def test_the_mid_point_is_set_and_saved(profile: str, value: str) -> None:
         assert there.servo().position() == pytest.approx(0.0, abs=0.002)
         there.sim().power_cycle()
         assert there.servo().position() == pytest.approx(0.0, abs=0.002)
+
+
+@pytest.mark.parametrize("verb", ["set_mid_point", "set_reversed"])
+def test_what_gives_positions_another_meaning_is_seen_by_gate_and_stop(verb: str) -> None:
+    with bench(profile="kst-ext") as there:
+        servo = there.servo()
+        there.sim().raw_position = 600
+        servo.position()
+        name, raw = ("mid_point", 0) if verb == "set_mid_point" else ("function_enable", 1 << REVERSED)
+        there.run(order(servo, servo.table[name], raw))
+        there.sent()
+        assert there.estop().acknowledged == (5,)
+        here = there.sim().raw_position
+        assert there.sent()[0] == "605#4002600000000000", "what was read before is no place to hold at"
+        assert there.sim().memory["goal_position"] == here
+        with pytest.raises(Interrupted):
+            servo.set_mid_point() if verb == "set_mid_point" else servo.set_reversed(True)
+        with pytest.raises(Interrupted):
+            servo.set_travel_limits(-0.5, 0.5)
+        assert [frame for frame in there.sent() if "#22" in frame] == []
+
+
+@pytest.mark.parametrize("name", ["mid_point", "function_enable"])
+def test_a_servo_that_sets_off_with_another_zero_is_stopped(name: str) -> None:
+    with bench(profile="kst-ext", old_target="kept") as there:
+        servo = there.servo()
+        servo.move(0.7)
+        there.run(order(servo, servo.table[name], 0 if name == "mid_point" else 1 << REVERSED))
+        there.link.advance(0.1)
+        assert there.sim().status()["moving"] is True
+        assert there.estop().acknowledged == (5,)
+        there.link.advance(1.0)
+        assert there.sim().status()["moving"] is False
+        assert abs(there.sim().raw_position) < 399, "it is not at 40 degrees of the new counting"
+
+
+def test_a_mid_point_is_never_set_twice() -> None:
+    with bench(profile="kst-ext", line=Deafening()) as there:
+        with pytest.raises(OutcomeUnknown):
+            there.servo().set_mid_point()
+        assert [frame for frame in there.sent() if "#2209" in frame] == ["605#2209300000000000"]
 
 
 def test_limits_are_kept() -> None:

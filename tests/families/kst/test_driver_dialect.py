@@ -37,6 +37,20 @@ def test_settings_may_be_text_or_values() -> None:
     assert window("0x10") == window(16) == 16
 
 
+def test_an_alarm_outlives_whoever_asks_before_he_knows_the_time() -> None:
+    with bench() as there:
+        there.sim().voltage = 1.0
+        there.servo().ping()
+        assert there.servo().alarm == (LOW_VOLTAGE,)
+        assert there.servo().telemetry().alarm == (LOW_VOLTAGE,)
+
+
+def test_any_reply_teaches_the_id_format() -> None:
+    memory = Memory()
+    Ear(frozenset({False, True}), memory).feed(CanFrame(0x585, bytes.fromhex("6003600000000000"), True))
+    assert Dialect(id_format="auto", memory=memory).extended(5) is True
+
+
 def test_nothing_is_learnt_without_a_memory() -> None:
     PLAIN.learn_format(5, True)
     PLAIN.learn_sized(5)

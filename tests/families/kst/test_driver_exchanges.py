@@ -22,13 +22,15 @@ def test_a_read_is_one_exchange_that_can_be_kept() -> None:
     assert exchange.repeatable
     assert exchange.tells_position
     assert exchange.replies == (wire.upload_due(5, 0x6002),)
-    for back, raw in (("4b02600084030000", 900), ("4b0260007cfc0000", -900), ("430260008403ffff", 900)):
+    for back, raw in (("4b02600084030000", 900), ("4b0260007cfc0000", -900), ("4302600084030000", 900)):
         assert play(exchange, (READ, back)) == raw
     assert play(exchange, (READ, "4202600001000000")) == 1  # length not stated: the object takes its own
     assert one.at > 100
 
 
-@pytest.mark.parametrize("back", ["4f02600001000000", "4102600008000000"])
+@pytest.mark.parametrize(
+    "back", ["4f02600001000000", "4102600008000000", "4302600000100100", "430260008403ffff"]
+)
 def test_a_value_of_another_size_is_no_value(back: str) -> None:
     one = node()
     with pytest.raises(OtherSize, match="and not in 2"):
@@ -134,6 +136,18 @@ def test_a_text_without_end_is_given_up() -> None:
             (VERSION, START),
             (VERSION, START),
             *endless,
+            ("605#800A100000000008", None),
+        )
+
+
+def test_segments_with_nothing_in_them_do_not_go_on_for_ever() -> None:
+    one = node()
+    with pytest.raises(UnexpectedReply, match="does not end"):
+        play(
+            whole(one, one.table["firmware_version"]),
+            (VERSION, START),
+            (VERSION, START),
+            ("605#6000000000000000", "0e00000000000000"),
             ("605#800A100000000008", None),
         )
 

@@ -19,8 +19,9 @@ from motorbus.core.operation import (
     Timeout,
 )
 from motorbus.errors import DeviceError
-from motorbus.families.kst import FAMILY, wire
+from motorbus.families.kst import FAMILY, broadcast_position, dialect_of, wire
 from motorbus.families.kst.driver import PLAIN, Dialect, Promise, line
+from motorbus.families.kst.simulator import Servo
 from tests.families.kst.bench import abort, bench, node
 
 
@@ -117,9 +118,38 @@ def test_a_servo_that_refuses_to_be_held_is_not_said_to_have_acknowledged() -> N
     with bench(ids=(5, 6)) as there:
         for node_ in (5, 6):
             there.servo(node_).ping()
-        there.sim(6).raw_position = 950  # turned by hand beyond its range, so it refuses to hold there
+        refuse_holds(there.sim(6))
         outcome = there.estop()
         assert (outcome.acknowledged, outcome.silent) == ((5,), (6,))
+
+
+def refuse_holds(servo: Servo) -> None:
+    """Travel limits of a servo whose host does not know that it has any."""
+    object.__setattr__(servo.switches, "beyond_limits", "abort")
+    servo.values["negative_limit"], servo.values["positive_limit"] = 100, 200
+
+
+def test_beyond_the_range_the_end_of_the_range_is_held_before_this_place() -> None:
+    stop = line.stop({5: answer("4b026000b6030000")}, PLAIN)
+    assert [str(one.request) for one in stop.exchanges] == ["605#2203600084030000", "605#22036000B6030000"]
+    with bench() as there:
+        there.sim().raw_position = -950
+        there.servo().move(1.0, wait=False)
+        assert there.estop().acknowledged == (5,)
+        there.link.advance(3.0)
+        assert there.sim().raw_position == -900, "the nearest place at which it lets itself be held"
+
+
+def test_who_speaks_in_a_form_that_nobody_knows_is_stopped_in_both() -> None:
+    with bench(settings={"id_format": "auto"}, id_format="ext", broadcast_ack=False) as there:
+        assert there.run(broadcast_position(1.2, (5,), dialect_of(there.family))) == ()
+        there.sent()
+        outcome = there.estop()
+        assert (outcome.acknowledged, outcome.silent) == ((5,), ())
+        assert {frame.partition("#")[0] for frame in there.sent()} == {"605", "00000605"}
+        assert there.sim().status()["moving"] is True  # it goes back to where it was asked
+        there.link.advance(1.0)
+        assert there.sim().status()["moving"] is False
 
 
 def test_stop_speaks_as_the_bus_does() -> None:

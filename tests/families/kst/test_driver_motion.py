@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
 from motorbus.core import units
 from motorbus.core.operation import Effect, Rank
-from motorbus.errors import DeviceError, LimitExceeded
+from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import driver
 from motorbus.families.kst.driver import Promise, Started
 from tests.families.kst.bench import abort, bench, node, play, watch
@@ -58,6 +59,14 @@ def test_a_servo_without_travel_limits_has_those_of_its_profile() -> None:
         ("605#2203600000000000", ACK),
     )
     assert played.exchanges[-1].goals[0].high == pytest.approx(math.radians(100))
+
+
+@pytest.mark.parametrize(
+    "how", [{"tolerance": 0}, {"tolerance": True}, {"tolerance": "1"}, {"timeout": math.nan}, {"timeout": "5s"}]
+)
+def test_how_long_to_wait_is_a_number(how: Any) -> None:
+    with pytest.raises(RequestError, match="not a finite number above 0"):
+        play(driver.move(node(), 0.1, **how))
 
 
 def test_where_there_is_a_start_rule_the_start_goes_first_and_is_told() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.errors import NoReply
+from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.errors import NoReply, RequestError
 from motorbus.families.kst.driver.presence import Presence, glance, settle_format, survey
+from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.families.kst.bench import abort, bench, node, play
 
 ASK = "605#4000300000000000"
@@ -37,6 +39,25 @@ def test_answers_that_break_each_other_show() -> None:
         there.simulator.servos[1].raw_position = 3
         found = there.run(survey(there.servo()))
         assert (found.most, found.errors, found.several) == (1, True, True)
+
+
+class NoErrors(PerfectLine):
+    """An adapter that tells of no bus errors, as most that speak slcan."""
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if isinstance(data, CanFrame) and data.id & ERROR_FLAG:
+            return []
+        return super().carry(sender, data, at)
+
+
+def test_answers_that_break_each_other_show_where_no_errors_are_told() -> None:
+    with bench(ids=(5, 5), line=NoErrors()) as there:
+        there.simulator.servos[1].raw_position = 3
+        found = there.run(survey(there.servo()))
+        assert (found.most, found.errors, found.torn, found.several) == (1, False, True, True)
+        with pytest.raises(RequestError, match="its id comes every time, its position never"):
+            there.servo().provision(new_id=9)
+        assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}
 
 
 def test_errors_without_any_answer_may_be_the_bit_rate() -> None:

@@ -212,3 +212,87 @@ def test_in_either_id_format() -> None:
     with bench(settings={"id_format": "auto"}, id_format="ext") as there:
         cycling(there)
         assert there.servo().provision(new_id=9).node == 9
+
+
+# --- other servos on the bus ---------------------------------------------------------------------------------
+
+
+def joining(there: Bench, *, restarts: bool) -> None:
+    """Somebody plugs in the second servo when asked for a power cycle, of which the first one may take part."""
+    second = there.simulator.servos[1]
+    second.unplug()
+
+    def on(event: object) -> None:
+        if isinstance(event, PowerCycleNeeded):
+            second.plug()
+            if restarts:
+                there.simulator.servos[0].power_cycle()
+
+    there.on = on
+
+
+def test_another_servo_with_the_new_id_is_not_taken_for_the_one_that_has_not_restarted() -> None:
+    with bench(ids=(5, 9)) as there:
+        joining(there, restarts=False)
+        with pytest.raises(OutcomeUnknown, match="not seen to come back"):
+            there.servo().provision(new_id=9, patience=2.0)
+
+
+@pytest.mark.parametrize("turned", [0, 77])
+def test_two_servos_that_have_the_new_id_after_the_restart_are_told(turned: int) -> None:
+    delay = 0.0 if turned else 0.0003
+    with bench(ids=(5, 9)) as there:
+        joining(there, restarts=True)
+        there.simulator.servos[1].delay = delay
+        there.simulator.servos[1].raw_position = turned
+        with pytest.raises(VerificationFailed, match=r"two servos answer as 0x09 \(9\)"):
+            there.servo().provision(new_id=9)
+
+
+def test_a_servo_that_has_the_old_id_after_the_restart_is_told() -> None:
+    with bench(ids=(5, 5), link=Timed) as there:
+        first, second = there.simulator.servos
+        second.unplug()
+        link = there.link
+        assert isinstance(link, Timed)
+
+        def both() -> None:
+            first.plug()
+            second.plug()
+
+        def on(event: object) -> None:
+            if isinstance(event, PowerCycleNeeded):
+                first.unplug()
+                link.then, link.when = both, link.now() + 1.0
+
+        there.on = on
+        with pytest.raises(OutcomeUnknown, match="which of them") as raised:
+            there.servo().provision(new_id=9)
+        assert "take one of them off the bus" in raised.value.advice
+        second.unplug()
+        assert there.servo().provision(new_id=9) == Provisioned(9, 500_000, "1.00", True)
+
+
+def test_an_id_that_was_written_before_is_not_saved_by_mistake() -> None:
+    with bench() as there:
+        there.servo().set_node_id(7)
+        cycling(there)
+        assert there.servo().provision(new_rate=250_000).node == 5
+        assert there.simulator.servos[0].node == 5
+
+
+def test_a_silence_without_a_restart_is_no_restart() -> None:
+    with bench(link=Timed) as there:
+        servo, link = there.simulator.servos[0], there.link
+        assert isinstance(link, Timed)
+
+        def on(event: object) -> None:
+            if isinstance(event, PowerCycleNeeded):  # a loose cable, and its supply is another one
+                servo.plugged = False
+                link.then, link.when = lambda: setattr(servo, "plugged", True), link.now() + 1.0
+
+        there.on = on
+        with pytest.raises(OutcomeUnknown, match="not seen to come back"):
+            there.servo().provision(new_id=9, patience=3.0)
+        servo.power_cycle()
+        assert there.servo().provision(new_id=9).resumed is True

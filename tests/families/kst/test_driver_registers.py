@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.errors import DeviceError, RequestError
+from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import driver
 from motorbus.families.kst.driver.registers import VERBS
 from motorbus.families.kst.table import TABLES
@@ -58,6 +58,12 @@ def test_a_goal_by_name_passes_the_limits_of_the_servo() -> None:
         with pytest.raises(Exception, match="lies outside"):
             servo.write(goal_position=0.3)
         assert [frame for frame in there.sent() if "0360" in frame] == []
+
+
+@pytest.mark.parametrize("to", [2.0, float("nan"), 10**400])
+def test_a_goal_by_name_outside_the_range_is_refused_as_one_by_move_is(to: float) -> None:
+    with pytest.raises(LimitExceeded, match="goal_position"):
+        play(driver.write(node(), goal_position=to))
 
 
 def test_limits_by_name_are_kept_and_read_back() -> None:

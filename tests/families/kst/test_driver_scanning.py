@@ -9,7 +9,7 @@ from motorbus.core.operation import CanFrame, Data, Progress
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.kst import Skipped, Suspicion
 from motorbus.families.kst.driver import scan
-from motorbus.families.kst.driver.scanning import BROKEN
+from motorbus.families.kst.driver.scanning import BROKEN, OTHER_FORMAT
 from motorbus.families.kst.table import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import bench
@@ -134,3 +134,22 @@ def test_frames_of_the_scan_are_of_eight_bytes() -> None:
         there.run(there.family.scan())
         seen += [record.data for record in watch if record.direction == "tx"]
         assert {len(one.data) for one in seen if isinstance(one, CanFrame)} == {8}
+
+
+@pytest.mark.parametrize(
+    ("spoken", "taken", "broadcast"), [("std", "ext", True), ("std", "ext", False), ("ext", "std", True)]
+)
+@pytest.mark.parametrize("ids", [(), (5, 6)])
+def test_who_answers_in_the_other_id_format_only_is_found_and_told(
+    spoken: str, taken: str, broadcast: bool, ids: tuple[int, ...]
+) -> None:
+    with bench(settings={"id_format": spoken}, id_format=taken, broadcast_read=broadcast) as there:
+        assert there.run(there.family.scan(ids)) == [Found(5, 500_000, None)]
+        assert there.of(Suspicion) == [Suspicion(5, 500_000, OTHER_FORMAT[taken == "ext"])]
+        assert there.run(there.family.scan(ids)) == [Found(5, 500_000, None)], "and again"
+
+
+def test_where_somebody_answers_the_other_id_format_is_not_tried() -> None:
+    with bench() as there:
+        there.run(there.family.scan())
+        assert all(len(frame.partition("#")[0]) == 3 for frame in there.sent())

@@ -47,6 +47,17 @@ def test_a_restart_in_the_middle_of_a_save(cut: str, node: int) -> None:
     assert not values.saving(1.1)
 
 
+@pytest.mark.parametrize(("cut", "node"), [("old", 37), ("new", 38)])
+def test_what_the_supply_leaves_in_the_middle_of_a_save_stays_so(cut: str, node: int) -> None:
+    values = memory()
+    values["node_id"] = 38
+    values.save(1.0, 0.15)
+    values.lose_supply(1.1, cut=cut)
+    assert values.stored("node_id", 9.0) == node
+    values.restart(9.0, cut="old")
+    assert values["node_id"] == node
+
+
 def test_a_save_without_time_is_done_at_once() -> None:
     values = memory()
     values["node_id"] = 38

@@ -30,6 +30,27 @@ def test_an_unplugged_servo_is_silent_and_comes_back_restarted() -> None:
     assert host.say("625#4000300000000000") == ["5A5#4F00300025000000"]
 
 
+@pytest.mark.parametrize(("cut", "node"), [("old", 0x25), ("new", 0x26)])
+def test_a_write_to_flash_ends_with_the_supply_however_long_it_is_away(cut: str, node: int) -> None:
+    host = Host(flash_time=0.15, flash_cut=cut)
+    host.say("625#2200300026000000")
+    host.say(f"625#{SAVE}")
+    host[0x25].unplug()
+    host.wait(1.0)
+    host.bus.servos[0].plug()
+    assert host.bus.servos[0].node == node
+
+
+def test_a_start_during_a_write_to_flash_is_lost() -> None:
+    host = Host(profile="xqpower", flash_time=0.15)
+    host.say(f"625#{SAVE}")
+    host.say(NMT_START)
+    assert host[0x25].started is False
+    host.wait(0.2)
+    host.say(NMT_START)
+    assert host[0x25].started is True
+
+
 def test_plugging_what_is_plugged_does_nothing() -> None:
     host = Host()
     host.say(f"625#{MOVE}")

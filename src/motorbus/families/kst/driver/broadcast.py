@@ -8,6 +8,7 @@ exception: nobody gives all servos one id by mistake.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from motorbus.core.entry import Entry, Value
 from motorbus.core.operation import (
@@ -20,40 +21,49 @@ from motorbus.core.operation import (
     Goal,
     Operation,
     Rank,
+    Report,
     Timeout,
 )
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
+from motorbus.families.kst.driver.exchanges import OtherSize, sized
 from motorbus.families.kst.driver.identity import code_of
-from motorbus.families.kst.driver.motion import counts
+from motorbus.families.kst.driver.motion import Started, counts
 from motorbus.families.kst.driver.node import Node, checked_id, checked_ids
 from motorbus.families.kst.table import SAVE
 
 
 def broadcast_read(name: str, dialect: Dialect = PLAIN) -> Operation[dict[int, Value]]:
-    """An object of everyone, in API units, by node; who refuses it, or is silent, is missing.
+    """An object of everyone, in API units, by node.
 
-    Raises RequestError for an object that is unknown or can only be written.
+    Who refuses it, is silent, says something longer, or says two different things (two servos with one id), is
+    missing. Raises RequestError for an object that is unknown or can only be written.
     """
     row = dialect.profile.table[name]
     if not row.readable:
         raise RequestError(f"{name} can only be written", advice="nothing was sent")
+    return (yield from Alone(_read(row, dialect)))
+
+
+def _read(row: Entry, dialect: Dialect) -> Operation[dict[int, Value]]:
+    """With the bus alone: what a node says to everyone's question looks just like what it says to its own."""
     found: dict[int, Value] = {}
     for extended in sorted(dialect.formats):
         frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
         answer = yield from Exchange[Answer](frame, ANY, lane=EVERY_LANE)
-        found |= _values(row, answer)
+        found |= _values(row, answer, dialect)
     return found
 
 
-def _values(row: Entry, answer: Answer) -> dict[int, Value]:
-    found: dict[int, Value] = {}
+def _values(row: Entry, answer: Answer, dialect: Dialect) -> dict[int, Value]:
+    told: dict[int, set[bytes]] = {}
     for reply in answer.replies:
         one = wire.decode_reply(reply.data)
-        if one is not None and one.kind == "upload" and _about(row, one) and len(one.data) >= row.size:
-            found[reply.lane] = row.to_value(row.decode(one.data[: row.size]))
-    return found
+        if one is not None and one.kind == "upload" and _about(row, one):
+            with suppress(OtherSize):
+                told.setdefault(reply.lane, set()).add(sized(Node(reply.lane, dialect), row, one))
+    return {node: row.to_value(row.decode(data.pop())) for node, data in told.items() if len(data) == 1}
 
 
 def _about(row: Entry, reply: wire.SdoReply) -> bool:
@@ -63,7 +73,8 @@ def _about(row: Entry, reply: wire.SdoReply) -> bool:
 def broadcast_position(
     to: float, nodes: Sequence[int], dialect: Dialect = PLAIN
 ) -> Operation[tuple[int, ...]]:
-    """Send everyone on the bus to `to` rad; returns who acknowledged.
+    """Send everyone on the bus to `to` rad; returns who acknowledged. Where the profile has a start rule, everyone is
+    started first, and `Started` (node 0) tells so.
 
     `nodes` are those that are there, for the gate and the emergency stop; everyone else on the bus moves as well.
     Raises LimitExceeded when `to` is outside the range of the profile, RequestError for no nodes.
@@ -79,6 +90,17 @@ def broadcast_position(
     raw = counts(Node(there[0], dialect), to)
     value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
     goals = tuple(Goal(node, "position", value, low, high) for node in there)
+    return (yield from Alone(_moved(dialect, row, raw, goals)))
+
+
+def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> Operation[tuple[int, ...]]:
+    if dialect.must_start:
+        for extended in sorted(dialect.formats):
+            frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
+            yield from Exchange[Answer](
+                frame, (), lane=EVERY_LANE, rank=Rank.CONTROL, effect=Effect.TORQUE, goals=goals
+            )
+            yield from Report(Started(wire.EVERYONE, frame))
     return (yield from _written(dialect, row, raw, goals))
 
 
@@ -91,7 +113,8 @@ def broadcast_save(dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
 
 def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
     """Give everyone another bit rate (bit/s), in force after a save and a restart; returns who acknowledged."""
-    return (yield from _written(dialect, dialect.profile.table["bit_rate_code"], code_of(rate)))
+    row = dialect.profile.table["bit_rate_code"]
+    return (yield from Alone(_written(dialect, row, code_of(rate))))
 
 
 def broadcast_node_id(
@@ -106,7 +129,7 @@ def broadcast_node_id(
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
-    return (yield from _written(dialect, dialect.profile.table["node_id"], new))
+    return (yield from Alone(_written(dialect, dialect.profile.table["node_id"], new)))
 
 
 def _written(

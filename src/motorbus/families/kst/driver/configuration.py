@@ -52,7 +52,8 @@ def stop_reports(node: Node) -> Operation[None]:
 def set_mid_point(node: Node) -> Operation[float]:
     """Make the present position the zero, and save; returns the position (rad) that it tells afterwards, about 0.
 
-    No source tells what becomes of the old target, which now lies elsewhere: keep clear, and order a target next.
+    No source tells what becomes of the old target, which now lies elsewhere: keep clear, and order a target next. It
+    is refused while a stop is latched, and never repeated in silence: OutcomeUnknown says that it may have been heard.
     """
     row = _row(node, "mid_point", "mid point")
     yield from decided(node)
@@ -105,7 +106,8 @@ def set_reversed(node: Node, on: bool) -> Operation[None]:
     """Reverse its sense of rotation, or not; the other bits of that object, which nobody knows, stay as they are.
 
     Read, changed, written, read back (three tries), saved and read back again. In the reversed state a change of one
-    travel limit changes the other too, and the write may be undone by a restart: read reversed() after one.
+    travel limit changes the other too, and the write may be undone by a restart: read reversed() after one. No source
+    tells what becomes of the old target, so keep clear; it is refused while a stop is latched.
     """
     row = _row(node, "function_enable", "reverse bit")
     yield from decided(node)

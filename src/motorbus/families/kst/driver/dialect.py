@@ -8,9 +8,10 @@ answers, who takes sized writes only, which alarms were heard). The plain family
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Final
 
-from motorbus.core.operation import Data, Event, Notice
+from motorbus.core.operation import CanFrame, Data, Event, Notice, Reply
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.table import PROFILES, Profile
@@ -32,17 +33,24 @@ class Memory:
     `extended`  id format by node: True 29 bits
     `sized`     nodes that take only writes which state their length
     `frames`    frames heard that were no bus errors, and `errors` those that were
+    `strangers` nodes that replied in an id format which is not spoken here
     """
 
     def __init__(self) -> None:
         self.extended: dict[int, bool] = {}
         self.sized: set[int] = set()
+        self.strangers: set[int] = set()
         self.alarms: dict[int, tuple[tuple[str, ...], float | None]] = {}
         self.frames = 0
         self.errors = 0
 
-    def hear(self, event: Event) -> None:
-        """Take note of a frame that came; when it came is known only at the node's next answer."""
+    def hear(self, event: Event, extended: bool = False) -> None:
+        """Take note of a frame that came; when it came is known only at the node's next answer.
+
+        A reply teaches the id format too, so that who answered everyone can be stopped alone.
+        """
+        if isinstance(event, Reply):
+            self.extended.setdefault(event.lane, extended)
         if isinstance(event, Notice) and event.kind == "bus error":
             self.errors += 1
             return
@@ -53,6 +61,8 @@ class Memory:
     def alarm(self, node: int, at: float) -> tuple[str, ...]:
         """The alarms of this node that were heard lately, `at` being now."""
         names, since = self.alarms.get(node, ((), None))
+        if at == -inf:  # whoever asks has not heard the node yet, so he does not know the time
+            return names
         if since is None and names:
             self.alarms[node] = (names, at)
         elif since is not None and at - since > ALARM_HELD:
@@ -139,18 +149,27 @@ class Ear:
 
     def __init__(self, formats: frozenset[bool], memory: Memory) -> None:
         self._receiver = wire.FrameReceiver(formats)
+        self._formats = formats
         self._memory = memory
 
     def feed(self, data: Data, /) -> list[Event]:
         """Take one frame; give what it is."""
         events = self._receiver.feed(data)
+        if isinstance(data, CanFrame) and data.extended not in self._formats:
+            self._memory.strangers.update(_replier(data))
         for event in events:
-            self._memory.hear(event)
+            self._memory.hear(event, isinstance(data, CanFrame) and data.extended)
         return events
 
     def flush(self) -> list[Event]:
         """Nothing is held back."""
         return self._receiver.flush()
+
+
+def _replier(frame: CanFrame) -> tuple[int, ...]:
+    """Whose reply this is by its identifier and length; () when it is none."""
+    node = frame.id - wire.REPLY
+    return (node,) if node in wire.NODES and len(frame.data) == wire.LENGTH else ()
 
 
 def alarm_names(data: bytes) -> tuple[str, ...]:

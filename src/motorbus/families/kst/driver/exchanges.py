@@ -35,6 +35,11 @@ NODE_ID: Final = 0x3000
 POSITION: Final = 0x6002
 GOAL: Final = 0x6003
 STORE: Final = 0x1010
+MID_POINT: Final = 0x3009
+UNSETTLING: Final = frozenset((MID_POINT, 0x300A, 0x300B, 0x300F))
+"""Mid point, travel limits and function bits: a servo that holds its old target may set off when one is written (no
+source tells), and positions read before a mid point or a reversal mean another place. So the gate, the latch and the
+stop take such a write for a switch of the torque."""
 UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x0607_0013))
 """Refusals that may mean "state the length"."""
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
@@ -88,9 +93,15 @@ def upload_row(
 
 
 def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:
-    """The bytes of this row in a reply. Raises OtherSize when it has fewer, or announces segments."""
-    if reply.kind == "upload" and len(reply.data) >= row.size:
-        return reply.data[: row.size]
+    """The bytes of this row in a reply. Raises OtherSize when it has fewer, announces segments, or says more.
+
+    Bytes beyond the row say nothing where the reply does not state its length, and where they fill up with zeros or
+    the sign; anything else is a longer number, of which these would be a wrong part.
+    """
+    own, more = reply.data[: row.size], reply.data[row.size :]
+    filled = reply.size is None or more.strip(b"\0") == b"" or (own[-1] > 0x7F and more.strip(b"\xff") == b"")
+    if reply.kind == "upload" and len(own) == row.size and filled:
+        return own
     came = f"{reply.size} bytes in segments" if reply.kind == "upload-start" else f"{len(reply.data)} bytes"
     raise OtherSize(
         f"node {node.node} tells {row.name} in {came}, and not in {row.size}",
@@ -111,7 +122,10 @@ def download(
     goals: tuple[Goal, ...] = (),
     rank: Rank = Rank.CONTROL,
 ) -> Exchange[None]:
-    """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more."""
+    """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more.
+
+    A mid point is not written again in silence: the servo may stand elsewhere by then.
+    """
     index, subindex = row.address, row.subindex or 0
 
     def read(answer: Answer) -> None:
@@ -130,9 +144,9 @@ def download(
         read,
         lane=node.node,
         rank=rank,
-        effect=row.effect,
+        effect=Effect.TORQUE if index in UNSETTLING else row.effect,
         goals=goals,
-        repeatable=True,
+        repeatable=index != MID_POINT,
     )
 
 
@@ -279,10 +293,11 @@ def _segments(node: Node, row: Entry) -> Operation[bytes]:
         segment = yield from _segment(node, toggle)
         data += segment.data
         toggle, last = 1 - toggle, segment.last
-        if len(data) > LONGEST:
+        if len(data) > LONGEST or not (segment.data or last):
             yield from _give_up(node, row)
             raise UnexpectedReply(
-                f"node {node.node} tells {row.name} in more than {LONGEST} bytes and does not end",
+                f"node {node.node} tells {row.name} and does not end: {len(data)} bytes so far",
+                expected=f"{LONGEST} bytes at most, and some in each segment",
                 received=data[:32],
                 node=node.node,
             )

@@ -100,25 +100,42 @@ def probe(node: Node, attempt: int) -> Exchange[bool]:
 
 
 def stop(nodes: Mapping[int, Answer | None], dialect: Dialect) -> Stop:
-    """Each node whose position is known holds there; each other one is asked for it, and can be held then."""
-    exchanges = tuple(_hold_or_ask(Node(node, dialect), nodes[node]) for node in sorted(nodes))
-    return Stop(exchanges, Promise.HOLD_REQUESTED.value)
+    """Each node whose position is known holds there; each other one is asked for it, and can be held then.
+
+    A node of which nobody knows the id format is addressed in both.
+    """
+    exchanges: list[Exchange[Answer]] = []
+    for node in (Node(number, dialect) for number in sorted(nodes)):
+        here = _told(nodes[node.node])
+        undecided = dialect.undecided(node.node)
+        for extended in (False, True) if undecided else (dialect.extended(node.node),):
+            wanted = (_ask(node, extended),) if here is None else _holds(node, here, extended)
+            exchanges += wanted
+    return Stop(tuple(exchanges), Promise.HOLD_REQUESTED.value)
 
 
-def _hold_or_ask(node: Node, answer: Answer | None) -> Exchange[Answer]:
-    here = _told(answer)
-    extended = node.dialect.extended(node.node)
-    if here is None:
-        return Exchange(
-            wire.encode_upload(node.node, POSITION, extended=extended),
-            (wire.upload_due(node.node, POSITION),),
-            _unrefused(node, POSITION),
-            lane=node.node,
-            rank=Rank.STOP,
-            repeatable=True,
-            tells_position=True,
-        )
+def _ask(node: Node, extended: bool) -> Exchange[Answer]:
+    return Exchange(
+        wire.encode_upload(node.node, POSITION, extended=extended),
+        (wire.upload_due(node.node, POSITION),),
+        _unrefused(node, POSITION),
+        lane=node.node,
+        rank=Rank.STOP,
+        repeatable=True,
+        tells_position=True,
+    )
+
+
+def _holds(node: Node, here: bytes, extended: bool) -> tuple[Exchange[Answer], ...]:
+    """Hold here. Beyond the range, where that may be refused, the end of the range is ordered first."""
+    raw = int.from_bytes(here, "little", signed=True)
+    end = max(-node.profile.limit, min(raw, node.profile.limit))
+    return tuple(_hold(node, place, extended) for place in dict.fromkeys((end, raw)))
+
+
+def _hold(node: Node, raw: int, extended: bool) -> Exchange[Answer]:
     states_length = node.dialect.states_length(node.node)
+    here = raw.to_bytes(2, "little", signed=True)
     return Exchange(
         wire.encode_download(node.node, GOAL, 0, here, sized=states_length, extended=extended),
         (wire.download_due(node.node, GOAL),),

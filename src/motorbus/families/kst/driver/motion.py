@@ -165,9 +165,10 @@ def counts(node: Node, to: float) -> int:
 
 def _checked_waiting(node: Node, tolerance: float, timeout: float | None) -> None:
     for value in (tolerance, timeout):
-        if value is not None and not 0 < value < float("inf"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if value is not None and not (number and 0 < value < float("inf")):
             raise RequestError(
-                f"node {node.node}: {value} is not a finite number above 0",
+                f"node {node.node}: {value!r} is not a finite number above 0",
                 advice="tolerance in rad, timeout in s; nothing was sent",
                 node=node.node,
             )

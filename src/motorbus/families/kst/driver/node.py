@@ -59,9 +59,14 @@ class Node:
                 advice="give a number; nothing was sent",
                 node=self.node,
             )
-        if row.unit == "rad":
-            return to_raw(self.profile, value, row.name)
-        return row.to_raw(value)
+        try:
+            return to_raw(self.profile, value, row.name) if row.unit == "rad" else row.to_raw(value)
+        except OverflowError:
+            raise RequestError(
+                f"{row.name}: this number is far out of range",
+                advice="give an angle inside the range; nothing was sent",
+                node=self.node,
+            ) from None
 
 
 def checked_id(node: int) -> int:

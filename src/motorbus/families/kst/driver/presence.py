@@ -2,7 +2,8 @@
 
 Two servos with one id answer in one of two ways. Not quite together, and two answers come; or in the same moment,
 and then equal answers merge into one frame and unequal ones break each other. So they are asked several things that
-two servos seldom agree upon, again and again, and bus errors meanwhile count as a second one.
+two servos seldom agree upon, again and again, and bus errors meanwhile count as a second one. Most slcan adapters
+tell of no bus errors: there, a position that never comes from somebody who always tells his id counts as one.
 """
 
 from __future__ import annotations
@@ -36,12 +37,16 @@ WATCH: Final = 0.5
 
 
 class Presence(NamedTuple):
-    """What came of asking: when (s), the most answers to one request, the id read back, bus errors meanwhile."""
+    """What came of asking: when (s), the most answers to one request, the id read back, bus errors meanwhile.
+
+    `torn`: the id came every time and the position never, as when two answers that differ break each other.
+    """
 
     at: float
     most: int
     reads_back: int | None = None
     errors: bool = False
+    torn: bool = False
 
     @property
     def there(self) -> bool:
@@ -51,7 +56,7 @@ class Presence(NamedTuple):
     @property
     def several(self) -> bool:
         """More than one answered, or some of the answers broke; where all broke, it may be the bit rate."""
-        return self.most > 1 or (self.errors and self.there)
+        return self.most > 1 or self.torn or (self.errors and self.there)
 
 
 def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
@@ -77,11 +82,14 @@ def survey(node: Node) -> Operation[Presence]:
 
 def _asked(node: Node) -> Operation[Presence]:
     most, reads_back = 0, None
+    answered = dict.fromkeys(QUESTIONS, 0)
     for index in QUESTIONS * ROUNDS:
         look = yield from glance(node, index)
         most = max(most, look.most)
+        answered[index] += look.there
         reads_back = look.reads_back or reads_back
-    return Presence(look.at, most, reads_back)
+    torn = answered[NODE_ID] == ROUNDS and not answered[POSITION]
+    return Presence(look.at, most, reads_back, torn=torn)
 
 
 def settle_format(node: Node) -> Operation[None]:
@@ -122,7 +130,11 @@ def single(node: Node) -> Operation[bool]:
 
 
 def _two(node: Node, found: Presence) -> RequestError:
-    signs = f"{found.most} answers to one request" if found.most > 1 else "bus errors whenever it is asked"
+    signs = (
+        "bus errors whenever it is asked" if found.errors else "its id comes every time, its position never"
+    )
+    if found.most > 1:
+        signs = f"{found.most} answers to one request"
     return RequestError(
         f"two servos answer as {hexadecimal(node.node)}: {signs}",
         cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",

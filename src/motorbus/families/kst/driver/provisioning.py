@@ -26,7 +26,7 @@ from motorbus.families.kst.driver.exchanges import order
 from motorbus.families.kst.driver.identity import code_of, identify, write_node_id
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
-from motorbus.families.kst.driver.presence import Presence, glance, glance_at, single
+from motorbus.families.kst.driver.presence import Presence, glance, glance_at, single, survey
 
 PATIENCE: Final = 120.0
 """s to wait for the power cycle."""
@@ -85,8 +85,8 @@ def provision(
     point. Whoever names a new rate says that this bus may be spoken to at it; it is listened to first.
 
     Raises RequestError (nothing was written) for an impossible id or rate, an id that is taken, or two servos with one
-    id; NoReply when it is nowhere; VerificationFailed when it comes back as it was; OutcomeUnknown when it does not
-    come back in time.
+    id; NoReply when it is nowhere; VerificationFailed when it comes back as it was, or beside another servo with its
+    new id; OutcomeUnknown when it does not come back in time, or somebody answers under the old id and the new one.
     """
     if new_id is None and new_rate is None:
         raise RequestError(
@@ -98,12 +98,11 @@ def provision(
     rate = yield from Tune(0)
     job = Job(node, new, rate, rate if new_rate is None else new_rate)
     place = yield from Alone(afterwards(_changed(job), lambda: iter(Tune(rate))))
-    resumed = place is None
     if place is not None:
         yield from Report(PowerCycleNeeded(node.node, new.node, job.new_rate))
         yield from _waited(job, place, patience)
     yield from Report(Progress(STEPS - 1, STEPS, "it is back: verifying"))
-    return (yield from Alone(afterwards(_verified(job, resumed), lambda: iter(Tune(rate)))))
+    return (yield from Alone(afterwards(_verified(job, place), lambda: iter(Tune(rate)))))
 
 
 # --- find out where things stand, and write what is missing -------------------------------------------------
@@ -113,12 +112,13 @@ def _changed(job: Job) -> Operation[Place | None]:
     """Write and save; returns where it was found. None when it has everything already, and nothing was written."""
     yield from Report(Progress(0, STEPS, "looking who is there"))
     where = yield from _found(job)
+    before = yield from glance(where.node)
     if (where.node.node, where.rate) == (job.new.node, job.new_rate):
         return None
     dialect = job.new.dialect
     dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
     yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
-    if where.node.node != job.new.node:
+    if where.node.node != job.new.node or before.reads_back not in (None, job.new.node):
         yield from write_node_id(where.node, job.new.node)
     if where.rate != job.new_rate:
         row = where.node.table["bit_rate_code"]
@@ -177,12 +177,13 @@ def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
     while True:
         now = yield from _seen(job, place.node, place.rate)
         begun = now.at if begun is None else begun
-        came_back = silent >= GONE and now.there
+        came_back = silent >= GONE and now.there and not _pending(job, place, now)
         silent = 0 if now.there else silent + 1
-        if (yield from _arrived(job, place, now)):
+        arrived = yield from _arrived(job, place, now)
+        if arrived and not now.there:
             return
         if now.there and (came_back or _forgot(job, place, now)):
-            raise _as_it_was(job, place)
+            raise _both(job, place) if arrived else _as_it_was(job, place)
         if now.at - begun > patience:
             raise _never_came(job, patience)
         yield from Pause(POLL)
@@ -207,14 +208,23 @@ def _tuned(node: Node, rate: int) -> Operation[Presence]:
     return (yield from glance(node))
 
 
+def _pending(job: Job, place: Place, now: Presence) -> bool:
+    """It answers as before and reads back the id to come: it was silent for a while, and has not restarted."""
+    return now.reads_back == job.new.node != place.node.node
+
+
 def _forgot(job: Job, place: Place, now: Presence) -> bool:
     """It read back the id to come, and reads back the old one now: it has restarted without it."""
     return place.reads_back == job.new.node != place.node.node and now.reads_back == place.node.node
 
 
-def _verified(job: Job, resumed: bool) -> Operation[Provisioned]:
+def _verified(job: Job, place: Place | None) -> Operation[Provisioned]:
     if job.moves_rate:
         yield from Tune(job.new_rate)
+    if place is not None and (yield from _still_there(job, place)):
+        raise _both(job, place)
+    if (yield from survey(job.new)).several:
+        raise _shared(job)
     identity = yield from identify(job.new)
     found = identity.details["reads_back_id"]
     if found not in (None, job.new.node):
@@ -222,11 +232,39 @@ def _verified(job: Job, resumed: bool) -> Operation[Provisioned]:
             f"it answers as {hexadecimal(job.new.node)} and reads back the id {found}",
             expected=str(job.new.node),
             cause="another id was written to it since, which the next restart may bring into force",
-            advice="provision it again",
+            advice=f"set_node_id({job.new.node}) and save() put that right; then power-cycle it, and call this again",
             node=job.new.node,
         )
     yield from Report(Progress(STEPS, STEPS, "verified after the restart"))
-    return Provisioned(job.new.node, job.new_rate, identity.firmware, resumed)
+    return Provisioned(job.new.node, job.new_rate, identity.firmware, resumed=place is None)
+
+
+def _still_there(job: Job, place: Place) -> Operation[bool]:
+    """Does somebody answer under the id that it is to have no more? A single look before may have been lost."""
+    if place.rate != job.new_rate or place.node.node == job.new.node:
+        return False
+    return (yield from glance(place.node)).there
+
+
+def _both(job: Job, place: Place) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"{hexadecimal(job.new.node)} answers, and {hexadecimal(place.node.node)} does too: which of them is the servo "
+        "that was provisioned is not known",
+        expected=f"{hexadecimal(job.new.node)} alone",
+        cause="another servo has joined the bus meanwhile, or this one has not restarted",
+        advice="take one of them off the bus, then call provision again: it finds out where things stand",
+        node=job.new.node,
+    )
+
+
+def _shared(job: Job) -> VerificationFailed:
+    return VerificationFailed(
+        f"two servos answer as {hexadecimal(job.new.node)} after the restart, or the bus is disturbed",
+        expected="one servo",
+        cause="a servo that had this id already was silent when it was looked for, and has joined the bus since",
+        advice="take one of them off the bus, then provision the other one to a free id",
+        node=job.new.node,
+    )
 
 
 def _as_it_was(job: Job, place: Place) -> VerificationFailed:

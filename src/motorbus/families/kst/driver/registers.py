@@ -14,7 +14,7 @@ from motorbus.core.operation import Effect, Operation
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.kst.driver.exchanges import ABSENT, OtherSize, meant, order, ready, upload_row
 from motorbus.families.kst.driver.keeping import keep
-from motorbus.families.kst.driver.motion import goal_of, send_goal
+from motorbus.families.kst.driver.motion import counts, goal_of, send_goal
 from motorbus.families.kst.driver.node import Node
 
 VERBS: Final[Mapping[str, str]] = {
@@ -95,6 +95,6 @@ def _checked(node: Node, row: Entry, value: Value) -> int:
         raise RequestError(
             f"{row.name} is not written by name: {refusal}", advice="nothing was sent", node=node.node
         )
-    raw = node.raw(row, value)
+    raw = counts(node, value) if row.effect is Effect.MOTION else node.raw(row, value)
     row.encode(raw)  # raises when it is out of range
     return raw

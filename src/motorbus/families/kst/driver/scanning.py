@@ -1,8 +1,9 @@
 """Looking for servos: one broadcast read that all answer, then the silent ids one by one, many in flight at once.
 
 Looking reads one object that every make has, the node id, and never writes: the goal position of these servos is the
-preset of some encoders. A refusal counts as presence, too. What does not fit (two answers to one request, another id
-than the one that answers, bus errors) is told as a `Suspicion`.
+preset of some encoders. A refusal counts as presence, too. Where nobody answers in the id format that is spoken, 11
+bits by the manual, the other one is tried, for the manual prints identifiers in a way that may mean either. What does
+not fit (two answers to one request, another id than the one that answers, bus errors) is told as a `Suspicion`.
 Source: a public demo driver for the broadcast; the rest is CiA 301.
 """
 
@@ -41,6 +42,10 @@ from motorbus.families.kst.wire import SdoReply
 BROKEN: Final = (
     "the first frame was broken and nobody answered it, so no more were sent: this bus uses another rate"
 )
+OTHER_FORMAT: Final = {
+    True: "answers in identifiers of 29 bits, which this bus does not speak: open it with id_format=ext",
+    False: "answers in identifiers of 11 bits, which this bus does not speak: open it with id_format=std",
+}
 PASSES: Final = 2
 """Whoever is silent is asked once more: the first frame after power-up may be missed."""
 
@@ -140,9 +145,36 @@ def at_one_rate(
             yield from Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
     if dialect.memory and dialect.memory.errors > errors:
         yield from Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
+    if not there and not careful:
+        return (yield from _strangers(dialect, asked, rate, broadcast=broadcast))
     if not broadcast:
         yield from _counted(dialect, sorted(there), rate)
     return (yield from _identified(dialect, sorted(there), rate))
+
+
+def _strangers(
+    dialect: Dialect, asked: Sequence[int], rate: int, *, broadcast: bool
+) -> Operation[list[Found]]:
+    """Who of these answers in the id format that is not spoken here. Told, and not asked more: that takes a new bus."""
+    if dialect.memory is None or len(dialect.formats) > 1:
+        return []
+    extended = True not in dialect.formats
+    heard_of = dialect.memory.strangers
+    heard_of.clear()
+    if broadcast:
+        yield from called(extended)
+    for batch in _batches([] if heard_of else asked):
+        yield from Together([outcome(_in_vain(Node(node, dialect), extended)) for node in batch])
+    found = [Found(node, rate, None) for node in asked if node in heard_of]
+    for one in found:
+        yield from Report(one)
+        yield from Report(Suspicion(one.node, rate, OTHER_FORMAT[extended]))
+    return found
+
+
+def _in_vain(node: Node, extended: bool) -> Operation[object]:
+    """Its answer does not count as one here, and is noted on its way."""
+    return (yield from _present(node, extended))
 
 
 def _errors(count: int) -> str:

@@ -69,12 +69,16 @@ class Memory:
         self._settle(at)
         return all(self._live[name] == raw for name, raw in self._stored.items())
 
-    def restart(self, at: float, *, cut: str) -> None:
-        """Begin anew with what was stored. A save under way has kept nothing ("old") or everything ("new")."""
+    def lose_supply(self, at: float, *, cut: str) -> None:
+        """From here on nothing is written. A save under way has kept nothing ("old") or everything ("new")."""
         self._settle(at)
         if self._picture is not None and cut == "new":
             self._stored = self._picture
         self._picture = None
+
+    def restart(self, at: float, *, cut: str) -> None:
+        """Lose the supply, and begin anew with what was stored."""
+        self.lose_supply(at, cut=cut)
         self._live = self._factory | self._stored
 
     def _settle(self, at: float) -> None:

@@ -148,8 +148,16 @@ def _set_middle(servo: Servo, raw: int, at: float) -> int:
     servo.shaft.make_middle(at)
     servo.values["mid_point"] = raw
     servo.values["zero"] = servo.shaft.zero
-    servo.values["goal_position"] = 0
+    _retarget(servo, at)
     return 0
+
+
+def _retarget(servo: Servo, at: float) -> None:
+    """Positions have another meaning now: what becomes of the target?"""
+    if servo.switches.old_target == "kept":
+        servo.shaft.go(servo.values["goal_position"], at)
+    else:
+        servo.values["goal_position"] = servo.shaft.reading(at)
 
 
 def _write_limit(servo: Servo, name: str, other: str, raw: int) -> int:
@@ -177,7 +185,7 @@ def _write_functions(servo: Servo, raw: int, at: float) -> int:
     if bool(raw & REVERSE) != servo.shaft.reversed:
         servo.shaft.halt(at)
         servo.shaft.reversed = not servo.shaft.reversed
-        servo.values["goal_position"] = servo.shaft.reading(at)
+        _retarget(servo, at)
     return 0
 
 

@@ -81,6 +81,7 @@ class Servo:
     def unplug(self) -> None:
         """Pull its cable, bus and supply in one. The shaft stays; an answer on its way is lost."""
         self.shaft.halt(self._now())
+        self.values.lose_supply(self._now(), cut=self.switches.flash_cut)
         self.plugged = False
         self.lives += 1
         self._reports_from = inf
@@ -195,9 +196,12 @@ class Servo:
         self._say(self, self.busy_until + self.delay, reply)
 
     def obey_start(self, order: wire.Start, at: float) -> None:
-        """Start or stop, when it is said in the form this one knows; nobody answers that."""
+        """Start or stop, when it is said in the form this one knows; nobody answers that.
+
+        During a write to flash it is lost like every other order, an assumption.
+        """
         form = self.profile.nmt if self.switches.nmt == "profile" else self.switches.nmt
-        if form not in order.forms:
+        if form not in order.forms or self.values.saving(at):
             return
         self.started = order.on
         self._report(order.on, at)

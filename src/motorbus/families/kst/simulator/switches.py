@@ -175,6 +175,13 @@ class Switches:
         "move",
         source="manual, command 5, tells of the value and not of the shaft",
     )
+    old_target: str = switch(
+        "follows",
+        "a new mid point or sense leaves the shaft where it is, or the target keeps its number and the shaft sets off",
+        "follows",
+        "kept",
+        source="not documented; kept is the cruel one",
+    )
     reversed_limits: str = switch(
         "mirror",
         "in the reversed state a travel limit that is written changes the other one too, or does not",
