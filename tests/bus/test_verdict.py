@@ -6,7 +6,7 @@ import pytest
 
 from motorbus.bus import verdict
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import Answer, Due, Effect, Exchange, Reply
+from motorbus.core.operation import Answer, CanFrame, Due, Effect, Exchange, Reply
 from motorbus.errors import ChecksumError, FramingError, NoReply, OutcomeUnknown, UnexpectedReply
 from tests.bus.script import position, reply
 
@@ -57,3 +57,14 @@ def test_a_write_that_was_not_confirmed_is_unknown_and_shows_what_came() -> None
     assert isinstance(found, OutcomeUnknown)
     assert "(2 tries)" in str(found)
     assert "received: FF FF 03" in str(found)
+
+
+def test_things_are_called_what_they_are_called_on_the_bus() -> None:
+    serial = verdict.error(Flight(position(3)), "silence", 1)
+    can: Exchange[Answer] = Exchange(CanFrame(0x603, bytes(8)), (Due(3, 3, 8),), repeatable=True)
+    frames = verdict.error(Flight(can), "silence", 1)
+    assert "baud rate" in serial.cause
+    assert "--baud all" in serial.advice
+    assert "another bit rate" in frames.cause
+    assert "terminating resistors" in frames.cause
+    assert "--bitrate all" in frames.advice

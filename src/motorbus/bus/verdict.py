@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import ANY, Effect, Exchange
+from motorbus.core.operation import ANY, CanFrame, Data, Effect, Exchange
 from motorbus.errors import (
     ChecksumError,
     FramingError,
@@ -19,16 +19,16 @@ from motorbus.errors import (
 
 CAUSES = {
     "silence": (
-        "no such id on this bus, another baud rate, no power, or a loose cable",
-        "`motorbus scan BUS` lists who answers; add `--baud all` to try every rate",
+        "no such id on this bus, another {rate}, no power, or a loose cable{bus}",
+        "`motorbus scan BUS` lists who answers; add `{flag} all` to try every rate",
     ),
     "checksum": (
         "bytes changed on the way: a long or loose cable, missing ground, or two nodes with one id",
         "check the wiring; `motorbus scan BUS` shows whether two nodes share an id",
     ),
     "framing": (
-        "the line carries something else: another baud rate, another program, electrical noise",
-        "check the baud rate and that nothing else talks on this bus",
+        "the line carries something else: another {rate}, another program, electrical noise",
+        "check the {rate} and that nothing else talks on this bus",
     ),
     "surplus": (
         "more bytes came than were asked for: two nodes with one id, an echo, or another host on the bus",
@@ -86,7 +86,7 @@ def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
     }.get(kind, f"no valid answer from {who}{again}")
     if made is OutcomeUnknown:
         what += "; whether the write took effect is not known"
-    cause, advice = CAUSES[kind]
+    cause, advice = (text.format(**_words(exchange.request)) for text in CAUSES[kind])
     return made(
         what,
         sent=exchange.request,
@@ -96,6 +96,17 @@ def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
         advice=advice,
         node=node,
     )
+
+
+def _words(request: Data) -> dict[str, str]:
+    """What things are called on a CAN bus, and on a serial line."""
+    if isinstance(request, CanFrame):
+        return {
+            "rate": "bit rate",
+            "flag": "--bitrate",
+            "bus": ", a bus without its two terminating resistors",
+        }
+    return {"rate": "baud rate", "flag": "--baud", "bus": ""}
 
 
 def latched() -> Interrupted:

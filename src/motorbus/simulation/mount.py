@@ -77,6 +77,8 @@ class Mount:
     @property
     def clients(self) -> list[Participant]:
         """Whoever takes part now."""
+        if not self._doors:
+            return self._fixed
         return [*self._fixed, *(client for door in self._doors for client in door.clients)]
 
     @property
@@ -91,17 +93,18 @@ class Mount:
 
     def step(self, stop: int | None = None, timeout: float = _LONGEST_WAIT) -> bool:
         """Wait for the next thing to do, at most so long (s), and do it. True when `stop` has turned readable."""
-        clients = [] if self.course.crowded else self.clients
-        readers = {one: client for client in clients if (one := client.fileno()) is not None}
+        everyone = {client: client.fileno() for client in self.clients}
+        heeded = {} if self.course.crowded else everyone
+        readers = {one: client for client, one in heeded.items() if one is not None}
         attended = {one: attendant for attendant in self.attendants for one in attendant.descriptors()}
         doors = {door.fileno(): door for door in self._doors}
         wait = min(timeout, max(0.0, self.course.next() - self._clock()))
-        for client in clients:
-            if client.fileno() is None:
+        for client, one in heeded.items():
+            if one is None:
                 self._hear(client, min(wait, _SLICE))
                 wait = 0.0
         waiting = [*readers, *attended, *doors, *(() if stop is None else (stop,))]
-        stuck = [one for client in self.clients if client.is_stuck() and (one := client.fileno()) is not None]
+        stuck = [one for client, one in everyone.items() if one is not None and client.is_stuck()]
         ready, _, _ = select(waiting, stuck, (), wait)
         self._happen(self._clock())
         for descriptor in ready:
@@ -133,6 +136,8 @@ class Mount:
             client.flush()
 
     def _sweep(self) -> None:
+        if not self._doors:
+            return
         gone = [client for door in self._doors for client in door.sweep()]
         self._lost_before += sum(client.lost for client in gone)
         if gone:

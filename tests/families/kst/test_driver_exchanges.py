@@ -97,6 +97,13 @@ def test_a_servo_that_takes_no_sized_write_is_written_to_all_the_same() -> None:
         there.servo().move(0.2)
 
 
+def test_a_servo_that_takes_only_sized_writes_gets_them() -> None:
+    with bench(accept_unsized=False, profile="kst-ext") as there:
+        there.servo().set_travel_limits(-0.5, 0.5)
+        there.servo().move(0.2)
+        assert "605#2203600073000000" not in there.sent(), "that was learnt from the limits"
+
+
 # --- segments -----------------------------------------------------------------------------------------------
 
 VERSION = "605#400A100000000000"

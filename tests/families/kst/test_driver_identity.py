@@ -76,6 +76,14 @@ def test_two_servos_with_one_id_are_given_no_other() -> None:
         assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}
 
 
+def test_an_id_that_another_servo_has_is_not_given() -> None:
+    with bench((5, 9)) as there:
+        with pytest.raises(RequestError, match="is taken"):
+            there.servo().set_node_id(9)
+        assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}
+        there.servo().set_node_id(5)  # its own is no other's
+
+
 def test_a_rate_is_in_force_after_save_and_restart_only() -> None:
     with bench() as there:
         servo = there.servo()

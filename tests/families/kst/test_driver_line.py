@@ -140,6 +140,18 @@ def test_beyond_the_range_the_end_of_the_range_is_held_before_this_place() -> No
         assert there.sim().raw_position == -900, "the nearest place at which it lets itself be held"
 
 
+def test_who_takes_only_writes_with_a_length_is_stopped_in_the_second_round() -> None:
+    with bench(accept_unsized=False) as there:
+        there.servo().ping()
+        there.sim().raw_position = 450
+        outcome = there.estop()
+        assert (outcome.acknowledged, outcome.rounds) == ((5,), 2)
+        assert there.sent()[-1] == "605#2B036000C2010000"
+    with bench(accept_unsized=False, settings={"sized": "no"}) as there:
+        there.servo().ping()
+        assert there.estop().silent == (5,)
+
+
 def test_who_speaks_in_a_form_that_nobody_knows_is_stopped_in_both() -> None:
     with bench(settings={"id_format": "auto"}, id_format="ext", broadcast_ack=False) as there:
         assert there.run(broadcast_position(1.2, (5,), dialect_of(there.family))) == ()

@@ -62,7 +62,8 @@ def test_a_servo_without_travel_limits_has_those_of_its_profile() -> None:
 
 
 @pytest.mark.parametrize(
-    "how", [{"tolerance": 0}, {"tolerance": True}, {"tolerance": "1"}, {"timeout": math.nan}, {"timeout": "5s"}]
+    "how",
+    [{"tolerance": 0}, {"tolerance": True}, {"tolerance": "1"}, {"timeout": math.nan}, {"timeout": "5s"}],
 )
 def test_how_long_to_wait_is_a_number(how: Any) -> None:
     with pytest.raises(RequestError, match="not a finite number above 0"):

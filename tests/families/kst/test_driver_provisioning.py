@@ -296,3 +296,22 @@ def test_a_silence_without_a_restart_is_no_restart() -> None:
             there.servo().provision(new_id=9, patience=3.0)
         servo.power_cycle()
         assert there.servo().provision(new_id=9).resumed is True
+
+
+def test_the_rate_of_one_among_others_is_not_changed() -> None:
+    with bench(ids=(5, 6, 9)) as there:
+        with pytest.raises(RequestError, match=r"not alone: 0x06 \(6\), 0x09 \(9\) would stay at 500000"):
+            there.servo().provision(new_rate=250_000)
+        assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}
+
+
+def test_while_it_is_waited_for_nobody_at_another_rate_is_disturbed() -> None:
+    with bench(ids=(5, 6), profile="kst-ext", broadcast_read=False) as there:
+        there.servo(6).start_reports(0.02)
+        there.on = lambda event: (
+            there.simulator.servos[0].unplug() if isinstance(event, PowerCycleNeeded) else None
+        )
+        with pytest.raises(OutcomeUnknown):
+            there.servo().provision(new_rate=250_000, patience=5.0)
+        assert there.sim(6).errors == 0
+        assert (there.bus.rate, there.bus.turns.listening) == (500_000, False)

@@ -131,6 +131,15 @@ def test_the_mid_point_makes_the_present_position_zero_and_nothing_moves(data: i
     assert (read(host, 0x6002), host[0x25].shaft.motion.position(host.now)) == (100, 445)
 
 
+@pytest.mark.parametrize(("index", "data"), [(0x3009, 0), (0x300F, 0x20)])
+def test_a_target_that_keeps_its_number_is_gone_to_where_that_is_now(index: int, data: int) -> None:
+    host = ext(position=345, old_target="kept")
+    write(host, index, data)
+    host.wait(2.0)
+    assert (read(host, 0x6002), read(host, 0x6003)) == (345, 345)
+    assert host[0x25].shaft.motion.position(host.now) == (690 if index == 0x3009 else -345)
+
+
 def test_the_mid_point_is_kept_by_a_save_and_lost_without() -> None:
     host = ext(position=345)
     write(host, 0x3009, 0)

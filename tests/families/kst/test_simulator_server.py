@@ -32,6 +32,13 @@ def test_writes_that_state_their_length_may_be_unknown_to_it() -> None:
         assert Host(accept_sized="no").say(f"625#{request}") == [f"5A5#80{multiplexer}01000405"]
 
 
+def test_writes_that_do_not_state_their_length_may_be_refused_where_it_is_not_four_bytes() -> None:
+    host = Host(accept_unsized="no", save_reply="ack")
+    assert host.say("625#2203600001000000") == ["5A5#8003600010000706"]
+    assert host.say("625#2B03600001000000") == ["5A5#6003600000000000"]
+    assert host.say("625#2210100173617665") == ["5A5#6010100100000000"]
+
+
 def test_objects_of_one_two_and_four_bytes_are_told_as_such() -> None:
     host = Host(profile="kst-ext")
     answers = host.say("625#400F300000000000", "625#400A300000000000", "625#4005600000000000")

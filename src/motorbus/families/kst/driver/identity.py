@@ -22,8 +22,8 @@ from motorbus.families.kst.driver.exchanges import (
     upload_row,
     whole,
 )
-from motorbus.families.kst.driver.node import Node, checked_id
-from motorbus.families.kst.driver.presence import single
+from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
+from motorbus.families.kst.driver.presence import glance, single
 from motorbus.families.kst.table import BIT_RATES
 
 UNKNOWN = "unknown"
@@ -80,13 +80,29 @@ def node_id(node: Node) -> Operation[int]:
 def set_node_id(node: Node, new: int) -> Operation[None]:
     """Give it another id, 1 to 127; in force after save() and a restart, lost at a restart without.
 
-    Looks first whether it is alone with its id. Raises RequestError for any other new id (nothing is sent) and for two
-    servos with one id (nothing is written), NoReply for nobody, VerificationFailed when it reads back neither.
+    Looks first whether it is alone with its id. Raises RequestError for any other new id (nothing is sent), for two
+    servos with one id and for an id that another servo has (nothing is written), NoReply for nobody,
+    VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
     """
     checked_id(new)
     if not (yield from Alone(single(node))):
         yield from answers(node)  # which tells best that nobody is there
+    yield from _free(Node(new, node.dialect), node)
     yield from write_node_id(node, new)
+
+
+def _free(new: Node, old: Node) -> Operation[None]:
+    """Raises RequestError when a servo answers as `new` already, unless that is the old id."""
+    if new.node == old.node:
+        return
+    look = yield from glance(new)
+    if look.there:
+        raise RequestError(
+            f"the id {hexadecimal(new.node)} is taken: a servo answers as it beside {hexadecimal(old.node)}",
+            cause="after a restart both would answer to one id, and neither could be addressed alone",
+            advice="choose a free id, or take that servo off the bus; nothing was written",
+            node=new.node,
+        )
 
 
 def write_node_id(node: Node, new: int) -> Operation[None]:

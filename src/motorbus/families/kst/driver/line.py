@@ -22,7 +22,14 @@ from motorbus.core.operation import (
 )
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import Dialect
-from motorbus.families.kst.driver.exchanges import GOAL, NODE_ID, POSITION, refused
+from motorbus.families.kst.driver.exchanges import (
+    GOAL,
+    NODE_ID,
+    POSITION,
+    UNSIZED_REFUSED,
+    meant,
+    refused,
+)
 from motorbus.families.kst.driver.keeping import LISTEN
 from motorbus.families.kst.driver.motion import Promise
 from motorbus.families.kst.driver.node import Node
@@ -157,11 +164,16 @@ def _told(answer: Answer | None) -> bytes | None:
 
 
 def _unrefused(node: Node, index: int) -> Any:
-    """The answer as it came; a refusal is no acknowledgement and raises DeviceError."""
+    """The answer as it came; a refusal is no acknowledgement and raises DeviceError.
+
+    One that may mean "state the length" is heeded by the next round.
+    """
 
     def read(answer: Answer) -> Answer:
         reply = wire.decode_reply(answer.replies[0].data) if answer.replies else None
         if reply is not None and reply.kind == "abort":
+            if index == GOAL and node.dialect.sized == "auto" and meant(reply.code) in UNSIZED_REFUSED:
+                node.dialect.learn_sized(node.node)
             raise refused(node, reply, index, 0)
         return answer
 

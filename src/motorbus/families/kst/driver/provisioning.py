@@ -27,6 +27,7 @@ from motorbus.families.kst.driver.identity import code_of, identify, write_node_
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.presence import Presence, glance, glance_at, single, survey
+from motorbus.families.kst.driver.scanning import called
 
 PATIENCE: Final = 120.0
 """s to wait for the power cycle."""
@@ -84,9 +85,10 @@ def provision(
     `PowerCycleNeeded`, waits at most `patience` seconds for it to come back, and verifies. May be called again at any
     point. Whoever names a new rate says that this bus may be spoken to at it; it is listened to first.
 
-    Raises RequestError (nothing was written) for an impossible id or rate, an id that is taken, or two servos with one
-    id; NoReply when it is nowhere; VerificationFailed when it comes back as it was, or beside another servo with its
-    new id; OutcomeUnknown when it does not come back in time, or somebody answers under the old id and the new one.
+    Raises RequestError (nothing was written) for an impossible id or rate, an id that is taken, two servos with one id,
+    or another rate while other servos are on the bus; NoReply when it is nowhere; VerificationFailed when it comes back
+    as it was, or beside another servo with its new id; OutcomeUnknown when it does not come back in time, or somebody
+    answers under the old id and the new one.
     """
     if new_id is None and new_rate is None:
         raise RequestError(
@@ -115,6 +117,8 @@ def _changed(job: Job) -> Operation[Place | None]:
     before = yield from glance(where.node)
     if (where.node.node, where.rate) == (job.new.node, job.new_rate):
         return None
+    if where.rate != job.new_rate:
+        yield from _alone_here(job, where)
     dialect = job.new.dialect
     dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
     yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
@@ -162,6 +166,23 @@ def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
     return Place(job.old, rate) if old else None
 
 
+def _alone_here(job: Job, where: Place) -> Operation[None]:
+    """A servo that comes back at another rate breaks the frames of those that stay at this one."""
+    there: set[int] = set()
+    for extended in sorted(job.old.dialect.formats):
+        there |= {reply.lane for reply in (yield from called(extended)).replies}
+    others = ", ".join(map(hexadecimal, sorted(there - {job.old.node, job.new.node})))
+    if others:
+        raise RequestError(
+            f"{hexadecimal(where.node.node)} is not alone: {others} would stay at {where.rate} bit/s",
+            expected="this servo alone, where its bit rate changes",
+            cause="servos at two rates on one bus break each other's frames",
+            advice="connect it alone; all at once are changed by broadcast_bit_rate() and broadcast_save(); "
+            "nothing was written",
+            node=where.node.node,
+        )
+
+
 def _ids(job: Job) -> str:
     ids = dict.fromkeys((job.old.node, job.new.node))
     return " or ".join(hexadecimal(node) for node in ids)
@@ -190,10 +211,14 @@ def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
 
 
 def _arrived(job: Job, place: Place, now: Presence) -> Operation[bool]:
-    """Does it answer as it should by now? At another rate it is looked for only when it is silent at the old one."""
+    """Does it answer as it should by now? At another rate it is looked for only when it is silent at the old one, and
+    only while nobody else is heard there."""
     if now.there and place.rate != job.new_rate:
         return False
-    return (yield from _seen(job, job.new, job.new_rate)).there
+    try:
+        return (yield from _seen(job, job.new, job.new_rate)).there
+    except RequestError:
+        return False
 
 
 def _seen(job: Job, node: Node, rate: int) -> Operation[Presence]:
@@ -204,7 +229,7 @@ def _seen(job: Job, node: Node, rate: int) -> Operation[Presence]:
 
 
 def _tuned(node: Node, rate: int) -> Operation[Presence]:
-    yield from Tune(rate)
+    yield from glance_at(node.dialect, rate)
     return (yield from glance(node))
 
 

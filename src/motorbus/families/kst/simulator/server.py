@@ -21,6 +21,7 @@ UNKNOWN_COMMAND: Final = 0x05040001
 WRITE_ONLY: Final = 0x06010001
 READ_ONLY: Final = 0x06010002
 NO_OBJECT: Final = 0x06020000
+OTHER_LENGTH: Final = 0x06070010
 TOO_LONG: Final = 0x06070012
 TOO_SHORT: Final = 0x06070013
 NO_SUBINDEX: Final = 0x06090011
@@ -116,6 +117,8 @@ class SdoServer:
                 return UNKNOWN_COMMAND
             if len(request.data) != row.size:
                 return TOO_LONG if len(request.data) > row.size else TOO_SHORT
+        elif not self._servo.switches.accept_unsized and row.size != _EXPEDITED:
+            return OTHER_LENGTH
         # Specifier 22 does not state the length: the object's own counts and the rest is ignored (CiA 301).
         refusal = objects.write(self._servo, row.name, row.decode(request.data[: row.size]), at)
         if refusal:

@@ -71,6 +71,11 @@ class Switches:
         "writes that state their length (23, 27, 2B, 2F) are taken, or refused with 05040001",
         source="manual shows 22 only; a public XQPOWER tool sends 2F and 23",
     )
+    accept_unsized: bool = switch(
+        True,
+        "writes that do not state their length (22) are taken, or refused with 06070010 where that is not 4 bytes",
+        source="manual shows 22 only; some CANopen servers refuse it so",
+    )
     out_of_range: str = switch(
         "abort",
         "a position beyond the range is refused with 06090031/32, or taken as the nearest allowed",
