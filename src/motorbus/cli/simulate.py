@@ -164,6 +164,12 @@ def _rate(family: Family, baud: int, bitrate: int) -> int:
         raise RequestError(f"--{wrong} is not for {family.name} devices", expected=f"--{right}")
     if given[right] < 0:
         raise RequestError(f"--{right} {given[right]} is not a rate", expected="bit/s, more than 0")
+    rates = family.link.rates if right == "bitrate" else ()
+    if given[right] and rates and given[right] not in rates:  # nobody there could be set to it
+        raise RequestError(
+            f"{family.name} devices have no bit rate of {given[right]} bit/s",
+            expected=f"one of {', '.join(map(str, rates))} bit/s",
+        )
     return given[right] or family.link.rate
 
 

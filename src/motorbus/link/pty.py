@@ -74,7 +74,7 @@ class PtyMaster:
             new.symlink_to(self.slave_name)
             new.replace(link)
         except OSError as error:
-            raise LinkError(f"{link}: cannot make the symbolic link: {error}") from error
+            raise LinkError(f"{link}: cannot make the symbolic link: {error.strerror}") from error
         self._links.append(link)
 
     def _check_left_behind(self, link: Path) -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from motorbus.core.operation import Data, Progress
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
-from motorbus.families.kst import PowerCycleNeeded, Provisioned
+from motorbus.families.kst import PowerCycleNeeded, Provisioned, driver
 from motorbus.link.memory import MemoryLink
-from tests.families.kst.bench import Bench, bench
+from tests.families.kst.bench import Bench, bench, node, play
 from tests.families.kst.test_driver_scanning import Deaf
 
 SAVE = "605#2210100173617665"
@@ -296,6 +296,12 @@ def test_a_silence_without_a_restart_is_no_restart() -> None:
             there.servo().provision(new_id=9, patience=3.0)
         servo.power_cycle()
         assert there.servo().provision(new_id=9).resumed is True
+
+
+@pytest.mark.parametrize("patience", [0, -1.0, float("nan"), float("inf"), "120s", True])
+def test_nobody_waits_for_ever(patience: Any) -> None:
+    with pytest.raises(RequestError, match="patience"):
+        play(driver.provision(node(), new_id=9, patience=patience))
 
 
 def test_the_rate_of_one_among_others_is_not_changed() -> None:

@@ -61,3 +61,9 @@ def test_a_lost_adapter_ends_it() -> None:
         there.link.unplug(0.5)
         with pytest.raises(LinkLost):
             look(there)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_nobody_listens_for_ever(seconds: float) -> None:
+    with bench() as there, pytest.raises(RequestError, match="seconds"):
+        look(there, seconds=seconds)

@@ -9,10 +9,11 @@ from motorbus.core.operation import CanFrame, Data, Progress
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.kst import Skipped, Suspicion
 from motorbus.families.kst.driver import scan
-from motorbus.families.kst.driver.scanning import BROKEN, OTHER_FORMAT
+from motorbus.families.kst.driver.scanning import BROKEN, OTHER_FORMAT, TORN
 from motorbus.families.kst.table import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import bench
+from tests.families.kst.test_driver_presence import NoErrors
 
 EVERYONE = "600#4000300000000000"
 
@@ -23,7 +24,7 @@ def test_one_frame_finds_everybody_and_the_silent_are_asked_twice() -> None:
         assert [(one.node, one.rate) for one in found] == [(1, 500_000), (37, 500_000), (127, 500_000)]
         frames = there.sent()
         assert frames[0] == EVERYONE
-        assert len(frames) == 1 + 2 * 124 + 3 * 2
+        assert len(frames) == 1 + 2 * 124 + 3 * 3  # of those who are there: id, version, position
         assert there.of(Found) == [Found(one.node, 500_000, None) for one in found]
         assert there.events.index(Found(127, 500_000, None)) == 2
         progress = there.of(Progress)
@@ -153,3 +154,10 @@ def test_where_somebody_answers_the_other_id_format_is_not_tried() -> None:
     with bench() as there:
         there.run(there.family.scan())
         assert all(len(frame.partition("#")[0]) == 3 for frame in there.sent())
+
+
+def test_two_servos_whose_answers_break_each_other_are_suspected_without_bus_errors() -> None:
+    with bench(ids=(5, 5, 6), line=NoErrors()) as there:
+        there.simulator.servos[1].raw_position = 3
+        assert [one.node for one in there.run(there.family.scan())] == [5, 6]
+        assert there.of(Suspicion) == [Suspicion(5, 500_000, TORN)]

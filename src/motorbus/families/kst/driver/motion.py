@@ -18,6 +18,7 @@ from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
 from motorbus.families.kst.driver.exchanges import ABSENT, decided, meant, order, upload_row
 from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.refusals import above_zero
 
 TOLERANCE: Final = 0.02
 """rad, a little more than a degree: under load a servo stays off its target, by how much no source tells."""
@@ -164,11 +165,6 @@ def counts(node: Node, to: float) -> int:
 
 
 def _checked_waiting(node: Node, tolerance: float, timeout: float | None) -> None:
-    for value in (tolerance, timeout):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if value is not None and not (number and 0 < value < float("inf")):
-            raise RequestError(
-                f"node {node.node}: {value!r} is not a finite number above 0",
-                advice="tolerance in rad, timeout in s; nothing was sent",
-                node=node.node,
-            )
+    above_zero("tolerance", tolerance, "rad", node=node.node)
+    if timeout is not None:
+        above_zero("timeout", timeout, "s", node=node.node)

@@ -27,6 +27,7 @@ from motorbus.families.kst.driver.identity import code_of, identify, write_node_
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.presence import Presence, glance, glance_at, single, survey
+from motorbus.families.kst.driver.refusals import above_zero
 from motorbus.families.kst.driver.scanning import called
 
 PATIENCE: Final = 120.0
@@ -94,6 +95,7 @@ def provision(
         raise RequestError(
             "what shall it become?", expected="new_id=, new_rate=, or both", advice="nothing was sent"
         )
+    above_zero("patience", patience, "s", node=node.node)
     new = node if new_id is None else Node(checked_id(new_id), node.dialect)
     if new_rate is not None:
         code_of(new_rate)

@@ -16,6 +16,7 @@ from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
 from motorbus.families.kst.driver.identity import code_of
 from motorbus.families.kst.driver.listening import Heard, heard
+from motorbus.families.kst.driver.refusals import above_zero
 from motorbus.families.kst.driver.scanning import at_one_rate
 from motorbus.families.kst.table import RATES
 
@@ -50,6 +51,7 @@ def scan_bit_rates(
     """
     for rate in rates:
         code_of(rate)
+    above_zero("seconds", seconds, "s")
     present = yield from Tune(0)
     search = _searched(dialect, tuple(rates), isolated, seconds)
     return (yield from Alone(afterwards(search, lambda: iter(Tune(present)))))

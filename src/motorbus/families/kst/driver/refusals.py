@@ -1,6 +1,8 @@
-"""What a profile lacks is refused before anything is sent, and the refusal names who has it."""
+"""Refusals made before anything is sent: what a profile lacks, with who has it, and times that would never end."""
 
 from __future__ import annotations
+
+from math import inf
 
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver.node import Node
@@ -18,3 +20,13 @@ def lacking(node: Node, what: str, row: str) -> RequestError:
         advice=f"if this servo has it, choose its profile, as in kst:PORT,profile={having[0]}; nothing was sent",
         node=node.node,
     )
+
+
+def above_zero(name: str, value: object, unit: str, *, node: int | None = None) -> None:
+    """Raises RequestError unless this is a finite number above 0: what waits for NaN seconds waits for ever."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < inf:
+        raise RequestError(
+            f"{name} {value!r} is not a finite number above 0",
+            advice=f"give it in {unit}; nothing was sent",
+            node=node,
+        )

@@ -1,6 +1,6 @@
 """Looking for servos: one broadcast read that all answer, then the silent ids one by one, many in flight at once.
 
-Looking reads one object that every make has, the node id, and never writes: the goal position of these servos is the
+Looking reads what every make has, the node id above all, and never writes: the goal position of these servos is the
 preset of some encoders. A refusal counts as presence, too. Where nobody answers in the id format that is spoken, 11
 bits by the manual, the other one is tried, for the manual prints identifiers in a way that may mean either. What does
 not fit (two answers to one request, another id than the one that answers, bus errors) is told as a `Suspicion`.
@@ -33,6 +33,7 @@ from motorbus.errors import LinkError, LinkLost, NoReply, WireError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, WINDOW, Dialect
 from motorbus.families.kst.driver.exchanges import NODE_ID
+from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.identity import identify
 from motorbus.families.kst.driver.listening import GLANCE, Heard, heard
 from motorbus.families.kst.driver.node import Node, checked_ids
@@ -201,8 +202,11 @@ def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[
     found: list[Found] = []
     for batch in _batches(nodes):
         told = yield from Together([outcome(identify(Node(node, dialect))) for node in batch])
-        pairs = zip(batch, told, strict=True)
-        found += [Found(node, rate, one if isinstance(one, Identity) else None) for node, one in pairs]
+        places = yield from Together([outcome(position(Node(node, dialect))) for node in batch])
+        for node, one, place in zip(batch, told, places, strict=True):
+            found.append(Found(node, rate, one if isinstance(one, Identity) else None))
+            if isinstance(one, Identity) and isinstance(place, NoReply):
+                yield from Report(Suspicion(node, rate, TORN))
     return found
 
 
@@ -247,6 +251,7 @@ def _about_ids(answer: Answer) -> Answer:
 TWICE: Final = (
     "two answers to one request: two servos with one id; connect them one at a time, and provision one"
 )
+TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other where they differ"
 
 
 def _compared(node: int, rate: int, reply: SdoReply | None) -> Operation[None]:
