@@ -230,6 +230,7 @@ def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.Mo
         ("feetech:socket://10.0.0.7:4000", "socket://10.0.0.7:4000"),
         ("kst:can://slcan/dev/ttyACM0", "/dev/ttyACM0"),
         ("kst:can://slcan/dev/ttyACM0@1000000", "/dev/ttyACM0"),
+        ("kst:can://serial/dev/ttyACM0", "/dev/ttyACM0"),
         ("kst:can://socketcan/can0", "can://socketcan/can0"),
         ("kst:can://socketcand/localhost/can0", "can://socketcand/localhost:29536/can0"),
         ("kst:can://virtual/anything", ""),

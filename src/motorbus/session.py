@@ -19,6 +19,7 @@ from motorbus import families
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
+from motorbus.core import units
 from motorbus.core.family import Family
 from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError, RequestError
@@ -119,7 +120,7 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     family = families.load(spot.family)
     merged: dict[str, object] = {**spot.options, **options}
     word = "baud" if family.link.kind == "bytes" else "bitrate"
-    rate = _number(word, merged.pop(word)) if word in merged else 0
+    rate = _rate(word, merged.pop(word)) if word in merged else 0
     settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
     known = {"ids", "model", *(option.name for option in family.link.options)} if simulated else set()
@@ -133,14 +134,13 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     return Opening(family.configured(**settings), spot.port, rate, rest)
 
 
-def _number(name: str, value: object) -> int:
+def _rate(word: str, said: object) -> int:
     try:
-        rate = int(str(value), 0)
-    except ValueError:
-        rate = 0
-    if rate <= 0:
-        raise RequestError(f"{name}={value}: not a rate in bit/s", expected="a positive whole number")
-    return rate
+        return units.rate(said)
+    except RequestError as refusal:
+        raise RequestError(
+            f"{word}={said}: not a rate in bit/s", expected=refusal.expected, advice=refusal.advice
+        ) from None
 
 
 def lock_name(address: str, options: Mapping[str, object]) -> str:

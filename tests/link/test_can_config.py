@@ -82,6 +82,15 @@ def test_a_file_that_is_no_configuration(monkeypatch: pytest.MonkeyPatch, tmp_pa
         config("can://virtual/a")
 
 
+def test_a_part_of_a_bit_timing_in_a_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CAN_CONFIG", '{"f_clock": 8000000, "brp": 1}')
+    found = config("can://slcan/dev/x", 500_000)
+    assert (found.rate, found.bits) == (500_000, 0)
+    assert found.warnings == (
+        "python-can's configuration says f_clock=8000000, brp=1, which is no whole bit timing: ignored",
+    )
+
+
 @pytest.mark.parametrize("text", ["{not", "[1, 2]", "5", '"fd"', "null"])
 def test_a_variable_that_is_no_configuration(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setenv("CAN_CONFIG", text)

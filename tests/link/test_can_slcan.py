@@ -114,6 +114,16 @@ def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
     assert adapter.told == [b"C", b"S6"]
 
 
+def test_a_fork_that_closes_leaves_the_channel_to_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    adapter = SlcanAdapter()
+    adapter.feed(b"S6\rO\r")
+    wire = SlcanWire("it", Cramped(adapter, 1000), lambda: None)
+    wire._is_open = True
+    monkeypatch.setattr("os.getpid", lambda: 1)
+    wire.close()
+    assert adapter.open
+
+
 @pytest.mark.parametrize("sent", range(1, 22))
 def test_a_line_cut_off_by_closing_is_no_frame(sent: int) -> None:
     """C, which closes the channel, is a hexadecimal digit as well."""

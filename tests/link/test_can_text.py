@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -131,6 +133,36 @@ def test_a_length_too_short_by_two_is_no_timestamp() -> None:
     reader.feed(SOME)
     assert reader.feed(b"t62564002600000000000\r") == []
     assert reader.damaged == 1
+
+
+def harmed(line: bytes) -> Iterator[tuple[bytes, bool]]:
+    """The line with one bit flipped, one byte lost, or one twice; and whether a digit has become another one."""
+    for place, byte in enumerate(line):
+        before, after = line[:place], line[place + 1 :]
+        yield before + after, False
+        yield line[: place + 1] + line[place:], False
+        for bit in range(8):
+            other = byte ^ 1 << bit
+            yield before + bytes([other]) + after, {byte, other} <= set(b"0123456789ABCDEFabcdef")
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        CanFrame(0x5A5, bytes.fromhex("4B 02 60 00 2C 01 00 00")),
+        CanFrame(0x5A5, bytes.fromhex("2C 01 00 00")),
+        CanFrame(0x185, bytes.fromhex("2C 01 00 00"), extended=True),
+    ],
+)
+def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFrame) -> None:
+    """A line has no checksum: this is all that can go unnoticed, and the next line but one is read again."""
+    for line, is_digit in harmed(slcan_line(frame)):
+        reader = SlcanReader()
+        frames = reader.feed(line + slcan_line(PING) * 2)
+        assert frames[-1] == PING
+        others = [one for one in frames if one not in (frame, PING)]
+        assert is_digit or not others, (line, others)
+        assert all(len(one.data) == len(frame.data) for one in others)
 
 
 def test_answers_are_no_frames() -> None:

@@ -74,11 +74,26 @@ def test_one_device_has_one_name_whatever_leads_to_it(tmp_path: Path) -> None:
 
 def test_hosts_are_compared_without_case() -> None:
     assert real_name("socket://Bridge:4000/") == real_name("socket://bridge:4000")
+    assert real_name("socket://localhost:4000") == real_name("socket://127.0.0.1:4000")
+    assert real_name("can://socketcand/localhost:4/can0") == real_name("can://socketcand/127.0.0.1:4/can0")
+    assert real_name("socket://localhost.lan:4000") == "socket://localhost.lan:4000"
 
 
 def test_different_ports_have_different_files() -> None:
     names = [PORT, "/dev/ttyACM8", "socket://bridge:4000", "socket://bridge:4001", "/dev/tty-ACM7"]
     assert len({PortLock(name).path for name in names}) == len(names)
+
+
+def test_a_fork_leaves_the_lock_to_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    with PortLock(PORT) as held:
+        child = PortLock(PORT)
+        child._descriptor, child._pid = os.dup(held._descriptor or 0), os.getpid()
+        monkeypatch.setattr(os, "getpid", lambda: 1)
+        child.release()
+        monkeypatch.undo()
+        owner = held.owner()
+        assert owner is not None
+        assert owner.pid == os.getpid()
 
 
 def test_the_socket_lies_beside_the_lock() -> None:

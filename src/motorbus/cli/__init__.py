@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 from contextlib import contextmanager
+from inspect import signature
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, CycloptsError, Group, Parameter
@@ -22,6 +23,7 @@ from motorbus import __version__
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, exit_code
 from motorbus.cli.output import Output
+from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -161,6 +163,7 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
             Say on stderr what happens; -vv says more.
         """
         output.json = as_json
+        _refuse_rehearsal(app, words)
         command, bound, ignored = parse(app, words)
         bound.arguments.update(dict.fromkeys(ignored, output))
         with _logging(verbose):
@@ -172,6 +175,20 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
         _common_first(words), exit_on_error=False, print_error=False, result_action="return_value"
     )
     return code if isinstance(code, int) else Exit.OK
+
+
+def _refuse_rehearsal(app: App, words: Sequence[str]) -> None:
+    """Raises RequestError for a dry run of a command that has none: it would be taken for an option of the bus."""
+    chain, apps, rest = app.parse_commands(words)
+    command = apps[-1].default_command
+    if "--dry-run" not in rest or command is None or "dry_run" in signature(command).parameters:
+        return
+    why = (
+        "a stop is never withheld" if chain == ("estop",) else "it changes no device, so nothing is withheld"
+    )
+    raise RequestError(
+        f"`motorbus {' '.join(chain)}` has no --dry-run: {why}", advice="leave it out; nothing was sent"
+    )
 
 
 def _common_first(words: Sequence[str]) -> list[str]:

@@ -1,10 +1,15 @@
-"""What needs somebody's agreement before it moves: one rule for every command that sends a goal, by whatever name."""
+"""What needs somebody's agreement before it is done: one rule for every command, by whatever name.
+
+Nobody is asked to agree to what is refused anyway, so a rehearsal comes before the question.
+"""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
+from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.target import able
 from motorbus.core.operation import Effect
 
@@ -34,9 +39,20 @@ def consent_to_ways(
     ways = [(one.node, abs(goal - able(one, "position")())) for one, goal in goals]
     far = [f"#{node} by {math.degrees(way):.0f} degrees" for node, way in ways if way > FAR]
     if far:
-        if rehearse is not None:
+        consent_to(f"move {', '.join(far)}", output, yes=False, rehearse=rehearse)
+
+
+def consent_to(what: str, output: Output, *, yes: bool, rehearse: Callable[[], object] | None = None) -> None:
+    """Ask before `what` is done, unless `yes`. Raises NeedsConsent when nobody agrees.
+
+    Before anybody is asked, `rehearse` raises what the work itself would be refused for.
+    """
+    if yes:
+        return
+    if rehearse is not None:
+        with suppress(Unforeseeable):  # so far it would not have been refused
             rehearse()
-        output.consent(f"move {', '.join(far)}", yes=False)
+    output.consent(what, yes=False)
 
 
 def goals_among(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[tuple[Any, float]]:

@@ -1,4 +1,4 @@
-"""--dry-run: the same operation, with everything that would change a device shown and withheld.
+"""--dry-run: the same operation, with everything that would change something shown and withheld.
 
 What only reads is carried out, because what would be sent depends on it (limits, register map, where a servo
 stands). A read that follows a withheld write would find the old value; it is not carried out but taken to confirm
@@ -114,5 +114,10 @@ def _meaning(one: Explanation) -> str:
     """What a frame of ours says; who it could come from besides, and how it is framed, is left to `decode`."""
     names = [part.name for part in one.parts]
     start = names.index("instruction") + 1 if "instruction" in names else 0
-    parts = [f"{part.name} {part.meaning}" for part in one.parts[start:] if part.name not in _FRAMING]
+    parts = [_said(part.name, part.meaning) for part in one.parts[start:] if part.name not in _FRAMING]
     return "; ".join([one.title.partition(" (or ")[0], *parts])
+
+
+def _said(name: str, meaning: str) -> str:
+    """A field and what it says; one that says its own name, as "node 37", is not named twice."""
+    return meaning if meaning.partition(" ")[0] == name else f"{name} {meaning}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, quantity, registers
-from motorbus.cli.consent import consent_to_ways, goals_among
+from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
@@ -156,7 +156,7 @@ def reg_write(
     yes
         Do not ask before a way of more than 180 degrees.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -166,7 +166,8 @@ def reg_write(
         one = face(rehearsal if dry_run else opening, node)
         values = _values(one, assignments)
         entries = [table_of(one)[name] for name in values]
-        consent_to_ways(goals_among(one, entries, values), output, yes=yes or dry_run)
+        ways, rehearsed = goals_among(one, entries, values), face(rehearsal, node)
+        consent_to_ways(ways, output, yes=yes or dry_run, rehearse=lambda: rehearsed.reg_write(**values))
         one.reg_write(**values)
         if dry_run:
             dry.show(rehearsal, output)
@@ -201,7 +202,7 @@ def action(
     bus
         feetech:PORT for everyone, or feetech:PORT#ID.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -315,7 +316,7 @@ def sync_write(
     yes
         Do not ask before a way of more than 180 degrees.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -379,14 +380,15 @@ def factory_restore(
     yes
         Do not ask before everything in EEPROM is overwritten.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
     bus, _, (node,) = _ours(device(device_))
-    output.consent(f"overwrite all settings of #{node}, and let it go limp", yes=yes or dry_run)
     with opened(bus, options, output) as opening:
         rehearsal = dry.DryBus(opening)
+        what = f"overwrite all settings of #{node}, and let it go limp"
+        consent_to(what, output, yes=yes or dry_run, rehearse=face(rehearsal, node).factory_restore)
         found = face(rehearsal if dry_run else opening, node).factory_restore()
     if dry_run:
         dry.show(rehearsal, output)

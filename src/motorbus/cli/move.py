@@ -70,7 +70,7 @@ def move(
     yes
         Do not ask before a way of more than 180 degrees.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """

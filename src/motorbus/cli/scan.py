@@ -11,6 +11,7 @@ from motorbus.cli import faces
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.target import id_shown, nobody, opened, rate_word, target
+from motorbus.core import units
 from motorbus.core.family import Found
 from motorbus.core.operation import Progress
 from motorbus.errors import RequestError
@@ -99,15 +100,18 @@ def _tried(texts: Mapping[str, str], family: Family) -> tuple[int, ...]:
 
 
 def rates(text: str, family: Family) -> tuple[int, ...]:
-    """The rates in a list, or all that the family knows. Raises RequestError when it is no list of numbers."""
+    """The rates in a list, or all that the family knows. Raises RequestError when it is no list of rates."""
     if text == "all":
         return family.link.rates
     words = text.replace("+", ",").split(",") if text else []
-    if not all(word.strip().isdecimal() for word in words):
+    try:
+        return tuple(map(units.rate, words))
+    except RequestError:
         raise RequestError(
-            f"--{rate_word(family)} {text}: not a list of rates", expected="as 1000000,500000 or all"
-        )
-    return tuple(int(word) for word in words)
+            f"--{rate_word(family)} {text}: not a list of rates",
+            expected="as 1000000,500k or all",
+            advice="nothing was sent",
+        ) from None
 
 
 def _heard(family: str, found: list[Found], bar: Bar, notes: list[str], event: object) -> None:

@@ -15,6 +15,7 @@ from cyclopts import App, Parameter
 from motorbus import families, session
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
+from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
@@ -78,8 +79,8 @@ def simulate(
     socketcand: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve socketcand (CAN).")] = "",
     can: Annotated[str, Parameter(help="INTERFACE/CHANNEL of a CAN bus to join, as socketcan/vcan0.")] = "",
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
-    baud: Annotated[int, Parameter(help="The rate of a serial line until a client sets one.")] = 0,
-    bitrate: Annotated[int, Parameter(help="The rate of a CAN bus until a client sets one.")] = 0,
+    baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
+    bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
     switch: Annotated[
         tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
@@ -95,15 +96,16 @@ def simulate(
         return _list(found, output)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
-    rate = _rate(found, baud, bitrate)
+    asked = _rate(found, baud, bitrate)
+    rate = asked or found.link.rate
     simulator.tune(rate)
     with ExitStack() as stack:
         stop = stack.enter_context(_until_signalled())
-        served = _served(stack, found, Ways(link, tcp, socketcand, can), bitrate)
+        served = _served(stack, found, Ways(link, tcp, socketcand, can), asked)
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
         places = [place for place, _ in served]
         mount = Mount(simulator, *places, pace=rate if pace else None, rate=rate, attendants=controls)
-        buses = [f"{family}:{port}{_appended(settings, port, bitrate)}" for _, port in served]
+        buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
         nodes = sorted(simulator.nodes)
         facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
         output.document("motorbus.simulate/1", facts)
@@ -157,20 +159,20 @@ def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tup
         yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
 
 
-def _rate(family: Family, baud: int, bitrate: int) -> int:
+def _rate(family: Family, baud: str, bitrate: str) -> int:
+    """What was said, in bit/s, 0 for nothing. Devices on CAN have the rates of their table and no others."""
     right, wrong = ("bitrate", "baud") if family.link.kind == "frames" else ("baud", "bitrate")
     given = {"baud": baud, "bitrate": bitrate}
     if given[wrong]:
         raise RequestError(f"--{wrong} is not for {family.name} devices", expected=f"--{right}")
-    if given[right] < 0:
-        raise RequestError(f"--{right} {given[right]} is not a rate", expected="bit/s, more than 0")
-    rates = family.link.rates if right == "bitrate" else ()
-    if given[right] and rates and given[right] not in rates:  # nobody there could be set to it
+    rate = units.rate(given[right]) if given[right] else 0
+    known = family.link.rates
+    if rate and right == "bitrate" and known and rate not in known:
         raise RequestError(
-            f"{family.name} devices have no bit rate of {given[right]} bit/s",
-            expected=f"one of {', '.join(map(str, rates))} bit/s",
+            f"--bitrate {given[right]}: no {family.name} device has this rate",
+            expected=f"one of {', '.join(map(str, known))}",
         )
-    return given[right] or family.link.rate
+    return rate
 
 
 def _appended(settings: Mapping[str, str], port: str, bitrate: int) -> str:

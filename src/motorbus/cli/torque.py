@@ -41,7 +41,7 @@ def torque(
     devices
         FAMILY:PORT for every device that answers, or FAMILY:PORT#ID for some.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, quantity, registers
-from motorbus.cli.consent import consent_to_ways, goals_among
+from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
 from motorbus.cli.target import check_names, device, face, opened, table_of
 from motorbus.core.entry import Storage
 from motorbus.core.operation import Effect
-from motorbus.errors import RequestError
+from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from motorbus.cli.quantity import Typed
     from motorbus.core.entry import Entry, Value
@@ -78,7 +79,7 @@ def write(
     yes
         Do not ask before writing to EEPROM, or before a way of more than 180 degrees.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -92,10 +93,11 @@ def write(
             _order(one, table[name], quantity.typed(table[name], text, raw=raw))
             for name, text in wanted.items()
         ]
-        _permit(orders, output, expert=expert, yes=yes or dry_run)
         values = {order.entry.name: order.value for order in orders}
+        rehearse = partial(face(rehearsal, node).write, **values)
+        _permit(orders, output, rehearse, expert=expert, yes=yes or dry_run)
         ways = goals_among(one, [order.entry for order in orders], values)
-        consent_to_ways(ways, output, yes=yes or dry_run)
+        consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
         one.write(**values)
     if dry_run:
         dry.show(rehearsal, output)
@@ -121,11 +123,25 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
 
 def _order(one: Any, entry: Entry, typed: Typed) -> Order:
     value = quantity.to_value(one, entry, int(typed.number)) if typed.raw else typed.number
-    entry.encode(quantity.to_raw(one, entry, value))  # raises when it is out of range
+    try:
+        entry.encode(quantity.to_raw(one, entry, value))  # raises when it is out of range
+    except RequestError as refusal:
+        if entry.effect is Effect.MOTION:
+            raise _beyond(refusal, one.node) from None
+        raise
     return Order(entry, value, typed.raw and not typed.named)
 
 
-def _permit(orders: Sequence[Order], output: Output, *, expert: bool, yes: bool) -> None:
+def _beyond(refusal: RequestError, node: int) -> LimitExceeded:
+    """A goal out of range is unsafe by whatever command it was given, so `move` and `write` end alike."""
+    return LimitExceeded(
+        f"node {node}: {refusal.summary}", expected=refusal.expected, advice=refusal.advice, node=node
+    )
+
+
+def _permit(
+    orders: Sequence[Order], output: Output, rehearse: Callable[[], object], *, expert: bool, yes: bool
+) -> None:
     moving = [order.entry.name for order in orders if order.raw and order.entry.effect is Effect.MOTION]
     if moving and not expert:
         raise NeedsConsent(
@@ -134,7 +150,8 @@ def _permit(orders: Sequence[Order], output: Output, *, expert: bool, yes: bool)
         )
     kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
     if kept:
-        output.consent(f"write {', '.join(kept)} to EEPROM, where it survives power-off", yes=yes)
+        what = f"write {', '.join(kept)} to EEPROM, where it survives power-off"
+        consent_to(what, output, yes=yes, rehearse=rehearse)
 
 
 def _show(one: Any, orders: Sequence[Order], output: Output) -> None:

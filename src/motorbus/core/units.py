@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from fractions import Fraction
 from math import isfinite, pi
 
 from motorbus.errors import RequestError
@@ -60,6 +61,8 @@ QUANTITIES: Mapping[str, str] = {
 """Which quantity a unit of the API (the unit of a table row) measures."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
+_FACTORS = {"k": 1000, "M": 1_000_000}
 _RAW = re.compile(r"([+-]?(?:0[xX][0-9a-fA-F]+|\d+))\s*raw", re.ASCII)
 
 
@@ -149,3 +152,21 @@ def _refused(text: str, quantity: str, what: str) -> RequestError:
         expected=f"a number, or a number with one of {units}",
         advice="nothing was sent",
     )
+
+
+def rate(text: object) -> int:
+    """`500000`, `500k`, `0.5M` -> bit/s; the one spelling of rates, in addresses and in flags.
+
+    Raises RequestError for what is no whole number of bit/s above 0.
+    """
+    said = str(text).strip()
+    short = _RATE.fullmatch(said)
+    try:
+        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(int(said, 0))
+    except ValueError:
+        found = Fraction(0)
+    if found <= 0 or found.denominator != 1:
+        raise RequestError(
+            f"{text} is not a rate", expected="bit/s, as 500000, 500k or 1M", advice="nothing was sent"
+        )
+    return int(found)

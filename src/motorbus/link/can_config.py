@@ -119,13 +119,18 @@ def _with_timing(config: CanConfig, whole: dict[str, Any], said: set[str]) -> Ca
     if timing is not None:
         settings = {**config.settings, "timing": timing}
         return config._replace(settings=settings, bits=int(getattr(timing, "bitrate", 0)))
-    if said & set(TIMING) - set(config.settings):
+    stray = [name for name in TIMING if name in whole and name not in config.settings]
+    if not stray:
+        return config
+    parts = ", ".join(f"{name}={whole[name]}" for name in stray)
+    if said & set(stray):
         raise RequestError(
             f"{config.name}: this bit timing is not complete, or impossible",
-            sent=", ".join(f"{name}={whole[name]}" for name in TIMING if name in whole),
+            sent=parts,
             expected=f"all of {', '.join(TIMING)}",
         )
-    return config
+    warning = f"python-can's configuration says {parts}, which is no whole bit timing: ignored"
+    return config._replace(warnings=(*config.warnings, warning))
 
 
 def _load(can: Any, port: str, given: dict[str, Any], context: str | None) -> dict[str, Any]:

@@ -56,6 +56,7 @@ class SlcanWire(TextWire):
         self._listening = LISTENING if listening is None else listening
         super().__init__(name, port, self._lines, slcan_line, MEND, self._end(shut))
         self._is_open = False
+        self._pid = os.getpid()
         self._told = ""
         self._place = 0
         self._late_until = -inf
@@ -149,9 +150,12 @@ class SlcanWire(TextWire):
 
     def _end(self, shut: Callable[[], None]) -> Callable[[], None]:
         def end() -> None:
-            """A line that went out in part must not swallow the last command, nor become a frame by it."""
+            """A line that went out in part must not swallow the last command, nor become a frame by it.
+
+            A fork that closes what it has inherited leaves the channel to its parent.
+            """
             with contextlib.suppress(OSError):  # gone already
-                if self._is_open:
+                if self._is_open and self._pid == os.getpid():
                     self._port.write((MEND if self._torn else b"") + b"C\r")
             shut()
 

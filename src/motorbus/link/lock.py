@@ -53,9 +53,10 @@ def _state_home() -> Path:
 
 
 def real_name(port: str) -> str:
-    """One name for one port, whatever the user called it: symbolic links resolved, letters of a host lowered."""
+    """One name for one port, whatever the user called it: symbolic links resolved, letters of a host lowered, and
+    this machine by its number."""
     if "://" in port:
-        return port.lower().rstrip("/")
+        return re.sub(r"(?<=/)localhost(?=[:/]|$)", "127.0.0.1", port.lower().rstrip("/"))
     return port.upper() if os.name == "nt" else os.path.realpath(port)
 
 
@@ -94,13 +95,15 @@ class PortLock:
         self.port = port
         self.path = state_folder() / f"{_stem(port)}.lock"
         self._descriptor: int | None = None
+        self._pid = 0
 
     def acquire(self) -> Self:
         """Take it. Raises PortBusy, whose `owner` is the process that holds it."""
         for _ in range(TRIES):
             self._descriptor = _try(self.path)
             if self._descriptor is not None:
-                _sign(self._descriptor, Owner(os.getpid(), program_name(), self.port))
+                self._pid = os.getpid()
+                _sign(self._descriptor, Owner(self._pid, program_name(), self.port))
                 return self
             owner = _signed(self.path)
             if owner is not None and is_alive(owner.pid):
@@ -109,7 +112,7 @@ class PortLock:
         raise busy(self.port, None)
 
     def release(self) -> None:
-        """Give it back; does nothing when it is not held."""
+        """Give it back; does nothing when it is not held. What a fork has inherited stays with its parent."""
         if self._descriptor is None:
             return
         descriptor, self._descriptor = self._descriptor, None
@@ -117,7 +120,8 @@ class PortLock:
             os.close(descriptor)
             self.path.unlink(missing_ok=True)
         else:
-            self.path.unlink(missing_ok=True)
+            if self._pid == os.getpid():
+                self.path.unlink(missing_ok=True)
             os.close(descriptor)
 
     def owner(self) -> Owner | None:

@@ -11,7 +11,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours
+from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours, reads_only
+from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver import Node
 from motorbus.families.kst.driver.identity import code_of
@@ -50,12 +51,13 @@ def node_id(
     yes
         Do not ask before the id is written.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (old,) = one_of_ours(device_)
     if not new:
+        reads_only(dry_run)
         _, found = on_servo(device_, options, output, lambda servo: servo.node_id())
         output.document("motorbus.kst.node-id/1", {"id": old, "reads_back": found})
         pending = "" if found == old else f"; it answers as {named(old)} until it is restarted"
@@ -63,8 +65,8 @@ def node_id(
         return Exit.OK
     wanted = whole(new, "an id")
     Node(wanted)  # raises when it is no id
-    output.consent(f"give {named(old)} the id {named(wanted)}", yes=yes or dry_run)
-    on_servo(device_, options, output, lambda servo: servo.set_node_id(wanted), dry_run=dry_run)
+    consent = "" if yes else f"give {named(old)} the id {named(wanted)}"
+    on_servo(device_, options, output, lambda one: one.set_node_id(wanted), dry_run=dry_run, consent=consent)
     if not dry_run:
         output.document("motorbus.kst.node-id/1", {"id": old, "new": wanted, "in_force": False, "next": NEXT})
         output.text(f"written: {named(old)} will be {named(wanted)}. {_next(device_)}")
@@ -104,19 +106,20 @@ def bit_rate(
     yes
         Do not ask before the rate is written.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     if not rate:
+        reads_only(dry_run)
         _, found = on_servo(device_, options, output, lambda servo: servo.bit_rate())
         output.document("motorbus.kst.bit-rate/1", {"id": node, "bitrate": found})
         output.text("not readable: the manual has no command for it" if found is None else f"{found} bit/s")
         return Exit.OK
     wanted = bits_per_second(rate)
-    output.consent(f"give {named(node)} the bit rate {wanted} bit/s", yes=yes or dry_run)
-    on_servo(device_, options, output, lambda servo: servo.set_bit_rate(wanted), dry_run=dry_run)
+    consent = "" if yes else f"give {named(node)} the bit rate {wanted} bit/s"
+    on_servo(device_, options, output, lambda one: one.set_bit_rate(wanted), dry_run=dry_run, consent=consent)
     if not dry_run:
         facts = {"id": node, "new": wanted, "in_force": False, "next": NEXT}
         output.document("motorbus.kst.bit-rate/1", facts)
@@ -151,13 +154,13 @@ def save(
     yes
         Do not ask before the memory is written.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
-    output.consent(f"save the settings of {named(node)}, where they survive power-off", yes=yes or dry_run)
-    on_servo(device_, options, output, lambda servo: servo.save(), dry_run=dry_run)
+    consent = "" if yes else f"save the settings of {named(node)}, where they survive power-off"
+    on_servo(device_, options, output, lambda one: one.save(), dry_run=dry_run, consent=consent)
     if not dry_run:
         output.document("motorbus.kst.save/1", {"id": node, "sent": True, "confirmed": None})
         output.text(f"sent to {named(node)}, which does not answer that; a power cycle shows what was saved")
@@ -183,7 +186,6 @@ def whole(text: str, what: str) -> int:
 
 def bits_per_second(text: str) -> int:
     """500000, 500k or 1M. Raises RequestError for a rate that these servos cannot have."""
-    factor = {"k": 1000, "M": 1_000_000}.get(text[-1:], 1)
-    rate = factor * whole(text[:-1] if factor > 1 else text, "a bit rate")
+    rate = units.rate(text)
     code_of(rate)
     return rate

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from motorbus.cli import dry
 from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, on_servo, one_of_ours
+from motorbus.cli.kst.servo import Device, Flag, Silent, app, on_servo, one_of_ours, reads_only
 from motorbus.core import units
 from motorbus.families.kst.driver import RawStatus, Servo
 
@@ -52,12 +52,13 @@ def position(
     yes
         Do not ask before a way of more than 180 degrees.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     one_of_ours(device_)
     if not value:
+        reads_only(dry_run)
         node, here = on_servo(device_, options, output, lambda servo: servo.position())
         output.document("motorbus.kst.position/1", {"id": node, "position": here})
         output.text(units.show(here, "position"))

@@ -6,9 +6,11 @@ said again go on from there, whatever happened in between.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from motorbus.cli import dry
+from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit
 from motorbus.cli.kst.identity import bits_per_second, whole
 from motorbus.cli.kst.offers import say
@@ -67,7 +69,7 @@ def provision(
     yes
         Do not ask before its memory is written.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
@@ -75,10 +77,11 @@ def provision(
     wanted = _wanted(new_id, new_bitrate)
     seconds = units.parse(patience, "time")
     become = " and ".join(_words(wanted))
-    output.consent(f"let {named(node)} become {become}, for good", yes=yes or dry_run)
     with opened(bus, options, output) as opening:
         if dry_run:
-            return _rehearsed(dry.DryBus(opening), node, wanted, output)
+            return _shown(dry.DryBus(opening), node, wanted, output)
+        rehearse = partial(_rehearse, dry.DryBus(opening), node, wanted)
+        consent_to(f"let {named(node)} become {become}, for good", output, yes=yes, rehearse=rehearse)
         with output.progress("provisioning") as bar:
             operation = driver.provision(face(opening, node), patience=seconds, **wanted)
             done = opening.run(operation, report=lambda event: _tell(event, bar, output))
@@ -119,7 +122,7 @@ def _tell(event: Any, bar: Bar, output: Output) -> None:
         output.note(said)
 
 
-def _rehearsed(bus: dry.DryBus, node: int, wanted: dict[str, int], output: Output) -> Exit:
+def _rehearse(bus: dry.DryBus, node: int, wanted: dict[str, int]) -> None:
     """What would be written; the looking before and the verifying after it are left out."""
     servo: Servo = face(bus, node)
     if "new_id" in wanted:
@@ -127,6 +130,10 @@ def _rehearsed(bus: dry.DryBus, node: int, wanted: dict[str, int], output: Outpu
     if "new_rate" in wanted:
         servo.set_bit_rate(wanted["new_rate"])
     servo.save()
+
+
+def _shown(bus: dry.DryBus, node: int, wanted: dict[str, int], output: Output) -> Exit:
+    _rehearse(bus, node, wanted)
     dry.show(bus, output)
     output.text("then a power cycle would be asked for, and the servo looked for")
     return Exit.OK

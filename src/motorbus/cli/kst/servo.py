@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final, TypeVar
 
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry
+from motorbus.cli.consent import consent_to
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, device, face, opened, target
 from motorbus.errors import RequestError
@@ -47,18 +49,32 @@ def on_servo(
     do: Callable[[Servo], T],
     *,
     dry_run: bool = False,
+    consent: str = "",
 ) -> tuple[int, T]:
     """Open the bus of BUS#ID and let `do` have the servo; its id, and what came of it.
 
-    With `dry_run` what would change something is shown and not sent, and what comes back is worth nothing.
+    With `dry_run` what would change something is shown and not sent, and what comes back is worth nothing. `consent`
+    is what somebody must agree to before, once a rehearsal has found nothing against it.
     """
     bus, _, (node,) = one_of_ours(text)
     with opened(bus, options, output) as opening:
         rehearsal = dry.DryBus(opening)
+        rehearse = partial(do, face(rehearsal, node))
+        consent_to(consent, output, yes=dry_run or not consent, rehearse=rehearse)
         result = do(face(rehearsal if dry_run else opening, node))
     if dry_run:
         dry.show(rehearsal, output)
     return node, result
+
+
+def reads_only(dry_run: bool) -> None:
+    """Raises RequestError for a dry run of what only reads: there is nothing to withhold."""
+    if dry_run:
+        raise RequestError(
+            "without a new value this only reads, so there is nothing that --dry-run could withhold",
+            expected="a new value, or no --dry-run",
+            advice="nothing was sent",
+        )
 
 
 def named(node: int) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from operator import methodcaller
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours
+from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours, reads_only
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -44,7 +45,7 @@ def reports(
     interval
         How often, as 10ms; as the servo is set when left out.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
@@ -90,13 +91,15 @@ def mid_point(
     yes
         Do not ask before the zero is moved for good.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
-    output.consent(f"make the present position of {named(node)} its zero, for good", yes=yes or dry_run)
-    _, here = on_servo(device_, options, output, lambda servo: servo.set_mid_point(), dry_run=dry_run)
+    consent = "" if yes else f"make the present position of {named(node)} its zero, for good"
+    _, here = on_servo(
+        device_, options, output, lambda one: one.set_mid_point(), dry_run=dry_run, consent=consent
+    )
     if not dry_run:
         output.document("motorbus.kst.mid-point/1", {"id": node, "position": here})
         output.text(
@@ -139,7 +142,7 @@ def limits(
     yes
         Do not ask before the limits are written for good.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
@@ -148,11 +151,13 @@ def limits(
         raise RequestError("one limit alone", expected="both, as -45deg 45deg", advice="nothing was sent")
     if low:
         bounds = units.parse(low, "position"), units.parse(high, "position")
-        output.consent(f"set the travel limits of {named(node)} for good", yes=yes or dry_run)
-        on_servo(device_, options, output, lambda one: one.set_travel_limits(*bounds), dry_run=dry_run)
+        consent = "" if yes else f"set the travel limits of {named(node)} for good"
+        set_ = methodcaller("set_travel_limits", *bounds)
+        on_servo(device_, options, output, set_, dry_run=dry_run, consent=consent)
         if dry_run:
             return Exit.OK
     else:
+        reads_only(dry_run)
         _, bounds = on_servo(device_, options, output, lambda one: one.travel_limits())
     output.document("motorbus.kst.limits/1", {"id": node, "low": bounds[0], "high": bounds[1]})
     output.table(f"#{node}", ["low", "high"], [[units.show(bound, "position") for bound in bounds]])
@@ -191,18 +196,20 @@ def reverse(
     yes
         Do not ask before it is written for good.
     dry_run
-        Show the frames that would be sent, and send none of them.
+        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     if switch:
-        output.consent(f"switch the reverse bit of {named(node)} {switch} for good", yes=yes or dry_run)
-        on_servo(device_, options, output, lambda one: one.set_reversed(switch == "on"), dry_run=dry_run)
+        on = switch == "on"
+        consent = "" if yes else f"switch the reverse bit of {named(node)} {switch} for good"
+        set_ = methodcaller("set_reversed", on)
+        on_servo(device_, options, output, set_, dry_run=dry_run, consent=consent)
         if dry_run:
             return Exit.OK
-        on = switch == "on"
     else:
+        reads_only(dry_run)
         _, on = on_servo(device_, options, output, lambda one: one.reversed())
     output.document("motorbus.kst.reverse/1", {"id": node, "reversed": on})
     output.text(f"{named(node)} turns {'in reverse' if on else 'as shipped'}")

@@ -251,7 +251,7 @@ def _about_ids(answer: Answer) -> Answer:
 TWICE: Final = (
     "two answers to one request: two servos with one id; connect them one at a time, and provision one"
 )
-TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other where they differ"
+TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other"
 
 
 def _compared(node: int, rate: int, reply: SdoReply | None) -> Operation[None]:
