@@ -14,6 +14,7 @@ from cyclopts import App, Parameter
 from motorbus import families
 from motorbus.cli import frame
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.cli.target import said
 from motorbus.core.family import Explanation
@@ -21,7 +22,7 @@ from motorbus.errors import RequestError
 from motorbus.link import can_log
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from motorbus.core.family import Family
     from motorbus.link.can_log import Logged
@@ -73,13 +74,18 @@ def decode(
     if file is not None:
         if data:
             raise RequestError("bytes and --file: one of them", advice="decode them one after the other")
-        return _stream(_on_can(found, can_log.read_log(file)), found, output)
+        return _stream(_on_can(found, _recorded(file)), found, output)
     if data:
         return _bytes_or_frames(data, found, output)
     first = sys.stdin.readline() if found.link.kind == "frames" else ""
     if can_log.looks_like_can(first):
         return _stream(_on_can(found, can_log.read_lines(chain([first], sys.stdin))), found, output)
     return _document(found.explain(_bytes(first + sys.stdin.read())), found, output)
+
+
+def _recorded(file: Path) -> Iterator[Logged]:
+    with usable(file, "read"):
+        yield from can_log.read_log(file)
 
 
 def _spoken(family: Family, options: Mapping[str, str]) -> Family:

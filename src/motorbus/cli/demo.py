@@ -16,6 +16,7 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import faces, scan
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.cli.simulated import Simulated
 from motorbus.cli.target import face, nobody, opened
@@ -190,7 +191,12 @@ def _drawn(path: Path, course: Course, found: Sequence[Found], output: Output) -
     title = f"{len(found)} × {', '.join(sorted(models))} on one bus, {course.rate:.0f} cycles per second"
     names = [f"#{one.node}" for one in found]
     try:
-        plot.trajectory(path, course.times, course.goals, course.presents, names, title=title, simulated=True)
+        with usable(path, "written"):
+            plot.trajectory(
+                path, course.times, course.goals, course.presents, names, title=title, simulated=True
+            )
+    except RequestError:
+        raise
     except MotorbusError as missing:
         output.note(str(missing))
         return None

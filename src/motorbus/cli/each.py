@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.target import able, everyone, face, gathered, offers, opened, target
+from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def _tried(bus: Bus | DryBus, node: int, verb: str, errors: list[MotorbusError])
     except LinkError:
         raise
     except MotorbusError as error:
+        in_words_of_the_shell(error, bus.family)
         errors.append(error)
         return {"done": False, "error": error.summary}
     return {"done": True, **({"promise": promise.value} if isinstance(promise, Enum) else {})}

@@ -37,6 +37,10 @@ some did, 5 when nobody did. A port that a foreign program holds cannot be
 reached: the error names that program. Without BUS, every bus that a motorbus
 process of yours holds is stopped.
 
+From here KST servos must say where they are before they can be held there. On
+a bus without ids everyone is asked who is there first, and the answers are
+waited for (0.15 s); name the servos (BUS#1-6), and that is left out.
+
 Examples:
 
     motorbus estop

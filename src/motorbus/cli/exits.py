@@ -48,7 +48,7 @@ MEANINGS: Final[Mapping[Exit, str]] = {
 
 
 class NeedsConsent(errors.MotorbusError):
-    """What was asked for moves far, writes EEPROM or goes past a guard, and nobody agreed. Nothing was sent."""
+    """What was asked for moves far, writes EEPROM or goes past a guard, and nobody agreed. Nothing was changed."""
 
 
 class Partial(errors.MotorbusError):

@@ -10,6 +10,8 @@ A family's face is the module (or package) of its name in this folder. Apart fro
     report_frames(family, node)                                all that a report of a node may be
     say(event)                                                 what an event of its operations says, "" if nothing
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
+    bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
+    COMMANDS                                                   what errors call -> the command that does the same
 
 A family that lacks one of them is served by the common verbs, or the command says that it cannot be done.
 """

@@ -5,7 +5,7 @@ The only face that knows this family. Besides its commands it offers the common 
 
 from __future__ import annotations
 
-from itertools import chain
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
@@ -330,9 +330,10 @@ def sync_write(
         values: dict[driver.Node, dict[str, Any]] = {
             servo: {name: _value(servo, table_of(servo)[name], texts[node])} for node, servo in servos.items()
         }
-        ways = [goals_among(servo, [table_of(servo)[name]], held) for servo, held in values.items()]
-        consent_to_ways(list(chain.from_iterable(ways)), output, yes=yes or dry_run)
-        carrier.run(driver.sync_write(values, rate=opening.rate))
+        ways = [way for one, held in values.items() for way in goals_among(one, [table_of(one)[name]], held)]
+        order = partial(driver.sync_write, values, rate=opening.rate)
+        consent_to_ways(ways, output, yes=yes or dry_run, rehearse=lambda: rehearsal.run(order()))
+        carrier.run(order())
     if dry_run:
         dry.show(rehearsal, output)
         return Exit.OK
@@ -393,8 +394,7 @@ def factory_restore(
     if dry_run:
         dry.show(rehearsal, output)
         return Exit.OK
-    output.document(
-        "motorbus.feetech.factory-restore/1", {"id": node, "found": found.node, "baud": found.rate}
-    )
+    facts = {"id": node, "found": found.node, "baud": found.rate}
+    output.document("motorbus.feetech.factory-restore/1", facts)
     output.text(f"#{node} is as shipped; it answers as #{found.node} at {found.rate} bit/s")
     return Exit.OK

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import traffic
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.read import state_facts
@@ -26,12 +27,15 @@ app = App(
     usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
     help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again. What no device tells has
-no column.
+no column. --listen asks nobody: it prints what others say, such as position
+reports, and works where listen_only=yes lets nothing out; --count is of frames
+then.
 
 Examples:
 
     motorbus monitor feetech:/dev/ttyACM0
     motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
+    motorbus monitor kst:can://slcan/dev/ttyACM0,listen_only=yes --listen
     motorbus monitor feetech:sim,ids=1-2#1+2 --count 3 --json""",
 )
 
@@ -44,6 +48,7 @@ def monitor(
     rate: float = 5.0,
     count: int = 0,
     duration: float = 0.0,
+    listen: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -59,11 +64,15 @@ def monitor(
         End after so many samples; 0 goes on.
     duration
         End after so many seconds; 0 goes on.
+    listen
+        Send nothing, and print every frame that is heard on a CAN bus instead.
     options
         Any option of the bus string, as a flag.
     """
     if not rate > 0 or count < 0 or not duration >= 0:
         raise RequestError("--rate must be above 0, --count and --duration not below 0")
+    if listen:
+        return traffic.listen(devices, count, duration, options, output)
     with ExitStack() as stack, _shown(output) as show:
         watched = _watched(gathered(devices), stack, options, output)
         return _watch(watched, 1 / rate, count, duration, show)

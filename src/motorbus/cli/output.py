@@ -118,7 +118,7 @@ class Output:
         if yes or (_can_ask() and _asked(f"{what}?")):
             return
         raise NeedsConsent(
-            f"nobody agreed to this: {what}", advice="say --yes if that is what you want; nothing was sent"
+            f"nobody agreed to this: {what}", advice="say --yes if that is what you want; nothing was changed"
         )
 
     def error(self, error: BaseException) -> None:

@@ -43,10 +43,14 @@ def show(title: str, rows: Iterable[Mapping[str, Any]], output: Output, *, full:
     """The same as a table."""
     names = FULL if full else BRIEF
     keys = ["name" if name == "register" else name.removeprefix(">") for name in names]
-    cells = [
-        {**row, "address": _address(row), "value": quantity.shown(row["value"], row["unit"])} for row in rows
-    ]
+    cells = [{**row, "address": _address(row), "value": _value(row)} for row in rows]
     output.table(title, names, [[row[key] for key in keys] for row in cells])
+
+
+def _value(row: Mapping[str, Any]) -> str:
+    """Nothing where the number is the raw one and words say what it means: letters and flags are no quantity."""
+    opaque = row["meaning"] and not row["unit"] and row["value"] == row["raw"]
+    return "" if opaque else quantity.shown(row["value"], row["unit"])
 
 
 def _address(row: Mapping[str, Any]) -> str:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
+from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
-from motorbus.errors import DeviceError, NoReply, RequestError
+from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -83,6 +84,9 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
             output.note(f"note: {warning}")
         try:
             yield found
+        except MotorbusError as error:
+            in_words_of_the_shell(error, found.family)
+            raise
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)

@@ -7,11 +7,21 @@ use, see `motorbus.cli.faces`.
 from __future__ import annotations
 
 from motorbus.cli.kst import identity, position, provision, settings, sheet
-from motorbus.cli.kst.offers import budget_frames, meaning, ping_everyone, report_frames, say
+from motorbus.cli.kst.offers import (
+    COMMANDS,
+    bit_rate_heard,
+    budget_frames,
+    meaning,
+    ping_everyone,
+    report_frames,
+    say,
+)
 from motorbus.cli.kst.servo import app
 
 __all__ = [
+    "COMMANDS",
     "app",
+    "bit_rate_heard",
     "budget_frames",
     "identity",
     "meaning",

@@ -5,23 +5,42 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli import quantity
+from motorbus.core import units
 from motorbus.families.kst import driver, wire
-from motorbus.families.kst.table import text
+from motorbus.families.kst.table import PROFILES, current, temperature, text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.core.entry import Entry
     from motorbus.core.family import Family
     from motorbus.core.operation import CanFrame
 
+COMMANDS: Final = {
+    "set_node_id()": "`motorbus kst node-id BUS#ID NEW`",
+    "set_node_id(": "`motorbus kst node-id BUS#ID {}`",
+    "set_bit_rate()": "`motorbus kst bit-rate BUS#ID RATE`",
+    "provision()": "`motorbus kst provision`",
+    "save()": "`motorbus kst save`",
+    "set_mid_point()": "`motorbus kst mid-point`",
+    "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
+    "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
+    "reversed()": "`motorbus kst reverse BUS#ID`",
+    "isolated=True": "`motorbus scan BUS --bitrate all`",
+}
 VERSIONS: Final = ("firmware_version", "software_version")
 
 
 def ping_everyone(bus: Bus) -> list[int]:
     """The servos that answer one read by everyone; on CAN their answers do not collide."""
     return sorted(bus.run(driver.broadcast_read("node_id", driver.dialect_of(bus.family))))
+
+
+def bit_rate_heard(bus: Bus, seconds: float, report: Callable[[object], None]) -> driver.BitRates:
+    """The bit rate of this bus by listening alone, `seconds` at each rate, and what was heard at each."""
+    search = driver.scan_bit_rates(driver.dialect_of(bus.family), seconds=seconds)
+    return bus.run(search, report=report)
 
 
 def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
@@ -52,8 +71,14 @@ def report_frames(family: Family, node: int) -> list[CanFrame]:
 
 
 def meaning(row: Entry, raw: int) -> str:
-    """A version is text; everything else as its row says."""
-    return text(row, raw) if row.name in VERSIONS else quantity.meaning(row, raw)
+    """A version is text, a status current and temperature; everything else as its row says."""
+    if row.name in VERSIONS:
+        return text(row, raw)
+    profile = next((one for one in PROFILES.values() if row is one.status_row), None)
+    if profile is None:
+        return quantity.meaning(row, raw)
+    here = units.show(current(profile, raw), "current")
+    return f"{here}, {units.show(temperature(profile, raw), 'temperature')}"
 
 
 def say(event: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.kst.identity import whole
 from motorbus.cli.kst.servo import Flag, Silent, app
 from motorbus.errors import RequestError
@@ -50,7 +51,8 @@ def eds(
     name = output_.name if output_ else ""
     text = made(PROFILES[profile], node_id=number, with_mandatory=with_mandatory, file_name=name)
     if output_ is not None:
-        output_.write_text(text, encoding="ascii", newline="\r\n")
+        with usable(output_, "written"):
+            output_.write_text(text, encoding="ascii", newline="\r\n")
     facts = {"profile": profile, "file": str(output_) if output_ else None}
     output.document("motorbus.kst.eds/1", {**facts, **({} if output_ else {"eds": text})})
     output.text(f"written: {output_}" if output_ else text.rstrip("\n"))

@@ -1,0 +1,24 @@
+"""Files that a command is told to read or to write: what is wrong with one is said once, and with its name."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from motorbus.errors import LinkError, RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@contextmanager
+def usable(file: Path, what: str) -> Iterator[None]:
+    """Around reading or writing this file; `what` is "read" or "written". Raises RequestError when it cannot be."""
+    try:
+        yield
+    except LinkError:  # an OSError too, but not one of the file
+        raise
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise RequestError(f"{file} cannot be {what}: {why}", advice="see that the path is right") from error

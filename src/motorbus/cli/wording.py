@@ -1,0 +1,38 @@
+"""Errors name what a program would call; in a shell there is a command for it, and that is what is said here."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+from motorbus.cli import faces
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from motorbus.core.family import Family
+    from motorbus.errors import MotorbusError
+
+COMMANDS: Final[Mapping[str, str]] = {
+    "stop()": "`motorbus stop`",
+    "identify()": "`motorbus info`",
+    "read()": "`motorbus read`",
+    "write()": "`motorbus write`",
+    "write(": "`motorbus write BUS#ID {}`",
+    "enable_torque()": "`motorbus torque on`",
+    "disable_torque()": "`motorbus torque off`",
+}
+"""What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
+_CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b")
+_PARTS: Final = ("summary", "expected", "cause", "advice")
+
+
+def in_words_of_the_shell(error: MotorbusError, family: Family) -> None:
+    """Name commands where this error names methods; what has no command stays as it is."""
+    words: dict[str, str] = {**COMMANDS, **(faces.offer(family.name, "COMMANDS") or {})}
+
+    def said(call: re.Match[str]) -> str:
+        return words.get(call[0]) or words.get(call[1] or "", call[0]).format(call[2])
+
+    for part in _PARTS:
+        setattr(error, part, _CALL.sub(said, getattr(error, part)))
