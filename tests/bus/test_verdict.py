@@ -68,3 +68,8 @@ def test_things_are_called_what_they_are_called_on_the_bus() -> None:
     assert "another bit rate" in frames.cause
     assert "terminating resistors" in frames.cause
     assert "--bitrate all" in frames.advice
+
+
+def test_what_the_adapter_says_is_the_cause() -> None:
+    found = verdict.error(Flight(position(3)), "silence", 1, "the adapter refused 3 frames")
+    assert found.cause == "the adapter refused 3 frames"

@@ -76,6 +76,35 @@ def test_an_example_with_simulated_devices_works(line: str, run: Run) -> None:
     assert ran.out
 
 
+RULE = "Read as usual; show the frames that would change something, and send none of those."
+
+
+@pytest.mark.parametrize(
+    "words", [words for words in ALL if words[0] not in OF_ONE_FAMILY or words[1:]], ids="-".join
+)
+def test_a_dry_run_means_the_same_everywhere(words: tuple[str, ...], run: Run) -> None:
+    """Who can change a device has one, by one rule; who cannot says so, with or without anything else."""
+    if "--dry-run" in (shown := run(*words, "--help").out):
+        assert RULE in " ".join(shown.replace("│", " ").split())
+        return
+    for more in ([], ["kst:sim#1"]):
+        ran = run(*words, *more, "--dry-run", "-vv")
+        assert (ran.code, ran.out) == (2, "")
+        assert f"`motorbus {' '.join(words)}` has no --dry-run" in ran.err
+        assert " tx " not in ran.err
+
+
+def test_everything_that_needs_consent_or_moves_has_a_dry_run() -> None:
+    def takes(words: tuple[str, ...], option: str) -> bool:
+        app = APP
+        for word in words:
+            app = app[word]
+        return app.default_command is not None and option in signature(app.default_command).parameters
+
+    assert [words for words in ALL if takes(words, "yes") and not takes(words, "dry_run")] == []
+    assert all(takes(words, "dry_run") for words in ALL if words[0] in ("write", "move", "torque", "stop") and words[1:])
+
+
 @pytest.mark.parametrize("words", ALL, ids="-".join)
 def test_every_command_has_help(words: tuple[str, ...], run: Run) -> None:
     ran = run(*words, "--help")

@@ -7,8 +7,8 @@ import math
 import pytest
 
 import motorbus
-from motorbus.cli.consent import consent_to_ways, goals_among
-from motorbus.cli.exits import NeedsConsent
+from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
+from motorbus.cli.exits import NeedsConsent, Unforeseeable
 from motorbus.cli.output import Output
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import Servo
@@ -74,3 +74,28 @@ def test_what_would_be_refused_anyway_is_told_before_anybody_is_asked(arm: Simul
         with pytest.raises(LimitExceeded):
             consent_to_ways([(one, here + 4.0)], Output(), yes=False, rehearse=rehearse)
         consent_to_ways([(one, here + 1.0)], Output(), yes=False, rehearse=rehearse)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("write BUS#1 goal_position=400deg", "lies outside"),
+        ("write BUS#1 id=4", "may lose it"),
+        ("feetech reg-write BUS#1 goal_position=400deg", "lies outside"),
+        ("feetech sync-write BUS goal_position 1=400deg", "lies outside"),
+    ],
+)
+def test_nobody_is_asked_about_what_is_refused_anyway(words: str, says: str, run: Run, arm: Simulation) -> None:
+    ran = run(*words.replace("BUS", arm.url).split())
+    assert ran.code == (2 if "id=" in words else 8)
+    assert says in ran.err
+    assert "nobody agreed" not in ran.err
+
+
+def test_what_cannot_be_foreseen_is_no_refusal() -> None:
+    def rehearse() -> None:
+        raise Unforeseeable("an answer decides")
+
+    with pytest.raises(NeedsConsent, match="save it"):
+        consent_to("save it", Output(), yes=False, rehearse=rehearse)
+    consent_to("save it", Output(), yes=True, rehearse=rehearse)

@@ -136,6 +136,9 @@ def test_recordings_are_read(suffix: str, relative: bool, run: Run, tmp_path: Pa
 def test_a_recording_that_is_empty_or_not_there_is_told(run: Run, tmp_path: Path) -> None:
     (tmp_path / "empty.log").write_text("")
     assert run("decode", "--family", "kst", "--file", str(tmp_path / "empty.log")).code == 2
-    assert run("decode", "--family", "kst", "--file", str(tmp_path / "nothing.log")).code == 1
+    for name in ("nothing.log", "nothing.asc", "nothing.blf"):
+        ran = run("decode", "--family", "kst", "--file", str(tmp_path / name))
+        assert (ran.code, ran.out) == (2, "")
+        assert f"{name} cannot be read: no such file or directory" in ran.err
     assert run("decode", "--family", "kst", GOAL, "--file", str(tmp_path / "empty.log")).code == 2
     assert run("decode", "--family", "feetech", "--file", str(tmp_path / "empty.log")).code == 2

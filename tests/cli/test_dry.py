@@ -95,3 +95,15 @@ def test_frames_are_explained_without_their_framing(
     assert "WRITE to servo 1; address register 48, torque_limit; torque_limit 500" in shown
     assert "checksum" not in shown
     assert "status packet" not in shown
+
+
+def test_a_field_that_says_its_name_is_named_once(capsys: pytest.CaptureFixture[str]) -> None:
+    with motorbus.simulate("kst", ids="0x25", profile="xqpower") as simulation:
+        with motorbus.open(simulation.url) as bus:
+            rehearsal = DryBus(bus)
+            bus.family.devices.blocking(rehearsal, 0x25).start_reports()
+        dry.show(rehearsal, Output())
+    shown = capsys.readouterr().out
+    assert "would send 000#0125" in shown
+    assert "; node 37" in shown
+    assert "node node" not in shown

@@ -53,6 +53,7 @@ def test_rates() -> None:
     assert scan.rates("", FAMILY) == ()
     assert scan.rates("all", FAMILY) == FAMILY.link.rates
     assert scan.rates("500000, 115200", FAMILY) == (500_000, 115_200)
+    assert scan.rates("500k+1M", FAMILY) == (500_000, 1_000_000)
     with pytest.raises(RequestError, match="not a list of rates"):
         scan.rates("fast", FAMILY)
 
@@ -95,3 +96,31 @@ def test_what_a_scan_notices_is_told(run: Run) -> None:
         ran = run("scan", simulation.url, "--json")
         assert "note: #37 at 500000 bit/s: two answers" in run("scan", simulation.url).err
     assert "two answers to one request" in ran.document["notes"][0]
+
+
+def test_a_rate_is_found_by_listening_alone(run: Run) -> None:
+    with motorbus.simulate("kst", ids="0x25", profile="kst-ext") as simulation:
+        with motorbus.open(simulation.url) as bus:
+            bus.family.devices.blocking(bus, 0x25).start_reports(0.1)
+        ran = run("scan", simulation.url, "--listen", "--json", "-vv")
+    assert (ran.code, ran.document["bitrate"]) == (0, 500_000)
+    assert list(ran.document["heard"])[-1] == "500000"
+    assert " tx " not in ran.err
+
+
+def test_a_bus_on_which_nobody_speaks_tells_no_rate(run: Run) -> None:
+    ran = run("scan", "kst:sim:none", "--listen")
+    assert ran.code == 2
+    with motorbus.simulate("kst", ids="0x25") as simulation:
+        ran = run("scan", simulation.url, "--listen", "-vv")
+    assert ran.code == 5
+    assert ran.out.count("silence") == 8
+    assert "--bitrate all" in ran.err
+    assert " tx " not in ran.err
+
+
+@pytest.mark.parametrize("words", ["feetech:sim", "kst:sim --ids 1", "kst:sim#1", "kst:sim --bitrate 1M"])
+def test_listening_asks_nobody(words: str, run: Run) -> None:
+    ran = run("scan", *words.split(), "--listen")
+    assert (ran.code, ran.out) == (2, "")
+    assert "--listen" in ran.err

@@ -128,6 +128,8 @@ def test_the_switches_are_listed(run: Run) -> None:
         (["feetech", "--baud", "-1"], 2),
         (["kst", "--baud", "500000"], 2),
         (["kst", "--bitrate", "123456"], 2),
+        (["kst", "--bitrate", "300k"], 2),
+        (["kst", "--bitrate", "fast"], 2),
         (["kst", "--ids", "0"], 2),
         (["kst", "--profile", "abacus"], 2),
         (["kst", "--out-of-range", "explode"], 2),

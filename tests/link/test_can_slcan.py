@@ -191,6 +191,11 @@ def test_damage_is_counted_and_survived() -> None:
         peer.say(b"\a\a", PONG)
         assert some(link) == [PONG]
         assert link.refused == 2
+        assert "refused 2 frames" in link.trouble()
+        assert link.trouble() == "", "told once"
+        peer.say(b"t6254\r", PONG)
+        assert some(link) == [PONG]
+        assert "1 lines of the adapter were damaged" in link.trouble()
         link.close()
 
 

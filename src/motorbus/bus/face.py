@@ -44,6 +44,7 @@ class BusFace:
             listen_only=bool(getattr(link, "listen_only", False)),
             admit=self._armed(admit) if admit is not None else None,
         )
+        self.turns.trouble = getattr(link, "trouble", str)
         self.changed = Condition(self.turns.lock)
         self.stopper = Stopper(link, self.turns, stop_socket)
         if stop_socket is not None:

@@ -11,6 +11,7 @@ over a local socket beside the lock file. Over a link with virtual time there is
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import json
 import socket
@@ -68,6 +69,7 @@ class Stopper:
                 self._thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
                 self._thread.start()
                 self._ready.wait(PATIENCE)
+                atexit.register(self.close)  # a process that ends lets a stop that has begun come to its end
 
     def trigger(self) -> None:
         """Ask for the stop and return at once; safe in a signal handler. Does nothing before `start`."""
@@ -233,8 +235,9 @@ class Stopper:
                 client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
 
     def close(self) -> None:
-        """End the thread. Nothing is sent."""
+        """End the thread, once a stop that has begun is over. Nothing else is sent."""
         self._closed = True
+        atexit.unregister(self.close)
         self.trigger()
         if self._thread is not None:
             self._thread.join(PATIENCE)

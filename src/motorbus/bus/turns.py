@@ -52,6 +52,7 @@ class Turns(Air):
         super().__init__(family, rate=rate, latency=latency, pace=_pace(paced))
         self.listen_only = self.listening = listen_only
         self.admit = admit
+        self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
         self.lock = RLock()
         self.latched = False
         self.stopping = False
@@ -316,7 +317,7 @@ class Turns(Air):
                 self.statistics.of(due.node).retries += 1
             self._queues[flight.rank].appendleft(flight)
         else:
-            self._settle(flight, error=verdict.error(flight, kind, flight.tries))
+            self._settle(flight, error=verdict.error(flight, kind, flight.tries, self.trouble()))
 
     def _probe_failed(self, probe: Flight, parent: Flight, kind: str, now: float) -> None:
         parent.tries += 1
@@ -327,7 +328,7 @@ class Turns(Air):
         if len(parent.exchange.replies) == 1:  # type: ignore[arg-type]  # never ANY here
             self._drop(parent)
             parent.noise = probe.noise
-            self._settle(parent, error=verdict.error(parent, kind, parent.tries))
+            self._settle(parent, error=verdict.error(parent, kind, parent.tries, self.trouble()))
 
     def _drop(self, flight: Flight) -> None:
         if flight in self._queues[flight.rank]:

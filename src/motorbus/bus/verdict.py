@@ -68,8 +68,8 @@ def fault(flight: Flight) -> str:
     return "checksum" if "checksum" in kinds else kinds[0] if kinds and kinds[0] in CAUSES else "silence"
 
 
-def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
-    """The exception for an exchange that failed for good."""
+def error(flight: Flight, kind: str, tries: int, said: str = "") -> MotorbusError:
+    """The exception for an exchange that failed for good; `said` is what the adapter has to say of it, if anything."""
     exchange = flight.exchange
     dues = () if exchange.replies is ANY else exchange.replies
     node = dues[0].node if dues else None
@@ -92,7 +92,7 @@ def error(flight: Flight, kind: str, tries: int) -> MotorbusError:
         sent=exchange.request,
         received=received,
         expected=f"{dues[0].length} bytes from {who}" if dues else "",
-        cause=cause,
+        cause=said or cause,
         advice=advice,
         node=node,
     )

@@ -17,7 +17,7 @@ from motorbus.core.operation import Effect
 from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from motorbus.cli.quantity import Typed
     from motorbus.core.entry import Entry, Value
@@ -88,11 +88,7 @@ def write(
     with opened(bus, options, output) as opening:
         rehearsal = dry.DryBus(opening)
         one = face(rehearsal if dry_run else opening, node)
-        table = table_of(one)
-        orders = [
-            _order(one, table[name], quantity.typed(table[name], text, raw=raw))
-            for name, text in wanted.items()
-        ]
+        orders = _orders(one, wanted, raw)
         values = {order.entry.name: order.value for order in orders}
         rehearse = partial(face(rehearsal, node).write, **values)
         _permit(orders, output, rehearse, expert=expert, yes=yes or dry_run)
@@ -119,6 +115,13 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
         for name in wanted.keys() & table.keys():
             quantity.typed(table[name], wanted[name], raw=raw)
     return wanted
+
+
+def _orders(one: Any, wanted: Mapping[str, str], raw: bool) -> list[Order]:
+    table = table_of(one)
+    return [
+        _order(one, table[name], quantity.typed(table[name], text, raw=raw)) for name, text in wanted.items()
+    ]
 
 
 def _order(one: Any, entry: Entry, typed: Typed) -> Order:

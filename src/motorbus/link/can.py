@@ -86,6 +86,7 @@ class CanLink:
         self.rate = self._settled_rate(usual)
         self.listen_only = self._config.listen_only
         self._tuning = False
+        self._told = (0, 0)
         self.lock_name = _lock_name(self._config)
         self._lock = PortLock(self.lock_name or port)
         if self.lock_name and not (shared and self._config.interface == "socketcan"):
@@ -207,6 +208,19 @@ class CanLink:
     def dropped(self) -> int:
         """Frames left out: CAN FD, and echoes of our own."""
         return self._wire.dropped
+
+    def trouble(self) -> str:
+        """What the adapter has said since this was last asked, for whoever waits in vain; "" for nothing."""
+        refused, damaged = self._wire.refused, self._wire.damaged
+        before, self._told = self._told, (refused, damaged)
+        if refused > before[0]:
+            return (
+                f"the adapter refused {refused - before[0]} frames: nobody on the bus acknowledges them, the bit rate "
+                "is another, or its buffer is full"
+            )
+        if damaged > before[1]:
+            return f"{damaged - before[1]} lines of the adapter were damaged: its cable, or another program on its port"
+        return ""
 
     def now(self) -> float:
         return time.monotonic()

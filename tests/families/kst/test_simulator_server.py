@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.families.kst.simulator.servo import MAILBOX
 from tests.families.kst.simulated_host import Host
 
 VERSION = "625#400A100000000000"
@@ -113,3 +114,9 @@ def test_one_servo_serves_one_request_after_the_other_and_two_serve_two_at_once(
         (0.0002, "581"),
         (0.0003, "581"),
     ]
+
+
+def test_a_flood_fills_the_mailbox_and_the_rest_is_lost() -> None:
+    host = Host()
+    assert len(host.timed(*["625#4000300000000000"] * 100)) == MAILBOX + 1
+    assert host.say("625#4000300000000000"), "and it is served again at once"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from math import inf, pi
+from typing import Final
 
 from motorbus.core.operation import CanFrame
 from motorbus.families.kst import wire
@@ -20,6 +21,8 @@ from motorbus.families.kst.table import BIT_RATES, Profile
 
 COUNTS_PER_RADIAN = 180 / pi
 """Times the counts per degree of the profile."""
+MAILBOX: Final = 16
+"""Requests that may wait for a servo; an assumption, no source tells the size of its receive buffer."""
 
 
 class Servo:
@@ -182,6 +185,8 @@ class Servo:
 
     def obey(self, request: wire.Request, at: float) -> None:
         """Carry a request out and answer it, one after the other: a servo has one SDO server."""
+        if self.busy_until - at > MAILBOX * self.switches.turnaround:
+            return  # no controller holds more; a host that floods it loses frames, and the others are served again soon
         self.extended = request.extended
         reply = self._server.answer(request, at)
         if reply is None:

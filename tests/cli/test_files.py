@@ -1,0 +1,29 @@
+"""What is wrong with a file is said with its name, and an error of the bus is not taken for one of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from motorbus.cli.files import usable
+from motorbus.errors import LinkLost, RequestError
+
+
+def test_a_file_that_is_good_is_used(tmp_path: Path) -> None:
+    with usable(tmp_path / "a", "written"):
+        (tmp_path / "a").write_text("x")
+    assert (tmp_path / "a").read_text() == "x"
+
+
+def test_what_is_wrong_is_said_with_the_name(tmp_path: Path) -> None:
+    missing = tmp_path / "none" / "a"
+    with pytest.raises(RequestError, match="a cannot be written: no such file or directory"), usable(missing, "written"):
+        missing.write_text("x")
+    with pytest.raises(RequestError, match="cannot be read: is a directory"), usable(tmp_path, "read"):
+        tmp_path.read_text()
+
+
+def test_a_lost_port_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(LinkLost), usable(tmp_path, "read"):
+        raise LinkLost("gone")

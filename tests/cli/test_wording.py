@@ -1,0 +1,61 @@
+"""No error of a shell names what only a program can call, where there is a command for it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from motorbus import families
+from motorbus.cli import faces, wording
+from motorbus.errors import MotorbusError, RequestError
+from tests.cli.conftest import Run
+
+
+@pytest.mark.parametrize(
+    ("family", "said", "meant"),
+    [
+        ("kst", "use set_node_id(), or provision(), which", "use `motorbus kst node-id BUS#ID NEW`, or `motorbus kst"),
+        ("kst", "set_node_id(38) and save() put", "`motorbus kst node-id BUS#ID 38` and `motorbus kst save` put"),
+        ("kst", "set_reversed(False) first", "`motorbus kst reverse BUS#ID off` first"),
+        ("kst", "say isolated=True; nothing", "say `motorbus scan BUS --bitrate all`; nothing"),
+        ("feetech", "write(operating_mode=0) puts", "`motorbus write BUS#ID operating_mode=0` puts"),
+        ("feetech", "still under way: stop() ends", "still under way: `motorbus stop` ends"),
+        ("template", "use disable_torque()", "use `motorbus torque off`"),
+    ],
+)
+def test_methods_become_commands(family: str, said: str, meant: str) -> None:
+    error = MotorbusError("x", cause=said, advice=said)
+    found = families.load("feetech" if family == "template" else family)
+    wording.in_words_of_the_shell(error, found)
+    assert meant in error.cause
+    assert meant in error.advice
+    assert meant in str(error)
+
+
+@pytest.mark.parametrize("text", ["a way (of 180 degrees)", "enable_torque(jump=0.5)", "2048 (raw)", "f(x)", "{}()"])
+def test_everything_else_stays(text: str) -> None:
+    error = RequestError(text, advice=text)
+    wording.in_words_of_the_shell(error, families.load("kst"))
+    assert (error.summary, error.advice) == (text, text)
+
+
+@pytest.mark.parametrize("family", faces.names())
+def test_every_command_that_is_named_exists(family: str, run: Run) -> None:
+    said = {**wording.COMMANDS, **(faces.offer(family, "COMMANDS") or {})}
+    for text in said.values():
+        words = re.sub(r"[`{}|]|BUS.*|--.*", "", text).split()[1:]
+        assert run(*[word for word in words if word not in ("on", "off")], "--help").code == 0
+
+
+@pytest.mark.parametrize("words", ["node_id=38", "bit_rate_code=7 --yes", "store=1", "function_enable=1", "mid_point=0"])
+def test_a_protected_object_is_refused_in_the_words_of_a_shell(words: str, run: Run) -> None:
+    ran = run("write", "kst:sim,profile=kst-ext#1", *words.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert "use `motorbus kst " in ran.err
+    assert "()" not in ran.err
+
+
+def test_a_stop_of_several_is_told_in_them_too(run: Run) -> None:
+    ran = run("write", "feetech:sim#1", "lock=1", "--yes")
+    assert "()" not in ran.err
