@@ -2,7 +2,8 @@
 
 Commands are listed in tests/coverage/FAMILY.toml, one entry for each; objects (registers) come from the tables of the
 family, so that a new row is on the page by itself. What stands on the page are claims: tests/test_coverage.py finds
-every one of them true, or fails. `python -m scripts.coverage` writes the page, with `--check` it only compares.
+every one of them true, or fails. What simulator and decoder make of an object is no claim but is seen while the page is
+made (`scripts/proof.py`). `python -m scripts.coverage` writes the page, with `--check` it only compares.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from motorbus import families
 from motorbus.core.entry import Entry, Storage
 from motorbus.core.family import Family
 from motorbus.core.operation import Effect
+from scripts.proof import Device, Order, Proof, by_name, by_order
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "reference" / "coverage.md"
@@ -68,6 +70,11 @@ class Coverage(NamedTuple):
     commands: tuple[Command, ...]
     objects: tuple[Object, ...]
     maps: Mapping[str, Mapping[str, str]]
+
+    def settings(self, map_: str) -> dict[str, object]:
+        """What a bus of these devices must be told."""
+        known = {option.name for option in self.family.link.settings}
+        return {name: value for name, value in self.maps[map_].items() if name in known}
 
 
 def known() -> list[str]:
@@ -146,8 +153,9 @@ HEAD = """# Coverage
 
 What of each vendor's manual is there: every instruction, command and object, in five places. Each cell of this page
 is a claim that a test finds true: the name exists in Python, the words are a command of the shell, the simulated
-device answers the frame (or does what it says, where no answer is due), `motorbus decode` explains it, and the test
-that is named is there. A cell that would be empty fails the tests.
+device answers the frame (or, where no answer is due, obeys: what is named changes), `motorbus decode` explains it, and
+the test that is named is there. For each object and each register map its frames were sent to a simulated device, and
+explained, when this page was made. A cell that would be empty fails the tests.
 
 This page is made by `python -m scripts.coverage` from the tables of the families and from `tests/coverage`.
 """
@@ -162,7 +170,7 @@ def _section(name: str) -> str:
     told = load(name)
     frames = vectors(name)
     commands = [_command_row(one, frames) for one in told.commands]
-    objects = [_object_row(one, len(told.family.tables)) for one in told.objects]
+    objects = [_object_row(told, one) for one in told.objects]
     return "\n".join(
         [
             f"## {told.title}\n",
@@ -195,14 +203,41 @@ def _command_row(one: Command, frames: Mapping[str, str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _object_row(one: Object, maps: int) -> str:
+def _object_row(told: Coverage, one: Object) -> str:
     row = one.row
     address = str(row.address) if row.subindex is None else f"0x{row.address:04X}:{row.subindex:02X}"
-    where = "all" if len(one.maps) == maps else ", ".join(one.maps)
+    where = "all" if len(one.maps) == len(told.family.tables) else ", ".join(one.maps)
     unwritten = row.writable and len(one.api) == 1 and one.api[0].endswith(".read")
     access = f"{row.access.value}; no verb writes it yet" if unwritten else row.access.value
     cells = [f"`{row.name}`", address, where, access, _code(one.api), _shell(one.cli)]
-    return f"| {' | '.join([*cells, 'answers', 'names it', _test(one.test)])} |"
+    return f"| {' | '.join([*cells, *proven(told, one), _test(one.test)])} |"
+
+
+def proven(told: Coverage, one: Object) -> Proof:
+    """What simulator and decoder make of this row, by every map that has it. Raises ValueError where one does not."""
+    found = {map_: proof(told, one, map_) for map_ in one.maps}
+    for map_, seen in found.items():
+        for who, what in seen._asdict().items():
+            if not what:
+                raise ValueError(
+                    f"{told.family.name}: the {who} knows nothing of {one.row.name} of the map {map_}"
+                )
+    said = [" or ".join(dict.fromkeys(column)) for column in zip(*found.values(), strict=True)]
+    return Proof(*said)
+
+
+def proof(told: Coverage, one: Object, map_: str) -> Proof:
+    """The same by one map. Raises ValueError for a row that no verb reaches and whose command is not listed."""
+    row = told.family.tables[map_][one.row.name]
+    device = Device(told.family.configured(**told.settings(map_)), told.ids, told.maps[map_])
+    if row.readable or not row.protected:
+        return by_name(device, row)
+    commands = {command.name: command for command in told.commands}
+    if one.command not in commands:
+        raise ValueError(f"{row.name}: there is no command {one.command!r}")
+    command, frames = commands[one.command], vectors(told.family.name)
+    sent, before = ([frames[name] for name in names] for names in (command.vectors, command.before))
+    return by_order(device, row, Order(tuple(sent), tuple(before), command.changes, command.restarts))
 
 
 def _short(frame: str) -> str:

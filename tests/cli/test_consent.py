@@ -85,7 +85,9 @@ def test_what_would_be_refused_anyway_is_told_before_anybody_is_asked(arm: Simul
         ("feetech sync-write BUS goal_position 1=400deg", "lies outside"),
     ],
 )
-def test_nobody_is_asked_about_what_is_refused_anyway(words: str, says: str, run: Run, arm: Simulation) -> None:
+def test_nobody_is_asked_about_what_is_refused_anyway(
+    words: str, says: str, run: Run, arm: Simulation
+) -> None:
     ran = run(*words.replace("BUS", arm.url).split())
     assert ran.code == (2 if "id=" in words else 8)
     assert says in ran.err

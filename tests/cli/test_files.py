@@ -18,7 +18,10 @@ def test_a_file_that_is_good_is_used(tmp_path: Path) -> None:
 
 def test_what_is_wrong_is_said_with_the_name(tmp_path: Path) -> None:
     missing = tmp_path / "none" / "a"
-    with pytest.raises(RequestError, match="a cannot be written: no such file or directory"), usable(missing, "written"):
+    with (
+        pytest.raises(RequestError, match="a cannot be written: no such file or directory"),
+        usable(missing, "written"),
+    ):
         missing.write_text("x")
     with pytest.raises(RequestError, match="cannot be read: is a directory"), usable(tmp_path, "read"):
         tmp_path.read_text()

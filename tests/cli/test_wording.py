@@ -15,8 +15,16 @@ from tests.cli.conftest import Run
 @pytest.mark.parametrize(
     ("family", "said", "meant"),
     [
-        ("kst", "use set_node_id(), or provision(), which", "use `motorbus kst node-id BUS#ID NEW`, or `motorbus kst"),
-        ("kst", "set_node_id(38) and save() put", "`motorbus kst node-id BUS#ID 38` and `motorbus kst save` put"),
+        (
+            "kst",
+            "use set_node_id(), or provision(), which",
+            "use `motorbus kst node-id BUS#ID NEW`, or `motorbus kst",
+        ),
+        (
+            "kst",
+            "set_node_id(38) and save() put",
+            "`motorbus kst node-id BUS#ID 38` and `motorbus kst save` put",
+        ),
         ("kst", "set_reversed(False) first", "`motorbus kst reverse BUS#ID off` first"),
         ("kst", "say isolated=True; nothing", "say `motorbus scan BUS --bitrate all`; nothing"),
         ("feetech", "write(operating_mode=0) puts", "`motorbus write BUS#ID operating_mode=0` puts"),
@@ -33,7 +41,9 @@ def test_methods_become_commands(family: str, said: str, meant: str) -> None:
     assert meant in str(error)
 
 
-@pytest.mark.parametrize("text", ["a way (of 180 degrees)", "enable_torque(jump=0.5)", "2048 (raw)", "f(x)", "{}()"])
+@pytest.mark.parametrize(
+    "text", ["a way (of 180 degrees)", "enable_torque(jump=0.5)", "2048 (raw)", "f(x)", "{}()"]
+)
 def test_everything_else_stays(text: str) -> None:
     error = RequestError(text, advice=text)
     wording.in_words_of_the_shell(error, families.load("kst"))
@@ -48,7 +58,9 @@ def test_every_command_that_is_named_exists(family: str, run: Run) -> None:
         assert run(*[word for word in words if word not in ("on", "off")], "--help").code == 0
 
 
-@pytest.mark.parametrize("words", ["node_id=38", "bit_rate_code=7 --yes", "store=1", "function_enable=1", "mid_point=0"])
+@pytest.mark.parametrize(
+    "words", ["node_id=38", "bit_rate_code=7 --yes", "store=1", "function_enable=1", "mid_point=0"]
+)
 def test_a_protected_object_is_refused_in_the_words_of_a_shell(words: str, run: Run) -> None:
     ran = run("write", "kst:sim,profile=kst-ext#1", *words.split())
     assert (ran.code, ran.out) == (2, "")

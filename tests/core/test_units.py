@@ -125,13 +125,22 @@ def test_no_text_gives_anything_but_a_number_or_our_error(text: str, quantity: s
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("500000", 500_000), (500_000, 500_000), ("500k", 500_000), ("0.5M", 500_000), ("1M", 1_000_000), ("0x10", 16)],
+    [
+        ("500000", 500_000),
+        (500_000, 500_000),
+        ("500k", 500_000),
+        ("0.5M", 500_000),
+        ("1M", 1_000_000),
+        ("0x10", 16),
+    ],
 )
 def test_a_rate_is_spelled_in_one_way_everywhere(text: object, value: int) -> None:
     assert rate(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "fast", "0", "-1", "0k", "-1M", "1m", "1.5", "0.0001k", "1/2", "nan", "1e6", "kk"])
+@pytest.mark.parametrize(
+    "text", ["", "fast", "0", "-1", "0k", "-1M", "1m", "1.5", "0.0001k", "1/2", "nan", "1e6", "kk"]
+)
 def test_what_is_no_rate_is_refused(text: str) -> None:
     with pytest.raises(RequestError, match="is not a rate"):
         rate(text)

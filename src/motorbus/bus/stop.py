@@ -35,6 +35,7 @@ ROUND_TIME = 0.25  # s for all frames of one round, beyond what they need
 BREATH = 0.05  # s; the shortest round after which something is missing
 CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
 PATIENCE = 5.0  # s that a caller waits for the stop thread
+STOP, END = b"!", b"."  # what wakes the thread
 
 
 class StopOutcome(NamedTuple):
@@ -73,9 +74,12 @@ class Stopper:
 
     def trigger(self) -> None:
         """Ask for the stop and return at once; safe in a signal handler. Does nothing before `start`."""
+        self._wake(STOP)
+
+    def _wake(self, word: bytes) -> None:
         if self._pair is not None:
             with contextlib.suppress(OSError):
-                self._pair[1].send(b"!")
+                self._pair[1].send(word)
 
     def estop(self) -> StopOutcome:
         """Stop, and wait for the outcome. Raises LinkLost when the bus is closed: nothing can be sent then."""
@@ -197,18 +201,21 @@ class Stopper:
             if listener is not None:
                 ready.register(listener, EVENT_READ)
             self._ready.set()
-            while not self._closed:
-                with contextlib.suppress(Exception):  # whatever goes wrong, the next wish must be heard
-                    self._look(ready, wish, listener)
+            ended = False
+            while not ended:
+                try:
+                    ended = self._look(ready, wish, listener)
+                except Exception:  # whatever goes wrong, the next wish must be heard
+                    ended = self._closed
             for key in list(ready.get_map().values()):
                 if key.fileobj not in (wish, listener) and isinstance(key.fileobj, socket.socket):
                     key.fileobj.close()
 
-    def _look(self, ready: DefaultSelector, wish: socket.socket, listener: socket.socket | None) -> None:
-        """Wait for a wish from this process first, then for clients; a mute one holds up nobody."""
+    def _look(self, ready: DefaultSelector, wish: socket.socket, listener: socket.socket | None) -> bool:
+        """Wait for a wish from this process first, then for clients; a mute one holds up nobody. True at the end."""
         ends = [key.fileobj for key, _ in ready.select()]
-        if wish in ends:
-            self._wished(wish)
+        if wish in ends and self._wished(wish):
+            return True
         for end in ends:
             if end is listener and listener is not None:
                 with contextlib.suppress(OSError):
@@ -216,11 +223,14 @@ class Stopper:
             elif end is not wish and isinstance(end, socket.socket):
                 ready.unregister(end)
                 self._asked(end)
+        return False
 
-    def _wished(self, wish: socket.socket) -> None:
-        wish.recv(4096)
-        if not self._closed:
+    def _wished(self, wish: socket.socket) -> bool:
+        """Stop if that is wished, also just before the end; True when the end is."""
+        words = wish.recv(4096)
+        if STOP in words:
             self._stop_and_tell()
+        return END in words
 
     def _stop_and_tell(self) -> StopOutcome:
         self.outcome = self.stop()
@@ -238,7 +248,7 @@ class Stopper:
         """End the thread, once a stop that has begun is over. Nothing else is sent."""
         self._closed = True
         atexit.unregister(self.close)
-        self.trigger()
+        self._wake(END)
         if self._thread is not None:
             self._thread.join(PATIENCE)
         for end in self._pair or ():
