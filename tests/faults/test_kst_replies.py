@@ -33,7 +33,7 @@ def test_reports_500_times_a_second_on_the_reply_identifier_fail_no_read(
     assert reports >= 500 * (rig.link.now() - 0.01)
     ledger = rig.bus.statistics.of(0x25)
     assert (ledger.ok, ledger.retries) == (ledger.sent, 0)
-    assert ledger.sent - total == (total - 1) // (EQUAL_RUN - 1), "a run of equal answers ends in a probe"
+    assert ledger.sent - total == (total - 1) // EQUAL_RUN, "a run of equal answers ends in a probe"
 
 
 @pytest.mark.timeout(900)
