@@ -6,7 +6,7 @@ frames the decoder does not name, has no proof, and `scripts/coverage.py` then m
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -57,9 +57,9 @@ def by_name(device: Device, row: Entry) -> Proof:
     """Read it where it can be read, and write it where that moves nothing and is not refused by name."""
     with device.made() as simulation, motorbus.open(simulation.url) as bus:
         one = bus.family.devices.blocking(bus, min(simulation.simulator.nodes))
-        one.identify()
-        seen = bus.trace.subscribe()
         try:
+            one.identify()
+            seen = bus.trace.subscribe()
             _read_and_written(one, row)
         except MotorbusError:
             return Proof("", "")
@@ -67,7 +67,7 @@ def by_name(device: Device, row: Entry) -> Proof:
         asked = [record.data for record in records if record.direction == "tx"]
         told = [record.data for record in records if record.direction == "rx"]
         good = bool(asked) and bool(told) and not faults(bus.family, told)
-        return Proof("answers" if good else "", _named(bus.family, asked, row.name))
+        return Proof("answers" if good else "", named(bus.family, asked, row.name))
 
 
 def _read_and_written(one: Any, row: Entry) -> None:
@@ -84,7 +84,7 @@ def by_order(device: Device, row: Entry, order: Order) -> Proof:
     seen = {_obeyed(device, frame, order) for frame in order.frames}
     frames = [data_of(frame) for frame in order.frames]
     simulator = seen.pop() if len(seen) == 1 else ""
-    return Proof(simulator, _named(device.family, frames, row.name))
+    return Proof(simulator, named(device.family, frames, row.name))
 
 
 def _obeyed(device: Device, frame: str, order: Order) -> str:
@@ -122,10 +122,14 @@ def faults(family: Family, frames: Iterable[Data]) -> list[str]:
     return [one.fault for data in frames for one in family.explain(_flat(data)) if one.fault]
 
 
-def _named(family: Family, frames: Iterable[Data], name: str) -> str:
-    explained = [one for data in frames for one in family.explain(_flat(data))]
-    said = [json.dumps([one.title, *(part[2:] for part in one.parts)]) for one in explained if not one.fault]
-    return "names it" if any(name in text for text in said) else ""
+def named(family: Family, frames: Iterable[Data], name: str) -> str:
+    """What the decoder makes of a name: "names it", or "" where it is a word in the meaning of no part.
+
+    Meanings only, for "id" is also what a field of many frames is called.
+    """
+    good = [one for data in frames for one in family.explain(_flat(data)) if not one.fault]
+    found = any(re.search(rf"\b{name}\b", part.meaning) for one in good for part in one.parts)
+    return "names it" if found else ""
 
 
 def _flat(data: Data) -> bytes:

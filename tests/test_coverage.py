@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import re
 import shlex
 from collections.abc import Iterable
@@ -16,11 +15,12 @@ import pytest
 import motorbus
 from motorbus import families
 from motorbus.cli import build, parse
-from motorbus.core.family import Family
+from motorbus.core.family import Explanation, Family
 from motorbus.core.operation import CanFrame, Data
 from motorbus.simulation.named import Simulation
 from scripts import coverage
 from scripts.coverage import Command, Coverage, Object
+from scripts.proof import Device, Order, by_order, named
 from tests.conformance.subjects import vectors
 
 ROOT = coverage.ROOT
@@ -40,7 +40,7 @@ for _name, _told in TOLD.items():
     CLAIMS += [(_name, row) for row in _told.objects]
 TESTS = sorted({one.test for _, one in CLAIMS})
 NAMES = sorted({(name, api) for name, one in CLAIMS for api in one.api})
-LINES = sorted({line for _, one in CLAIMS for line in one.cli})
+LINES = sorted({(name, line) for name, one in CLAIMS for line in one.cli})
 PATIENCE = 1.0
 """s in which a device must have answered."""
 
@@ -83,10 +83,10 @@ def test_a_name_exists_in_python(family: str, name: str) -> None:
     assert callable(found) or hasattr(found, "function")
 
 
-@pytest.mark.parametrize("line", LINES)
-def test_words_are_a_command(line: str) -> None:
+@pytest.mark.parametrize(("family", "line"), LINES)
+def test_words_are_a_command(family: str, line: str) -> None:
     spoken = (
-        line.replace("BUS", "feetech:sim").replace("ID", "1").replace("VALUE", "1").replace("RATE", "500k")
+        line.replace("BUS", f"{family}:sim").replace("ID", "1").replace("VALUE", "1").replace("RATE", "500k")
     )
     words = shlex.split(spoken)
     command, _, _ = parse(build(), words)
@@ -163,30 +163,92 @@ def test_the_frame_is_explained(told: Coverage, one: Command) -> None:
         assert explained.parts
 
 
-def names_it(family: Family, data: Iterable[Data], name: str) -> bool:
-    explained = [one for piece in data for one in family.explain(flat(piece))]
-    assert [one.fault for one in explained if one.fault] == []
-    return any(name in json.dumps([one.title, *(part[2:] for part in one.parts)]) for one in explained)
-
-
 @pytest.mark.parametrize(("told", "one", "map_"), OBJECTS)
-def test_a_row_is_answered_and_named(told: Coverage, one: Object, map_: str) -> None:
-    row = told.family.tables[map_][one.row.name]
-    if one.command:
-        assert one.command in {command.name for command in told.commands}
-    if not row.readable and row.protected:
-        assert one.command, "the command is judged above"
-        return
-    with fresh(told, map_) as simulation:
-        node = min(simulation.simulator.nodes)
-        with motorbus.open(simulation.url) as bus:
-            device = bus.family.devices.blocking(bus, node)
-            device.identify()
-            seen = bus.trace.subscribe()
-            if row.readable:
-                device.read(row.name)
-            else:
-                device.write(**{row.name: row.to_value(row.high)})
-            frames = [record.data for record in seen]
-    assert len(frames) >= 2
-    assert names_it(told.family, frames, row.name)
+def test_a_row_is_answered_or_obeyed_and_named(told: Coverage, one: Object, map_: str) -> None:
+    seen = coverage.proof(told, one, map_)
+    assert seen.simulator == "answers" or seen.simulator.startswith("obeys: `")
+    assert seen.decoder == "names it"
+
+
+def test_what_is_not_answered_is_not_said_to_be() -> None:
+    kst = TOLD["kst"]
+    found = {one.row.name: coverage.proven(kst, one).simulator for one in kst.objects}
+    assert [name for name, said in found.items() if said != "answers"] == ["store"]
+    assert found["store"] == "obeys: `node_id` after a power cycle"
+
+
+SOME = [("feetech", "goal_position"), ("feetech", "id"), ("feetech", "moving")]
+SOME += [
+    ("kst", name) for name in ("store", "bit_rate_code", "mid_point", "report_interval", "node_id", "status")
+]
+
+
+def of(family: str, name: str) -> Object:
+    (found,) = (one for one in TOLD[family].objects if one.row.name == name)
+    return found
+
+
+@pytest.mark.parametrize(("family", "name"), SOME)
+def test_a_device_that_is_deaf_to_a_row_has_no_proof(
+    family: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The negative: were a row not there, the page could not be made."""
+    made = Device.made
+
+    def deaf(device: Device) -> Simulation:
+        simulation = made(device)
+        receive = simulation.simulator.receive
+
+        def some(data: Data, at: float) -> None:
+            if not named(device.family, [data], name):
+                receive(data, at)
+
+        monkeypatch.setattr(simulation.simulator, "receive", some)
+        return simulation
+
+    assert coverage.proven(TOLD[family], of(family, name)).simulator
+    monkeypatch.setattr(Device, "made", deaf)
+    with pytest.raises(ValueError, match=f"the simulator knows nothing of {name} of the map"):
+        coverage.proven(TOLD[family], of(family, name))
+
+
+@pytest.mark.parametrize(("family", "name"), SOME)
+def test_a_decoder_that_does_not_name_a_row_is_no_proof(
+    family: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    explain = type(TOLD[family].family).explain
+
+    def vague(self: Family, data: bytes) -> list[Explanation]:
+        return [
+            one._replace(
+                parts=tuple(p._replace(meaning=re.sub(rf"\b{name}\b", "?", p.meaning)) for p in one.parts)
+            )
+            for one in explain(self, data)
+        ]
+
+    monkeypatch.setattr(type(TOLD[family].family), "explain", vague)
+    with pytest.raises(ValueError, match=f"the decoder knows nothing of {name} of the map"):
+        coverage.proven(TOLD[family], of(family, name))
+
+
+def test_a_save_that_keeps_nothing_is_no_proof() -> None:
+    """An order that nobody answers is judged by what it changes, and by nothing else."""
+    kst = TOLD["kst"]
+    device = Device(kst.family, kst.ids, kst.maps["kst"])
+    frames = coverage.vectors("kst")
+    row = of("kst", "store").row
+    save, before = frames["save"], frames["node-id-1"]
+    good = Order((save,), (before,), "node_id", restarts=True)
+    assert by_order(device, row, good).simulator == "obeys: `node_id` after a power cycle"
+    for bad in (
+        good._replace(before=()),
+        good._replace(changes=""),
+        good._replace(frames=(save.replace("625#", "626#"),)),
+    ):
+        assert by_order(device, row, bad).simulator == ""
+    assert by_order(device, row, good._replace(frames=(before,))) == ("answers", "")
+
+
+def test_a_command_that_is_not_listed_is_no_way() -> None:
+    with pytest.raises(ValueError, match="there is no command 'sing'"):
+        coverage.proof(TOLD["kst"], of("kst", "store")._replace(command="sing"), "kst")

@@ -9,6 +9,7 @@ import pytest
 from motorbus import families
 from motorbus.cli import faces, wording
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
 
@@ -68,6 +69,8 @@ def test_a_protected_object_is_refused_in_the_words_of_a_shell(words: str, run: 
     assert "()" not in ran.err
 
 
-def test_a_stop_of_several_is_told_in_them_too(run: Run) -> None:
-    ran = run("write", "feetech:sim#1", "lock=1", "--yes")
-    assert "()" not in ran.err
+def test_what_is_said_of_one_of_several_is_worded_too(run: Run, arm: Simulation) -> None:
+    arm[1].memory["operating_mode"] = 2
+    ran = run("stop", f"{arm.url}#1")
+    assert ran.code == 2
+    assert "use `motorbus torque off`, after which it is limp" in ran.err

@@ -68,6 +68,7 @@ def test_eeprom_needs_agreement(run: Run, arm: Simulation) -> None:
         ("goal_position=1e999", 2),
         ("goal_position=far", 2),
         ("goal_position=9", 8),
+        ("goal_position=9999deg", 8),
         ("max_temperature=101", 2),
         ("goal_positon=1", 2),
         ("present_position=1", 2),

@@ -68,3 +68,13 @@ def test_a_program_that_moves_is_stopped_from_another_shell(
     assert stop["acknowledged"] == [37]
     assert str(process.pid) in stop["by"]
     assert "Interrupted" in out, err
+
+
+def test_who_is_named_is_held_without_asking_who_is_there(run: Run) -> None:
+    """The question to everyone waits for whoever may answer; an address with ids spares that time."""
+    asks_everyone = "tx 600#"
+    assert asks_everyone in run("estop", "kst:sim,ids=1-2", "-vv").err
+    named = run("estop", "kst:sim,ids=1-2#1+2", "-vv")
+    assert named.code == 0
+    assert asks_everyone not in named.err
+    assert "0.15 s" in run("estop", "--help").out

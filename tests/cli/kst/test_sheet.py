@@ -37,3 +37,9 @@ def test_it_is_written_to_a_file(run: Run, tmp_path: Path) -> None:
 def test_what_there_is_no_sheet_for_ends_with_2(run: Run) -> None:
     assert run("kst", "eds", "--profile", "acme").code == 2
     assert run("kst", "eds", "--node", "128").code == 2
+
+
+def test_a_place_that_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
+    ran = run("kst", "eds", "--output", str(tmp_path / "none" / "servo.eds"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "servo.eds cannot be written: no such file or directory" in ran.err
