@@ -37,7 +37,7 @@ def test_eyes_see_a_line_each_until_the_time_is_over(reporting: Simulation, run:
     lines = ran.out.splitlines()
     assert (ran.code, lines[0]) == (0, "simulated")
     assert 8 <= len(lines) <= 14
-    assert all("5A5#" in line and "position" in line for line in lines[1:])
+    assert all("5A5#" in line and line.count("0° (raw 0") == 1 for line in lines[1:])
 
 
 def test_a_silent_bus_is_told(run: Run) -> None:

@@ -70,7 +70,7 @@ def test_a_protected_object_is_refused_in_the_words_of_a_shell(words: str, run: 
 
 
 def test_what_is_said_of_one_of_several_is_worded_too(run: Run, arm: Simulation) -> None:
-    arm[1].memory["operating_mode"] = 2
+    arm[1].memory["operating_mode"] = 3
     ran = run("stop", f"{arm.url}#1")
     assert ran.code == 2
     assert "use `motorbus torque off`, after which it is limp" in ran.err

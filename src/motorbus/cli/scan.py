@@ -102,11 +102,11 @@ def _rate_heard(wanted: Target, more: bool, options: Mapping[str, str], output: 
         why = "it asks nobody" if more else f"{wanted.family.name} buses have no such search"
         raise RequestError(f"--listen: {why}", expected="a CAN bus, without ids and rates")
     with opened(wanted.bus, options, output) as opening, output.progress("listening") as bar:
-        found = hear(opening, SECONDS, lambda event: _heard(wanted.family.name, [], bar, [], event))
-    heard = {str(rate): what.value for rate, what in found.heard.items()}
-    output.document("motorbus.scan.rate/1", {"bus": wanted.bus, "bitrate": found.rate, "heard": heard})
+        rate, told = hear(opening, SECONDS, lambda event: _heard(wanted.family.name, [], bar, [], event))
+    heard = {str(one): what for one, what in told.items()}
+    output.document("motorbus.scan.rate/1", {"bus": wanted.bus, "bitrate": rate, "heard": heard})
     output.table("", [">bit/s", "heard"], list(heard.items()))
-    if found.rate is None:
+    if rate is None:
         raise NoReply(
             f"{wanted.bus}: no traffic was heard at any rate",
             cause="nobody speaks unless asked, or the bus has another rate",

@@ -81,6 +81,6 @@ def _tell(opening: Bus, bus: str, record: TraceRecord, at: float, output: Output
 
 
 def _values(one: Explanation) -> str:
-    """The data fields alone: whose frame it is stands in the title."""
-    said = [f"{part.name} {part.meaning}" for part in one.parts if part.start >= _DATA]
-    return "".join(f"; {text}" for text in said if not text.startswith("reserved"))
+    """The data fields that the title does not tell already."""
+    data = [part for part in one.parts if part.start >= _DATA and part.name != "reserved"]
+    return "".join(f"; {part.name} {part.meaning}" for part in data if part.meaning not in one.title)

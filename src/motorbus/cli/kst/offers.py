@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli import quantity
 from motorbus.core import units
+from motorbus.errors import RequestError
 from motorbus.families.kst import driver, wire
 from motorbus.families.kst.table import PROFILES, current, temperature, text
 
@@ -37,10 +38,29 @@ def ping_everyone(bus: Bus) -> list[int]:
     return sorted(bus.run(driver.broadcast_read("node_id", driver.dialect_of(bus.family))))
 
 
-def bit_rate_heard(bus: Bus, seconds: float, report: Callable[[object], None]) -> driver.BitRates:
-    """The bit rate of this bus by listening alone, `seconds` at each rate, and what was heard at each."""
-    search = driver.scan_bit_rates(driver.dialect_of(bus.family), seconds=seconds)
-    return bus.run(search, report=report)
+def bit_rate_heard(
+    bus: Bus, seconds: float, report: Callable[[object], None]
+) -> tuple[int | None, dict[int, str]]:
+    """The bit rate of this bus by listening alone, `seconds` at each rate, and what was heard at each.
+
+    A rate that the adapter lacks is left out, and that is told. Raises RequestError when it can listen at none.
+    """
+    heard: dict[int, str] = {}
+    refusals: list[RequestError] = []
+    dialect, rates = driver.dialect_of(bus.family), bus.family.link.rates
+    for rate in rates:
+        try:
+            found = bus.run(driver.scan_bit_rates(dialect, rates=(rate,), seconds=seconds), report=report)
+        except RequestError as refusal:
+            refusals.append(refusal)
+            heard[rate] = f"not listened to: {refusal.cause}"
+            continue
+        heard[rate] = found.heard[rate].value
+        if found.rate is not None:
+            return rate, heard
+    if len(refusals) == len(rates):
+        raise refusals[0]
+    return None, heard
 
 
 def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
