@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.errors import LinkLost, RequestError
-from motorbus.families.kst import Heard, dialect_of, scan_bit_rates
+from motorbus.errors import LinkError, LinkLost, RequestError
+from motorbus.families.kst import Heard, Skipped, dialect_of, scan_bit_rates
 from motorbus.families.kst.table import RATES
+from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, bench
 from tests.families.kst.test_driver_scanning import Deaf
 
@@ -49,6 +50,22 @@ def test_an_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
             look(there)
         assert there.sent() == []
         assert there.run(scan_bit_rates(dialect_of(there.family), isolated=True)).rate == 125_000
+
+
+class Without800k(MemoryLink):
+    """An adapter that lacks a rate, as slcan has none of 800k that everybody agrees upon."""
+
+    def tune(self, rate: int, listen_only: bool = False) -> None:
+        if rate == 800_000:
+            raise LinkError("this adapter has no such rate")
+        super().tune(rate, listen_only)
+
+
+def test_a_rate_that_the_adapter_lacks_is_left_out_and_told() -> None:
+    with bench(bit_rate=1_000_000, reports_ms=10.0, link=Without800k) as there:
+        found = there.run(scan_bit_rates(dialect_of(there.family)))
+        assert (found.rate, 800_000 in found.heard) == (1_000_000, False)
+        assert there.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
 
 
 def test_impossible_rates_are_refused() -> None:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli import quantity
 from motorbus.core import units
-from motorbus.errors import RequestError
 from motorbus.families.kst import driver, wire
 from motorbus.families.kst.table import PROFILES, current, temperature, text
 
@@ -46,21 +45,15 @@ def bit_rate_heard(
     A rate that the adapter lacks is left out, and that is told. Raises RequestError when it can listen at none.
     """
     heard: dict[int, str] = {}
-    refusals: list[RequestError] = []
-    dialect, rates = driver.dialect_of(bus.family), bus.family.link.rates
-    for rate in rates:
-        try:
-            found = bus.run(driver.scan_bit_rates(dialect, rates=(rate,), seconds=seconds), report=report)
-        except RequestError as refusal:
-            refusals.append(refusal)
-            heard[rate] = f"not listened to: {refusal.cause}"
-            continue
-        heard[rate] = found.heard[rate].value
-        if found.rate is not None:
-            return rate, heard
-    if len(refusals) == len(rates):
-        raise refusals[0]
-    return None, heard
+
+    def told(event: object) -> None:
+        if isinstance(event, driver.Skipped):
+            heard[event.rate] = f"not listened to: {event.why}"
+        report(event)
+
+    found = bus.run(driver.scan_bit_rates(driver.dialect_of(bus.family), seconds=seconds), report=told)
+    heard |= {rate: one.value for rate, one in found.heard.items()}
+    return found.rate, {rate: heard[rate] for rate in bus.family.link.rates if rate in heard}
 
 
 def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:

@@ -17,7 +17,7 @@ from motorbus.families.kst.driver.dialect import PLAIN, Dialect
 from motorbus.families.kst.driver.identity import code_of
 from motorbus.families.kst.driver.listening import Heard, heard
 from motorbus.families.kst.driver.refusals import above_zero
-from motorbus.families.kst.driver.scanning import at_one_rate
+from motorbus.families.kst.driver.scanning import Skipped, at_one_rate
 from motorbus.families.kst.table import RATES
 
 LISTEN: Final = 1.0
@@ -46,8 +46,9 @@ def scan_bit_rates(
     """Find the bit rate of a bus: `seconds` of listening at each rate, then, only with `isolated`, asking.
 
     A frame that comes whole proves a rate, and the search ends. Errors rule one out. Where all are silent nothing is
-    sent unless the caller says that the bus is isolated: that no machine depends on it. The rate is set again at the
-    end. Raises RequestError for an impossible rate, and for an adapter that cannot just listen unless `isolated`.
+    sent unless the caller says that the bus is isolated: that no machine depends on it. A rate that the adapter lacks
+    is left out and reported as `Skipped`. The rate is set again at the end. Raises RequestError for an
+    impossible rate, and for an adapter that cannot just listen unless `isolated`.
     """
     for rate in rates:
         code_of(rate)
@@ -59,27 +60,37 @@ def scan_bit_rates(
 
 def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seconds: float) -> Operation[BitRates]:
     verdicts: dict[int, Heard] = {}
+    unable: LinkError | None = None
     for number, rate in enumerate(rates):
         try:
             verdicts[rate] = yield from heard(dialect, rate, seconds)
         except LinkLost:
             raise
-        except LinkError as error:
-            if not isolated:
-                raise _cannot_listen(error) from error
-            verdicts[rate] = Heard.SILENCE
+        except (
+            LinkError
+        ) as error:  # it cannot listen, or does not have this rate, as slcan does not have 800k
+            unable = error
+            yield from Report(Skipped(rate, error.summary))
+            continue
         if verdicts[rate] is Heard.TRAFFIC:
             return BitRates(rate, verdicts)
         yield from Report(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
-    if isolated:
-        return (yield from _asked(dialect, verdicts))
-    return BitRates(None, verdicts)
+    if unable is not None and not verdicts:
+        if not isolated:
+            raise _cannot_listen(unable) from unable
+        verdicts = dict.fromkeys(rates, Heard.SILENCE)
+    return (yield from _asked(dialect, verdicts)) if isolated else BitRates(None, verdicts)
 
 
 def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> Operation[BitRates]:
     """The first rate at which somebody answers, of those at which no errors were heard."""
     for rate in [rate for rate, verdict in verdicts.items() if verdict is Heard.SILENCE]:
-        yield from Tune(rate)
+        try:
+            yield from Tune(rate)
+        except LinkLost:
+            raise
+        except LinkError:  # an adapter need not have every rate
+            continue
         found = yield from at_one_rate(dialect, wire.NODES, rate, broadcast=True, careful=True)
         if found:
             return BitRates(rate, verdicts, tuple(found))
