@@ -1,6 +1,6 @@
 """What only FEETECH servos can do: writes that wait for a trigger, many servos in one packet, back as shipped.
 
-The only face that knows this family. Besides its commands it offers the common ones what `faces.py` names.
+Besides these commands it offers the common ones what `faces.py` names.
 """
 
 from __future__ import annotations
