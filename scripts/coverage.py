@@ -104,8 +104,8 @@ def _command(told: Mapping[str, Any]) -> Command:
 
 def _objects(family: Family, told: Mapping[str, Any]) -> Iterator[Object]:
     rows: dict[str, list[str]] = {}
-    for table_name, table in family.tables.items():
-        for name in table:
+    for table_name in told["maps"]:  # of a map without a simulator nothing can be claimed
+        for name in family.tables[table_name]:
             rows.setdefault(name, []).append(table_name)
     strangers = set(told.get("object", {})) - set(rows)
     if strangers:

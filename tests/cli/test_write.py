@@ -94,6 +94,12 @@ def test_nothing_is_written_when_one_of_several_is_wrong(run: Run, arm: Simulati
     assert held(run, arm, "torque_limit") == 1000
 
 
+def test_a_word_that_only_some_maps_know_is_a_value(run: Run, arm: Simulation) -> None:
+    ran = run("write", f"{arm.url}#1", "operating_mode=step", "--dry-run")
+    assert ran.code == 0, ran.err
+    assert run("write", f"{arm.url}#1", "operating_mode=constant current", "--dry-run").code == 2
+
+
 @pytest.mark.parametrize("words", [[], ["goal_time=1", "goal_time=2"]], ids=" ".join)
 def test_what_is_no_order_ends_with_2(words: list[str], run: Run, arm: Simulation) -> None:
     assert run("write", f"{arm.url}#1", *words).code == 2

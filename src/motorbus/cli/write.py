@@ -111,9 +111,8 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
         raise RequestError("a register is named twice", sent=" ".join(assignments), advice="nothing was sent")
     wanted = dict(pairs)
     check_names(family, wanted)
-    for table in family.tables.values():
-        for name in wanted.keys() & table.keys():
-            quantity.typed(table[name], wanted[name], raw=raw)
+    for name, text in wanted.items():
+        _typed_by_some([table[name] for table in family.tables.values() if name in table], text, raw)
     return wanted
 
 
@@ -122,6 +121,18 @@ def _orders(one: Any, wanted: Mapping[str, str], raw: bool) -> list[Order]:
     return [
         _order(one, table[name], quantity.typed(table[name], text, raw=raw)) for name, text in wanted.items()
     ]
+
+
+def _typed_by_some(entries: Sequence[Entry], text: str, raw: bool) -> None:
+    """Raise RequestError for a text that is a value of this register in none of the maps that have it."""
+    refusals = []
+    for entry in entries:
+        try:
+            quantity.typed(entry, text, raw=raw)
+        except RequestError as error:
+            refusals.append(error)
+    if entries and len(refusals) == len(entries):
+        raise refusals[0]
 
 
 def _order(one: Any, entry: Entry, typed: Typed) -> Order:

@@ -215,3 +215,39 @@ def test_stray_bytes_broken_and_good_packets_are_told_apart() -> None:
         "ff ff 02 02 00 00",
     ]
     assert [bool(explanation.fault) for explanation in explanations] == [True, True, False, True]
+
+
+# --- maps ---------------------------------------------------------------------------------------------------
+
+
+def introduced(id: int, *head: int) -> bytes:
+    """A servo is asked for registers 0 to 4, and answers."""
+    return wire.read(id, 0, 5) + wire.encode_status(id, 0, bytes(head))
+
+
+def test_a_servo_that_has_said_who_it_is_is_named_by_its_own_map() -> None:
+    talk = introduced(1, 3, 43, 0, 10, 18) + introduced(2, 0, 10, 1, 5, 4)
+    talk += wire.write(1, 44, b"\x64\x00") + wire.write(2, 42, b"\x02\x00") + wire.write(3, 42, b"\x00\x02")
+    hls, scs, other = explain(talk)[4:]
+    assert meanings(hls)["goal_torque"] == "100 (0.65 A)"
+    assert meanings(scs)["goal_position"] == "512 (2.618 rad)"
+    assert meanings(other)["goal_position"] == "512 (0.7854 rad)"
+
+
+def test_each_servo_of_a_sync_write_is_named_by_its_own_map() -> None:
+    talk = introduced(1, 3, 43, 0, 10, 18) + wire.sync_write(44, [(1, b"\x64\x00"), (2, b"\x64\x00")])
+    rows = [(part.name, part.meaning) for part in explain(talk)[2].parts[7:10:2]]
+    assert rows == [("goal_torque", "100 (0.65 A)"), ("goal_time", "100")]
+
+
+def test_alarms_are_those_of_the_map_once_it_is_known() -> None:
+    alarm = wire.read(1, 66, 1) + wire.encode_status(1, 0x10, b"\x00")
+    assert explain(alarm)[1].title.endswith("alarm angle")
+    assert explain(introduced(1, 3, 43, 0, 10, 18) + alarm)[3].title.endswith("alarm undefined bit 4")
+
+
+def test_an_unknown_firmware_is_named_by_the_usual_map() -> None:
+    talk = introduced(1, 9, 9, 0, 9, 3) + wire.write(1, 200, b"\x01")
+    assert meanings(explain(talk)[2])["data"] == "register 200, not in the STS map: 1"
+    talk = introduced(1, 3, 43, 0, 10, 18) + wire.write(1, 200, b"\x01")
+    assert meanings(explain(talk)[2])["data"] == "register 200, not in the HLS map: 1"

@@ -1,4 +1,4 @@
-"""The STS map row by row, the numbers a servo says of itself, and every way it writes a negative number."""
+"""The STS map row by row, and every way it writes a negative number."""
 
 from __future__ import annotations
 
@@ -11,18 +11,7 @@ from hypothesis import strategies as st
 from motorbus.core.entry import Access, Coding, Entry, Storage
 from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
-from motorbus.families.feetech.table import (
-    ALARM_BITS,
-    BAUD_CODES,
-    MODELS,
-    STS,
-    TABLES,
-    Model,
-    alarms,
-    map_for,
-    model_number,
-    velocity_scale,
-)
+from motorbus.families.feetech.table import ALARM_BITS, STS
 from tests.families.feetech.vectors import VALID
 
 # address: name, bytes, sign bit (None: unsigned), lowest, highest, shipped
@@ -117,7 +106,6 @@ def named(words: str) -> set[str]:
 
 
 def test_the_map_has_these_rows_and_no_others() -> None:
-    assert dict(TABLES) == {"sts": STS}
     told = {
         row.address: (row.name, row.size, row.sign_bit, row.low, row.high, row.default)
         for row in STS.values()
@@ -299,72 +287,3 @@ def test_signed_rows_are_sign_magnitude_as_on_the_wire() -> None:
         "goal_position_echo": 0,
         "present_current": 300,
     }
-
-
-# --- what a servo says of itself ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("major", "minor", "order", "table"),
-    [
-        (0, 0, "big", "scs"), (0, 39, "big", "scs"), (0, 40, "big", ""), (0, 10, "little", ""),
-        (1, 0, "little", "smcl"), (1, 39, "little", "smcl"), (1, 10, "big", ""),
-        (2, 39, "little", ""), (2, 40, "little", "smbl"), (2, 69, "little", "smbl"), (2, 70, "little", ""),
-        (3, 0, "little", "sts"), (3, 10, "little", "sts"), (3, 39, "little", "sts"),
-        (3, 19, "big", ""), (3, 20, "big", "scs2"), (3, 39, "big", "scs2"), (3, 40, "big", ""),
-        (3, 40, "little", "hls"), (3, 59, "little", "hls"), (3, 60, "little", ""),
-        (20, 5, "little", ""), (255, 255, "little", ""), (3, 10, "", ""),
-    ],
-)  # fmt: skip
-def test_the_map_follows_from_firmware_and_byte_order(major: int, minor: int, order: str, table: str) -> None:
-    assert map_for(major, minor, order) == table
-
-
-@pytest.mark.parametrize(
-    ("major", "minor", "name", "order", "number"),
-    [
-        (5, 4, "SCS0009", "big", 1284),
-        (6, 8, "SM60-360M", "little", 2054),
-        (6, 26, "SM60-360M", "little", 6662),
-        (8, 44, "SM85BLHV", "little", 11272),
-        (9, 2, "STS3032", "little", 521),
-        (9, 3, "STS3215", "little", 777),
-        (9, 11, "STS3250", "little", 2825),
-        (9, 20, "SCSXX-2", "big", 2324),
-        (10, 18, "HLS3950", "little", 4618),
-        (10, 5, "STS3045BL", "little", 1290),
-    ],
-)
-def test_a_model_has_a_name_a_byte_order_and_a_number(
-    major: int, minor: int, name: str, order: str, number: int
-) -> None:
-    assert MODELS[major, minor] == Model(name, order)
-    assert model_number(major, minor, order) == number
-
-
-def test_all_models_of_the_vendors_configuration_are_known() -> None:
-    counts = {major: sum(1 for found, _ in MODELS if found == major) for major in (5, 6, 8, 9, 10)}
-    assert counts == {5: 12, 6: 14, 8: 25, 9: 19, 10: 23}
-    assert len(MODELS) == 93
-    assert {model.order for (major, _), model in MODELS.items() if major in (6, 8, 10)} == {"little"}
-    assert (9, 12) not in MODELS
-
-
-def test_baud_codes_are_those_of_the_vendor() -> None:
-    assert list(BAUD_CODES.values()) == [
-        1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400, 19_200, 14_400, 9_600, 4_800,
-    ]  # fmt: skip
-    assert list(BAUD_CODES) == list(range(12))
-
-
-def test_alarms_tell_every_bit() -> None:
-    assert alarms(0) == ()
-    assert alarms(0x20) == ("overload",)
-    assert alarms(0b0001_1111) == ("voltage", "sensor", "temperature", "current", "angle")
-    assert alarms(0xC1) == ("voltage", "undefined bit 6", "undefined bit 7")
-    assert all(len(alarms(error)) == error.bit_count() for error in range(256))
-
-
-@pytest.mark.parametrize(("phase", "scale"), [(12, 1), (4, 1), (8, 50), (0, 50), (0xFB, 50)])
-def test_bit_2_of_the_phase_decides_the_unit_of_velocity(phase: int, scale: int) -> None:
-    assert velocity_scale(phase) == scale

@@ -1,4 +1,4 @@
-"""FEETECH SCS, SMS, STS and HLS servos on a half-duplex serial bus; so far the STS register map.
+"""FEETECH SCS, SMS, STS and HLS servos on a half-duplex serial bus: all six maps are read, that of STS is commanded.
 
 `Servo` and `AsyncServo` are one servo each; the functions serve several at once, or are kept for a loop. `FAMILY`
 is what the rest of motorbus knows of these servos.

@@ -2,7 +2,8 @@
 
 Instruction and status packets have the same shape: FF FF 01 02 01 FB is a PING to servo 1, and also the
 answer of a servo 1 that has a voltage alarm. What a packet can be read as depends on its fifth byte and on
-what was said before; where both readings are possible, both are told. Registers are named by the STS map.
+what was said before; where both readings are possible, both are told. Registers are named by the STS map, and those
+of a servo by its own map once it has said, in answer to a READ from register 0 on, who it is.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Explanation, Part
 from motorbus.core.operation import Noise
-from motorbus.families.feetech.table import STS, alarms
+from motorbus.families.feetech.table import STS, TABLES, alarms, choose
 from motorbus.families.feetech.wire import (
     BROADCAST,
     HEADER,
@@ -28,6 +29,9 @@ from motorbus.families.feetech.wire import (
 )
 from motorbus.families.feetech.wire.stream import Stream
 
+_HEAD = 5
+"""Registers that tell who a servo is."""
+
 
 class _Asked(NamedTuple):
     """What a servo was asked for: so many bytes from this register on, due in its next status packet."""
@@ -38,10 +42,23 @@ class _Asked(NamedTuple):
 
 @dataclass(slots=True)
 class _Said:
-    """What was said before: the last instruction packet, and what each servo still owes."""
+    """What was said before: the last instruction packet, what each servo still owes, and the maps of those who have
+    told who they are; `usual` is the map of the others."""
 
+    usual: Table
     last: bytes = b""
     asked: dict[int, _Asked] = field(default_factory=dict)
+    maps: dict[int, Table] = field(default_factory=dict)
+
+    def table(self, id: int) -> Table:
+        """The register map by which to name what this servo is told or tells."""
+        return self.maps.get(id, self.usual)
+
+    def learn(self, id: int, data: bytes) -> None:
+        """Registers 0 to 4 and what follows them, as this servo has them."""
+        chosen = choose((data[0], data[1]), (data[3], data[4]), data[2])
+        if chosen.table:
+            self.maps[id] = TABLES[chosen.table]
 
 
 def explain(data: bytes, table: Table = STS) -> list[Explanation]:
@@ -52,10 +69,10 @@ def explain(data: bytes, table: Table = STS) -> list[Explanation]:
     """
     stream = Stream(BROADCAST, bytes)
     told: list[Explanation] = []
-    said = _Said()
+    said = _Said(table)
     for packet in _together([*stream.feed(data), *stream.flush()]):
         if isinstance(packet, bytes):
-            told.append(_packet(packet, said, table))
+            told.append(_packet(packet, said))
         else:
             told.extend(_fault(piece) for piece in _pieces(packet))
     return told
@@ -64,34 +81,39 @@ def explain(data: bytes, table: Table = STS) -> list[Explanation]:
 # --- good packets -------------------------------------------------------------------------------------------
 
 
-def _packet(data: bytes, said: _Said, table: Table) -> Explanation:
+def _packet(data: bytes, said: _Said) -> Explanation:
     """A packet is an instruction when its form allows that and nobody owes an answer of just this form."""
     id, code, parameters = data[2], data[4], data[5:-1]
+    table = said.table(id)
     if data == said.last and id != BROADCAST:
-        return _instruction(data, f"the same again: an echo, or {_as_status(data)}", table)
+        return _instruction(data, f"the same again: an echo, or {_as_status(data, table)}", said)
     owed = said.asked.pop(id, None)
     answers = owed is not None and owed.size == len(parameters)
     if id != BROADCAST and (answers or not suits(code, parameters)):
-        return _status(data, owed if answers else None, table)
+        return _status(data, owed if answers else None, said)
     said.last = data
     said.asked.update(_wishes(id, code, parameters))
-    return _instruction(data, f"or {_as_status(data)}" if id != BROADCAST else "", table)
+    return _instruction(data, f"or {_as_status(data, table)}" if id != BROADCAST else "", said)
 
 
-def _status(data: bytes, owed: _Asked | None, table: Table) -> Explanation:
-    code, parameters = data[4], data[5:-1]
+def _status(data: bytes, owed: _Asked | None, said: _Said) -> Explanation:
+    id, code, parameters = data[2], data[4], data[5:-1]
+    if owed and owed.address == 0 and len(parameters) >= _HEAD:
+        said.learn(id, parameters)
+    table = said.table(id)
     also = f" (or {_as_instruction(data)})" if code in RULES or code & 0xC0 else ""
     parts = _values(5, owed.address, parameters, table) if owed else _data(5, parameters)
-    return _told(data, _as_status(data) + also, Part(4, data[4:5], "error", _alarms(code)), parts)
+    told = Part(4, data[4:5], "error", _alarms(code, table))
+    return _told(data, _as_status(data, table) + also, told, parts)
 
 
-def _instruction(data: bytes, also: str, table: Table) -> Explanation:
+def _instruction(data: bytes, also: str, said: _Said) -> Explanation:
     id, code, parameters = data[2], data[4], data[5:-1]
     title = _as_instruction(data) + (f" ({also})" if also else "")
-    doubt = f"; as an error byte: {_alarms(code)}" if id != BROADCAST else ""
+    doubt = f"; as an error byte: {_alarms(code, said.table(id))}" if id != BROADCAST else ""
     named = Part(4, data[4:5], "instruction", instruction_name(code) + doubt)
     if suits(code, parameters):
-        return _told(data, title, named, _parameters(code, parameters, table))
+        return _told(data, title, named, _parameters(id, code, parameters, said))
     return _told(data, title, named, _data(5, parameters), _senseless(code, parameters))
 
 
@@ -99,18 +121,18 @@ def _told(data: bytes, title: str, fifth: Part, parts: list[Part], fault: str = 
     return Explanation(data, title, (*_head(data), fifth, *parts, _sum(data)), fault)
 
 
-def _as_status(data: bytes) -> str:
+def _as_status(data: bytes, table: Table) -> str:
     count = len(data) - 6
     carried = f" with {_bytes(count)}" if count else ""
-    return f"status packet of servo {data[2]}{carried}: {_alarms(data[4])}"
+    return f"status packet of servo {data[2]}{carried}: {_alarms(data[4], table)}"
 
 
 def _as_instruction(data: bytes) -> str:
     return f"{instruction_name(data[4])} to {'everyone' if data[2] == BROADCAST else f'servo {data[2]}'}"
 
 
-def _alarms(error: int) -> str:
-    return f"alarm {', '.join(alarms(error))}" if error else "no alarm"
+def _alarms(error: int, table: Table = STS) -> str:
+    return f"alarm {', '.join(alarms(error, table.name))}" if error else "no alarm"
 
 
 def _senseless(code: int, parameters: bytes) -> str:
@@ -155,13 +177,14 @@ def _sum(data: bytes) -> Part:
     return Part(len(data) - 1, data[-1:], "checksum", verdict)
 
 
-def _parameters(code: int, parameters: bytes, table: Table) -> list[Part]:
+def _parameters(id: int, code: int, parameters: bytes, said: _Said) -> list[Part]:
+    table = said.table(id)
     if code in (Instruction.READ, Instruction.SYNC_READ):
         return _span(parameters, table)
     if code in (Instruction.WRITE, Instruction.REG_WRITE):
         return [_address(parameters[0], table), *_values(6, parameters[0], parameters[1:], table)]
     if code == Instruction.SYNC_WRITE:
-        return _sync_write(parameters, table)
+        return _sync_write(parameters, said)
     if code == Instruction.CALIBRATE and parameters:
         return [Part(5, parameters, "position", _word(parameters))]
     return _data(5, parameters)
@@ -178,12 +201,16 @@ def _span(parameters: bytes, table: Table) -> list[Part]:
     ]
 
 
-def _sync_write(parameters: bytes, table: Table) -> list[Part]:
+def _sync_write(parameters: bytes, said: _Said) -> list[Part]:
     address, length = parameters[:2]
-    parts = [_address(address, table), Part(6, parameters[1:2], "length", f"{_bytes(length)} for each servo")]
+    parts = [
+        _address(address, said.usual),
+        Part(6, parameters[1:2], "length", f"{_bytes(length)} for each servo"),
+    ]
     for at in range(2, len(parameters), length + 1):
-        parts.append(Part(5 + at, parameters[at : at + 1], "id", _id(parameters[at])))
-        parts += _values(6 + at, address, parameters[at + 1 : at + 1 + length], table)
+        id, data = parameters[at], parameters[at + 1 : at + 1 + length]
+        parts.append(Part(5 + at, parameters[at : at + 1], "id", _id(id)))
+        parts += _values(6 + at, address, data, said.table(id))
     return parts
 
 
@@ -196,7 +223,11 @@ def _register(address: int, table: Table) -> str:
     if row := table.at(address):
         return row.name
     before = table.at(address - 1)
-    return f"second byte of {before.name}" if before and before.size == 2 else "not in the STS map"
+    return (
+        f"second byte of {before.name}"
+        if before and before.size == 2
+        else f"not in the {table.name.upper()} map"
+    )
 
 
 def _values(start: int, address: int, data: bytes, table: Table) -> list[Part]:

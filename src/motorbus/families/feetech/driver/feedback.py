@@ -12,6 +12,7 @@ from typing import Final, TypeVar
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import State
 from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.errors import DeviceError
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.identity import known, unknown_map
 from motorbus.families.feetech.driver.node import Node
@@ -110,10 +111,23 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
     if node.table is None or node.settings is None:
         return _after(node, lambda same: _quantity(same, name))
     if name not in node.table or not node.table[name].unit:
-        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+        raise _untold(node, name.replace("_", " "))
     row = node.table[name]
 
     def take(data: bytes) -> float:
         return float(node.value(row, row.decode(data)))
 
     return read_block(node, row.address, row.size, take)
+
+
+def _untold(node: Node, what: str) -> DeviceError:
+    """The error for a quantity that this servo does not tell in a unit."""
+    if not node.writable and node.identity is not None and node.identity.table:
+        return DeviceError(
+            f"node {node.node} is {node.identity.model}: nobody has published whether it tells its {what}, and in "
+            "what unit",
+            expected=f"a servo whose register map has it; {node.identity.table} does not, or in doubt",
+            advice="read_raw() gives the bare number where there is one",
+            node=node.node,
+        )
+    return unknown_map(node, f"cannot tell its {what} in a unit")

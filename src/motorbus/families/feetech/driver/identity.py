@@ -1,8 +1,9 @@
 """Who is there: is it alive, what is it, which register map has it, and how is it set.
 
 The map follows from firmware and byte order, the model gives the name and the byte order (the algorithm of the
-vendor's FD 1.9.8.5). A servo whose map is unknown, or not described here, is read by the few rows that all maps
-share and is never written: the same address is the lock in one map and the torque limit in another.
+vendor's FD 1.9.8.5). A servo whose map is known is read by that map, and written when the driver commands it. One whose
+map is unknown is read by the few rows that all maps share. Neither is ever guessed: the same address is the lock in one
+map and the torque limit in another.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from motorbus.core.operation import Due, Exchange, Operation, Rank, Timeout
 from motorbus.errors import DeviceError, NoReply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
-from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
-from motorbus.families.feetech.table import MODELS, STS, TABLES, map_for, model_number
+from motorbus.families.feetech.driver.node import COMMANDED, IMAGE, Node, Settings, settings_of
+from motorbus.families.feetech.table import STS, TABLES, Choice, choose, model_number
 
 _HEAD: Final = 5
 _COMMON: Final = frozenset(
@@ -89,17 +90,22 @@ def known(node: Node) -> Operation[Table]:
 
 
 def writable(node: Node) -> Operation[Table]:
-    """As `known`, for those who will write. Raises DeviceError when the map is not known."""
+    """As `known`, for those who will write. Raises DeviceError when the map is not known, or not commanded here."""
     table = yield from known(node)
+    refuse_unless_writable(node)
+    return table
+
+
+def refuse_unless_writable(node: Node) -> None:
+    """Raise DeviceError for a servo, already known, whose map is not known or not commanded here."""
     if not node.writable:
         raise unknown_map(node, "refuses to write to it")
-    return table
 
 
 def meet(node: Node, head: bytes) -> Identity:
     """Registers 0 to 4 of this servo have been read."""
     node.identity = identity_of(node.node, head)
-    node.table = TABLES[node.identity.table] if node.identity.table else common_table(_order(head))
+    node.table = TABLES[node.identity.table] if node.identity.table else common_table(_choice(head).order)
     return node.identity
 
 
@@ -115,29 +121,23 @@ def learn(node: Node, image: bytes) -> Identity:
 
 def identity_of(node: int, head: bytes) -> Identity:
     """What registers 0 to 4 say."""
-    firmware, model = (head[0], head[1]), (head[3], head[4])
-    order = _order(head)
-    register_map = map_for(*firmware, order)
-    name = MODELS[model].name if model in MODELS else f"unknown model {model[0]}.{model[1]}"
+    chosen = _choice(head)
+    major, minor = head[3], head[4]
     return Identity(
         node,
-        name,
-        f"{firmware[0]}.{firmware[1]}",
-        register_map if register_map in TABLES else "",
+        chosen.model.name if chosen.model else f"unknown model {major}.{minor}",
+        f"{head[0]}.{head[1]}",
+        chosen.table,
         {
-            "model_number": model_number(*model, order),
-            "byte_order": order,
-            "register_map": register_map or "unknown",
+            "model_number": model_number(major, minor, chosen.order),
+            "byte_order": chosen.order,
+            "register_map": chosen.table or "unknown",
         },
     )
 
 
-def _order(head: bytes) -> str:
-    """The model decides the byte order; a model nobody knows tells it by register 2."""
-    model = MODELS.get((head[3], head[4]))
-    if model is not None:
-        return model.order
-    return "little" if head[2] == 0 else "big"
+def _choice(head: bytes) -> Choice:
+    return choose((head[0], head[1]), (head[3], head[4]), head[2])
 
 
 @cache
@@ -157,14 +157,19 @@ def _commoner(row: Entry, order: str) -> Entry:
 
 
 def unknown_map(node: Node, refusal: str) -> DeviceError:
-    """The error for what needs a register map that this servo's firmware does not tell."""
+    """The error for what needs a register map that this servo's firmware does not tell, or that is only read here."""
     identity = node.identity
     assert identity is not None
+    if identity.table:
+        fact = f"whose register map {identity.table} is read and not commanded yet: motorbus"
+        advice = "read() it by name, or disable_torque(); nothing was written"
+    else:
+        fact = "whose register map (unknown) is not described: motorbus"
+        advice = "read() the registers that all maps share, or disable_torque(); nothing was written"
     return DeviceError(
-        f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map "
-        f"({identity.details['register_map']}) is not described: motorbus {refusal}",
-        expected=f"a servo with one of the maps {', '.join(TABLES)}",
+        f"node {node.node} is {identity.model} with firmware {identity.firmware}, {fact} {refusal}",
+        expected=f"a servo with one of the maps {', '.join(sorted(COMMANDED))}",
         cause="the same address means different things in different maps, so a guess could damage the servo",
-        advice="read() the registers that all maps share, or disable_torque(); nothing was written",
+        advice=advice,
         node=node.node,
     )

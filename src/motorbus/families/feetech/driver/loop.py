@@ -13,6 +13,7 @@ from motorbus.core.operation import Answer, Exchange
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
+from motorbus.families.feetech.driver.identity import unknown_map
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import position_goal
 
@@ -29,7 +30,8 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
     """The present positions of all of these in one exchange, which may be kept and run again.
 
     Raises RequestError when a servo is not prepared, or when the replies would need more than `air` s at `rate`
-    bit/s (give a greater `air`, or divide the servos). A single servo that is silent raises NoReply when run.
+    bit/s (give a greater `air`, or divide the servos); DeviceError when the register map of one is unknown. A single
+    servo that is silent raises NoReply when run.
     """
     nodes = distinct(servos)
     rows = {node.node: _row(node, "present_position") for node in nodes}
@@ -62,7 +64,8 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
     """Goal positions in rad for all of these, in one packet that nobody acknowledges.
 
     Raises RequestError when a servo is not prepared, is not in position mode, or there are too many for a packet;
-    LimitExceeded when a position is not a finite number. The gate judges the limits.
+    DeviceError when the map of one is not commanded here; LimitExceeded when a position is not a finite number. The
+    gate judges the limits.
     """
     nodes = distinct(servos)
     if len(positions) != len(nodes):
@@ -84,10 +87,12 @@ def _goal(node: Node, to: float) -> Block:
 
 
 def _row(node: Node, name: str) -> Entry:
-    if node.table is None or node.limits is None:
+    if node.table is None or node.settings is None:
         raise RequestError(
             f"node {node.node} is not prepared: its limits and units are not known",
             advice="call prepare() on each servo once before the loop, or run prepare_all(); nothing was sent",
             node=node.node,
         )
+    if not node.table[name].unit:
+        raise unknown_map(node, "cannot tell its position in a unit")
     return node.table[name]

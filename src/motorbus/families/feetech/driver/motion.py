@@ -17,7 +17,7 @@ from motorbus.core.operation import Effect, Goal, Operation
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.identity import prepare, writable
+from motorbus.families.feetech.driver.identity import prepare, refuse_unless_writable, writable
 from motorbus.families.feetech.driver.node import POSITION, PWM, STEP, VELOCITY, Node
 from motorbus.families.feetech.driver.orders import position_goal
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
@@ -162,7 +162,11 @@ def move(
 def move_block(
     node: Node, table: Table, to: float, velocity: float | None = None, acceleration: float | None = None
 ) -> Block:
-    """Registers 41 to 47 at once: acceleration, goal position, goal time, goal velocity."""
+    """Registers 41 to 47 at once: acceleration, goal position, goal time, goal velocity.
+
+    Raises DeviceError for a servo whose map is not commanded here: on HLS the 0 for the time would be a torque of 0.
+    """
+    refuse_unless_writable(node)
     goal, time, speed, ramp = (
         table[name] for name in ("goal_position", "goal_time", "goal_velocity", "acceleration")
     )

@@ -16,8 +16,11 @@ from motorbus.core.family import Identity
 from motorbus.core.operation import Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.table import alarms, velocity_scale
+from motorbus.families.feetech.table import alarms, tells_current, velocity_scale, zero_is_maximum
 
+COMMANDED: Final = frozenset(("sts",))
+"""The register maps this driver writes and moves by. Servos of other maps are read by name, and nothing more: modes,
+units and the place of the lock differ, and half of a driver for them would be worse than none."""
 IMAGE: Final = 40
 """Bytes of the EEPROM area, registers 0 to 39, which one READ brings."""
 MANY_TURNS: Final = 30719
@@ -29,8 +32,6 @@ _POSITIONS: Final = ("present_position", "goal_position", "goal_position_echo")
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
 SCALED: Final = frozenset((*_POSITIONS, *_VELOCITIES))
 """Rows whose unit depends on settings of the servo (angular resolution, phase)."""
-_NO_CURRENT: Final = 0b10_0000
-_ZERO_IS_MAXIMUM: Final = 0b1000
 
 alarm_names: Final = cache(alarms)
 
@@ -38,9 +39,10 @@ alarm_names: Final = cache(alarms)
 class Settings(NamedTuple):
     """What the EEPROM of a servo says about how to talk to it.
 
-    `limits` in rad; None when its map is not known. `mode` is the operating mode. `factors` multiply what a row
-    says of its unit, by row name. `answers_writes` is the status return level. `zero_is_maximum`: a goal velocity
-    of 0 means the maximum, otherwise it means standstill. `tells_current`: its bridge measures the current.
+    `limits` in rad; None when its map is not known, or two limits of 0 mean what nobody has published. `mode` is the
+    operating mode; None where the driver does not command the map, whose modes have other numbers. `factors` multiply
+    what a row says of its unit, by row name. `answers_writes` is the status return level. `zero_is_maximum`: a goal
+    velocity of 0 means the maximum, otherwise it means standstill. `tells_current`: its bridge measures the current.
     """
 
     limits: tuple[float, float] | None = None
@@ -79,12 +81,12 @@ class Node:
 
     @property
     def writable(self) -> bool:
-        """Its register map is known, so that a write does what its name says."""
-        return self.identity is not None and self.identity.table != ""
+        """Its register map is known and commanded here, so that a write does what its name says."""
+        return self.identity is not None and self.identity.table in COMMANDED
 
     def heard(self, error: int, at: float) -> None:
         """A reply came: keep its alarm bits and its time. An alarm never makes a good reply a failure."""
-        self.alarm = alarm_names(error) if error else ()
+        self.alarm = alarm_names(error, self.table.name if self.table else "sts") if error else ()
         self.at = at
 
     def forget_settings(self) -> None:
@@ -132,26 +134,31 @@ def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
 
 
 def settings_of(table: Table, image: bytes) -> Settings:
-    """What registers 0 to 39 say, read by a table that has all of its rows (a map that is known)."""
+    """What registers 0 to 39 say, read by the map of the servo."""
 
     def raw(name: str) -> int:
         row = table[name]
         return row.decode(image[row.address : row.address + row.size])
 
     phase = raw("phase")
-    turns = float(max(1, raw("angular_resolution")))
-    low, high = raw("min_position_limit"), raw("max_position_limit")
-    if low == high == 0:
-        low, high = -MANY_TURNS, MANY_TURNS
-    scale = table["goal_position"].scale
+    turns = float(max(1, raw("angular_resolution"))) if "angular_resolution" in table else 1.0
+    limits = _limits(table, raw("min_position_limit"), raw("max_position_limit"))
+    count = table["goal_position"].scale * turns
     return Settings(
-        limits=(low * scale * turns, high * scale * turns),
-        mode=raw("operating_mode"),
+        limits=(limits[0] * count, limits[1] * count) if limits else None,
+        mode=raw("operating_mode") if table.name in COMMANDED else None,
         factors={
             **dict.fromkeys(_POSITIONS, turns),
-            **dict.fromkeys(_VELOCITIES, float(velocity_scale(phase))),
+            **dict.fromkeys(_VELOCITIES, float(velocity_scale(phase, table.name))),
         },
         answers_writes=raw("status_return_level") != 0,
-        zero_is_maximum=bool(phase & _ZERO_IS_MAXIMUM),
-        tells_current=not phase & _NO_CURRENT,
+        zero_is_maximum=zero_is_maximum(phase, table.name),
+        tells_current=tells_current(phase, table.name),
     )
+
+
+def _limits(table: Table, low: int, high: int) -> tuple[int, int] | None:
+    """In counts. Two zeros mean many turns on STS, a motor without limits on SCS, and who knows what elsewhere."""
+    if low or high:
+        return low, high
+    return (-MANY_TURNS, MANY_TURNS) if table.name in COMMANDED else None

@@ -13,7 +13,8 @@ from motorbus.core.entry import Entry, Storage, Table, Value
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.node import MANY_TURNS, POSITION, SCALED, STEP, Node
+from motorbus.families.feetech.driver.identity import refuse_unless_writable
+from motorbus.families.feetech.driver.node import COMMANDED, MANY_TURNS, POSITION, SCALED, STEP, Node
 from motorbus.families.feetech.table import TABLES
 
 _DUTY = 0.001
@@ -62,8 +63,10 @@ def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
 def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
     """A goal position in rad: its raw value, and the goal for the gate, which judges the limits.
 
-    Raises RequestError in other than position mode, LimitExceeded for what is no number or fits no register.
+    Raises DeviceError when its map is not commanded here, RequestError in other than position mode, LimitExceeded for
+    what is no number or fits no register.
     """
+    refuse_unless_writable(node)
     if node.mode != POSITION:
         raise RequestError(
             f"node {node.node} cannot go to a position in operating mode {node.mode}",
@@ -84,21 +87,22 @@ def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
 
 def check_names(names: Iterable[str]) -> None:
     """Raise RequestError for a name that no register map has, before anything is sent."""
+    tables = list(TABLES.values())
     for name in names:
-        _candidates(name)
+        if not any(name in table for table in tables):
+            tables[0][name]  # the look-up raises, with suggestions
 
 
 def check_values(values: Mapping[str, Value]) -> None:
-    """Raise RequestError for what no servo of any map would be given, before anything is sent."""
+    """Raise RequestError for what no servo that is commanded would be given, before anything is sent.
+
+    A name that only other maps have passes: whoever has it says what it is when it is known.
+    """
+    check_names(values)
     for name, value in values.items():
-        faults = [_fault(row, value) for row in _candidates(name)]
-        if faults[0] is not None and all(faults):
+        faults = [_fault(TABLES[one][name], value) for one in sorted(COMMANDED) if name in TABLES[one]]
+        if faults and faults[0] is not None and all(faults):
             raise faults[0]
-
-
-def _candidates(name: str) -> list[Entry]:
-    rows = [table[name] for table in TABLES.values() if name in table]
-    return rows or [next(iter(TABLES.values()))[name]]  # the look-up raises, with suggestions
 
 
 def _fault(row: Entry, value: Value) -> RequestError | None:

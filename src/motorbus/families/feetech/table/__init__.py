@@ -1,4 +1,4 @@
-"""What can be addressed in FEETECH servos: the register maps, and how to tell which one a servo has."""
+"""What can be addressed in FEETECH servos: the six register maps, and how to tell which one a servo has."""
 
 from __future__ import annotations
 
@@ -9,30 +9,54 @@ from typing import Final
 from motorbus.core.entry import Table
 from motorbus.families.feetech.table.codes import (
     ALARM_BITS,
+    ALARM_BITS_OF,
     BAUD_CODES,
+    BAUD_CODES_OF,
+    FIRMWARE,
     MODELS,
+    Choice,
     Model,
     alarms,
+    choose,
     map_for,
     model_number,
-    velocity_scale,
 )
+from motorbus.families.feetech.table.hls import HLS
+from motorbus.families.feetech.table.phase import PHASE_BITS, tells_current, velocity_scale, zero_is_maximum
+from motorbus.families.feetech.table.scs import SCS, SCS2, SCS_COUNT
+from motorbus.families.feetech.table.sms import SMBL, SMCL
 from motorbus.families.feetech.table.sts import AMPERE, COUNT, STS
 
-TABLES: Final[Mapping[str, Table]] = MappingProxyType({STS.name: STS})
-"""Every register map that is described, by its name."""
+TABLES: Final[Mapping[str, Table]] = MappingProxyType(
+    {table.name: table for table in (STS, SMBL, SMCL, SCS, SCS2, HLS)}
+)
+"""Every register map by its name."""
 
 __all__ = [
     "ALARM_BITS",
+    "ALARM_BITS_OF",
     "AMPERE",
     "BAUD_CODES",
+    "BAUD_CODES_OF",
     "COUNT",
+    "FIRMWARE",
+    "HLS",
     "MODELS",
+    "PHASE_BITS",
+    "SCS",
+    "SCS2",
+    "SCS_COUNT",
+    "SMBL",
+    "SMCL",
     "STS",
     "TABLES",
+    "Choice",
     "Model",
     "alarms",
+    "choose",
     "map_for",
     "model_number",
+    "tells_current",
     "velocity_scale",
+    "zero_is_maximum",
 ]

@@ -21,25 +21,27 @@ from typing import Final
 
 from motorbus.core.entry import Access, Coding, Entry, Storage, Table
 from motorbus.core.operation import Effect
-from motorbus.families.feetech.table.codes import ALARM_BITS, BAUD_CODES
+from motorbus.families.feetech.table.codes import ALARM_BITS, rates
+from motorbus.families.feetech.table.phase import PHASE_BITS
+from motorbus.families.feetech.table.sources import (
+    CLI,
+    FD,
+    HLS_TABLE,
+    LEROBOT,
+    MANUAL,
+    SDK,
+    SERVOLAB,
+    SPECIAL,
+    V36,
+)
 
 COUNT: Final = tau / 4096
 """One count of the encoder, in rad."""
 AMPERE: Final = 0.0065
 """One count of a current register, in A."""
 
-_FD = "FD 1.9.8.5 register configuration"
-_V36 = "STS3215 memory table V3.6"
-_SDK = "FEETECH SDK header SMS_STS.h"
-_HLS = "HLS memory table"
-_LEROBOT = "lerobot, motors/feetech/tables.py"
-_SPECIAL = "FEETECH notes on special bytes of STS servos"
-_MANUAL = "FEETECH serial bus servo protocol manual V1.01"
-_CLI = "measured by feetech-cli on an STS3215"
-_SERVOLAB = "measured by servolab on an STS3215, firmware 3.10"
-
-_COMMON = f"{_FD}; {_SDK}"
-_BOTH = f"{_FD}; {_V36}"
+_COMMON = f"{FD}; {SDK}"
+_BOTH = f"{FD}; {V36}"
 
 _identity = partial(
     Entry, size=1, access=Access.READ, storage=Storage.EEPROM, high=255, protected=True, source=_COMMON
@@ -50,19 +52,8 @@ _setting = partial(
 _command = partial(Entry, access=Access.READ_WRITE, storage=Storage.RAM)
 _feedback = partial(Entry, access=Access.READ, storage=Storage.RAM, source=_COMMON)
 _factory = partial(
-    Entry, size=1, access=Access.READ, storage=Storage.FACTORY, high=255, protected=True, source=_LEROBOT
+    Entry, size=1, access=Access.READ, storage=Storage.FACTORY, high=255, protected=True, source=LEROBOT
 )
-
-_PHASE_BITS = {
-    0: "drive direction reversed",
-    1: "brushed motor (takes effect after a restart)",
-    2: "velocity in units of 1 count/s (else 50)",
-    3: "velocity 0 means maximum (else stop)",
-    4: "position feedback over many turns (else one)",
-    5: "integrated bridge: low voltage sampling, no current feedback",
-    6: "PWM at 16 kHz (else 24 kHz)",
-    7: "position feedback reversed",
-}
 
 _IDENTITY_ROWS = (
     _identity(name="firmware_major", address=0, default=3),
@@ -72,26 +63,26 @@ _IDENTITY_ROWS = (
     ),
     _identity(
         name="byte_order", address=2, high=1, default=0, choices={0: "little", 1: "big"},
-        source=f"{_FD}; {_HLS}",
+        source=f"{FD}; {HLS_TABLE}",
         note="called END by the vendor; 0 is documented for STS, SMS and HLS, 1 on SCS is an assumption",
     ),
     _identity(name="model_major", address=3, default=9),
     _identity(name="model_minor", address=4, default=3),
     _setting(
         name="id", address=5, high=253, default=1, effect=Effect.IDENTITY, protected=True,
-        source=f"{_MANUAL}, example 3; {_COMMON}",
+        source=f"{MANUAL}, example 3; {_COMMON}",
         note="the reply to the write may come from the new id; closing the lock must address the new one",
     ),
     _setting(
         name="baud_rate", address=6, high=7, default=0, effect=Effect.IDENTITY, protected=True,
-        source=_COMMON, choices={code: f"{BAUD_CODES[code]} bit/s" for code in range(8)},
+        source=_COMMON, choices=rates("sts"),
         note="FD allows 0 to 7 on STS; lerobot and rustypot name other rates for 5 to 7 and are wrong there",
     ),
 )  # fmt: skip
 
 _SETTING_ROWS = (
     _setting(
-        name="return_delay", address=7, high=254, default=0, unit="s", scale=2e-6, source=_V36,
+        name="return_delay", address=7, high=254, default=0, unit="s", scale=2e-6, source=V36,
         note="V3.6: in 2 µs; FD and newer pages: reserved. lerobot says many servos ship with 250 (500 µs)",
     ),
     _setting(
@@ -106,7 +97,7 @@ _SETTING_ROWS = (
     _setting(
         name="max_position_limit", address=11, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, high=4095,
         default=4095, unit="rad", scale=COUNT,
-        note="FD gives 1 to 4095; 0 is allowed here because both limits 0 mean many turns",
+        note="given as 1 to 4095; 0 is allowed here because both limits 0 mean many turns",
     ),
     _setting(name="max_temperature", address=13, high=100, default=70, unit="°C"),
     _setting(
@@ -119,8 +110,8 @@ _SETTING_ROWS = (
         note="of the stall torque; copied to torque_limit at power-up",
     ),
     _setting(
-        name="phase", address=18, high=255, default=12, bits=_PHASE_BITS, effect=Effect.MOTION,
-        protected=True, source=f"{_SPECIAL}; {_V36}",
+        name="phase", address=18, high=255, default=12, bits=PHASE_BITS["sts"], effect=Effect.MOTION,
+        protected=True, source=f"{SPECIAL}; {V36}",
         note="never copy it from another servo: a wrong value can leave a permanent voltage alarm",
     ),
     _setting(
@@ -136,7 +127,7 @@ _SETTING_ROWS = (
         note="FD: one byte, 0 to 254; V3.6 and lerobot: two bytes, 0 to 1000. Chosen: one byte",
     ),
     _setting(
-        name="integral_limit", address=25, high=254, default=0, source=f"{_FD}; {_HLS}",
+        name="integral_limit", address=25, high=254, default=0, source=f"{FD}; {HLS_TABLE}",
         note="the greatest integral is 4 times this, 0 is none; V3.6 and lerobot take it for the high byte "
         "of min_start_force",
     ),
@@ -153,12 +144,12 @@ _SETTING_ROWS = (
     _setting(
         name="homing_offset", address=31, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=11, low=-2047,
         high=2047, default=0, unit="rad", scale=COUNT, effect=Effect.MOTION, protected=True,
-        source=f"{_V36}; {_LEROBOT}; {_CLI}",
+        source=f"{V36}; {LEROBOT}; {CLI}",
         note="present = (encoder - offset) mod 4096, in position mode only; newest FD: 0 to 8191 unsigned",
     ),
     _setting(
         name="operating_mode", address=33, high=3, default=0, effect=Effect.MOTION,
-        choices={0: "position", 1: "velocity", 2: "PWM", 3: "step"}, source=f"{_COMMON}; {_V36}; {_CLI}",
+        choices={0: "position", 1: "velocity", 2: "PWM", 3: "step"}, source=f"{_COMMON}; {V36}; {CLI}",
         note="takes effect at once, even when locked; locked it is lost at power-off",
     ),
     _setting(
@@ -179,44 +170,44 @@ _COMMAND_ROWS = (
     _command(
         name="torque_enable", address=40, size=1, high=128, default=0, effect=Effect.TORQUE,
         choices={0: "off", 1: "on", 2: "damped (not every firmware)", 128: "call the present position 2048"},
-        source=f"{_COMMON}; {_V36}; {_CLI}",
+        source=f"{_COMMON}; {V36}; {CLI}",
         note="128 writes homing_offset; writing goal_position turns it on by itself; its state after "
         "power-up varies",
     ),
     _command(
         name="acceleration", address=41, size=1, high=254, default=0, unit="rad/s²", scale=100 * COUNT,
-        source=f"{_COMMON}; {_V36}; {_SERVOLAB}",
+        source=f"{_COMMON}; {V36}; {SERVOLAB}",
         note="0 means the maximum; 104 to 105 counts/s² for each unit were measured on firmware 3.10",
     ),
     _command(
         name="goal_position", address=42, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32766,
         high=32766, unit="rad", scale=COUNT, effect=Effect.MOTION,
-        source=f"{_MANUAL}, example 4; {_COMMON}; {_V36}; {_CLI}",
+        source=f"{MANUAL}, example 4; {_COMMON}; {V36}; {CLI}",
         note="turns torque on by itself; useful to ±30719 over many turns; relative in step mode, where "
         "writing it again moves again",
     ),
     _command(
         name="goal_time", address=44, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=10, low=-1000, high=1000,
-        default=0, effect=Effect.MOTION, source=f"{_MANUAL}, example 4; {_FD}; {_SERVOLAB}",
+        default=0, effect=Effect.MOTION, source=f"{MANUAL}, example 4; {FD}; {SERVOLAB}",
         note="position mode: ms, and only some firmware heeds it; PWM mode: duty in 0.1 %, positive turns "
         "towards smaller angles. V3.6 and lerobot put the sign at bit 11; chosen: bit 10",
     ),
     _command(
         name="goal_velocity", address=46, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32766,
         high=32766, default=0, unit="rad/s", scale=COUNT, effect=Effect.MOTION,
-        source=f"{_MANUAL}, example 4; {_COMMON}; {_V36}",
+        source=f"{MANUAL}, example 4; {_COMMON}; {V36}",
         note="1 count/s when bit 2 of phase is set, else 50; ±3400 is typical. In position mode the greatest "
         "velocity, where 0 means what bit 3 of phase says",
     ),
     _command(
         name="torque_limit", address=48, size=2, high=1000, default=1000, unit="fraction", scale=0.001,
-        effect=Effect.TORQUE, source=f"{_COMMON}; {_V36}",
+        effect=Effect.TORQUE, source=f"{_COMMON}; {V36}",
         note="loaded from max_torque at power-up; on SCS and old SMS this address is the lock",
     ),
     _command(
         name="lock", address=55, size=1, high=1, default=1, effect=Effect.PERSISTENT,
         choices={0: "open: writes to EEPROM persist", 1: "closed: they are lost at power-off"},
-        source=f"{_COMMON}; {_V36}; {_CLI}",
+        source=f"{_COMMON}; {V36}; {CLI}",
         note="shipped 0 by V3.6, 1 by FD and on current servos; a locked write still changes the live value",
     ),
 )  # fmt: skip
@@ -224,7 +215,7 @@ _COMMAND_ROWS = (
 _FEEDBACK_ROWS = (
     _feedback(
         name="present_position", address=56, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32767,
-        high=32767, unit="rad", scale=COUNT, source=f"{_MANUAL}, example 2; {_COMMON}",
+        high=32767, unit="rad", scale=COUNT, source=f"{MANUAL}, example 2; {_COMMON}",
         note="homing_offset is applied in position mode only; beyond 0 to 4095 when bit 4 of phase is set",
     ),
     _feedback(
@@ -239,7 +230,7 @@ _FEEDBACK_ROWS = (
     _feedback(name="present_temperature", address=63, size=1, high=255, unit="°C"),
     _feedback(
         name="reg_write_pending", address=64, size=1, high=1, default=0, choices={0: "nothing", 1: "waiting"},
-        source=f"{_MANUAL}, REG WRITE; {_FD}", note="1 from REG WRITE until ACTION",
+        source=f"{MANUAL}, REG WRITE; {FD}", note="1 from REG WRITE until ACTION",
     ),
     _feedback(
         name="hardware_error", address=65, size=1, high=255, default=0, bits=ALARM_BITS,
@@ -251,7 +242,7 @@ _FEEDBACK_ROWS = (
     ),
     _feedback(
         name="goal_position_echo", address=67, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32767,
-        high=32767, unit="rad", scale=COUNT, source=f"{_HLS}; {_LEROBOT}",
+        high=32767, unit="rad", scale=COUNT, source=f"{HLS_TABLE}; {LEROBOT}",
         note="documented for HLS; lerobot names address 71 instead, so do not rely on it",
     ),
     _feedback(
