@@ -179,12 +179,25 @@ def _section(name: str) -> str:
             "|---|---|---|---|---|---|---|---|",
             *commands,
             "\n### Objects\n",
+            *_left_out(told),
             "| object | address | maps | access | API | shell | simulator | decoder | test |",
             "|---|---|---|---|---|---|---|---|---|",
             *objects,
             "",
         ]
     )
+
+
+def _left_out(told: Coverage) -> list[str]:
+    """What to say of register maps that nothing is claimed for."""
+    others = [name for name in told.family.tables if name not in told.maps]
+    if not others:
+        return []
+    here, there = (", ".join(f"`{name}`" for name in names) for names in (told.maps, others))
+    return [
+        f"Of the map {here}. Those of {there} are described, read and decoded. No simulator has them yet, so",
+        f"nothing is claimed for them here: [every register]({told.family.name}-registers.md).\n",
+    ]
 
 
 def _command_row(one: Command, frames: Mapping[str, str]) -> str:

@@ -15,7 +15,9 @@ from motorbus.cli import build, parse
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("changelog.d/*.md")])
-WITHOUT_HARDWARE = re.compile(r"(feetech|kst):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$")
+WITHOUT_HARDWARE = re.compile(
+    r"(feetech|kst):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$|^motorbus feetech (registers|models)"
+)
 
 
 def name_of(page: Path) -> str:

@@ -1,0 +1,164 @@
+"""Makes docs/reference/feetech-registers.md, and beside it the same as JSON, from the rows of the register maps.
+
+So the page cannot say anything else than what the program does. `--check` sees that both are current.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from motorbus.cli.feetech.tables import database, meanings
+from motorbus.core.entry import Entry, Table
+from motorbus.families.feetech.table import (
+    ALARM_BITS_OF,
+    BAUD_CODES,
+    BAUD_CODES_OF,
+    FIRMWARE,
+    MODELS,
+    PHASE_BITS,
+    TABLES,
+    model_number,
+)
+
+ROOT: Final = Path(__file__).resolve().parent.parent
+PAGE: Final = ROOT / "docs" / "reference" / "feetech-registers.md"
+DATABASE: Final = PAGE.with_suffix(".json")
+
+HEAD: Final = """# FEETECH registers
+
+FEETECH servos have six register maps, and the model does not tell which: firmware and byte order do. This page has
+every row of each map with its source, and a note where sources disagree and on what was chosen. It is made by
+`python -m scripts.feetech_registers` from the rows that the program itself uses; the same rows are there
+[as JSON](feetech-registers.json), and in the shell, with `--json` too:
+
+```console
+$ motorbus feetech registers --map hls
+$ motorbus feetech models
+```
+
+What motorbus does with them: servos of all six maps are found, identified and read by name. Those of the STS map are
+also written and moved. The others refuse to be written and moved until their driver exists, for the same address means
+another thing in each map: 48 is the torque limit here and the lock there. The simulator knows the STS map only.
+
+A word has its low byte first (little-endian), on SCS its high byte. A negative number is the magnitude with the sign
+bit set; never two's complement. The range bounds the raw number; times the unit it is a value. `effect` is the worst
+that writing can do; what is kept in EEPROM is only kept when the lock is open.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    maps = [line for table in TABLES.values() for line in _map(table)]
+    parts = (_choice(), maps, _models(), _baud_codes(), _alarms(), _phase())
+    return "\n".join([HEAD, *(line for part in parts for line in part)])
+
+
+def text_of_database() -> str:
+    """All maps as JSON, one register on a line."""
+    maps = []
+    for one in database(list(TABLES.values()))["maps"]:
+        rows = ",\n".join(f"   {json.dumps(row, ensure_ascii=False)}" for row in one.pop("registers"))
+        maps.append(f'{json.dumps(one, ensure_ascii=False)[:-1]}, "registers": [\n{rows}\n  ]}}')
+    return '{"schema": "motorbus.feetech.registers/1", "maps": [\n  ' + ",\n  ".join(maps) + "\n]}\n"
+
+
+def _choice() -> Iterator[str]:
+    yield "## Which map a servo has\n"
+    yield "Registers 0 to 4 tell: firmware, byte order, model. The model number decides the byte order, and one that"
+    yield "nobody knows tells it by register 2. Other firmware has no map here: it is read by what all maps share.\n"
+    rows: list[list[object]] = []
+    for one in FIRMWARE:
+        minors = f"{one.major}.{one.minors.start} to {one.major}.{one.minors.stop - 1}"
+        rows.append([minors, one.order, f"[{one.table}](#{one.table})"])
+    yield from _table(("firmware", "byte order", "map"), rows)
+
+
+def _map(table: Table) -> Iterator[str]:
+    yield f"## {table.name}\n"
+    yield f"{table.title[0].upper()}{table.title[1:]}. {len(table)} registers.\n"
+    columns = ("address", "register", "bytes", "in", "access", "sign", "range", "default", "unit", "effect")
+    yield from _table((*columns, "meaning", "source", "note"), map(_row, table.values()))
+
+
+def _row(row: Entry) -> list[object]:
+    return [
+        *(row.address, f"`{row.name}`", row.size, row.storage.value, row.access.value),
+        "" if row.sign_bit is None else f"bit {row.sign_bit}",
+        f"{row.low} to {row.high}",
+        "" if row.default is None else row.default,
+        f"{row.scale:.6g} {row.unit}" if row.unit else "",
+        row.effect.name.lower() if row.writable else "",
+        *("<br>".join(meanings(row)), row.source, row.note),
+    ]
+
+
+def _models() -> Iterator[str]:
+    yield "## Models\n"
+    yield "A number is a name and a byte order. Variants with another supply voltage or gear ratio share a number, so"
+    yield "neither can be read; the map is what such servos usually have, and only the firmware tells.\n"
+    rows: list[list[object]] = [
+        [
+            *(
+                model_number(*number, model.order),
+                f"{number[0]}.{number[1]}",
+                model.name,
+                " or ".join(model.maps),
+            ),
+            *(model.order, f"{model.resolution} over {model.arc:g}°", model.note),
+        ]
+        for number, model in MODELS.items()
+    ]
+    yield from _table(("number", "major.minor", "model", "map", "byte order", "counts", "note"), rows)
+
+
+def _baud_codes() -> Iterator[str]:
+    yield "## Baud codes\n"
+    yield "Register 6. Some libraries give other rates for 5 to 7, which loses the servo.\n"
+    rows: list[list[object]] = [
+        [code, rate, ", ".join(name for name, codes in BAUD_CODES_OF.items() if code in codes) or "none"]
+        for code, rate in BAUD_CODES.items()
+    ]
+    yield from _table(("code", "bit/s", "maps that take it"), rows)
+
+
+def _alarms() -> Iterator[str]:
+    yield "## Alarm bits\n"
+    yield "Of the error byte in every answer, of register 65, and of the masks 19 and 20.\n"
+    yield from _bits(ALARM_BITS_OF)
+
+
+def _phase() -> Iterator[str]:
+    yield "## Phase byte\n"
+    yield "Register 18; what is said holds when the bit is set. It belongs to one servo and is never copied.\n"
+    yield from _bits(PHASE_BITS)
+
+
+def _bits(of_maps: Mapping[str, Mapping[int, str]]) -> Iterator[str]:
+    rows: list[list[object]] = [[bit, *(bits.get(bit, "") for bits in of_maps.values())] for bit in range(8)]
+    yield from _table(("bit", *of_maps), rows)
+
+
+def _table(columns: tuple[str, ...], rows: Iterable[list[Any]]) -> Iterator[str]:
+    yield f"| {' | '.join(columns)} |"
+    yield f"|{'---|' * len(columns)}"
+    for row in rows:
+        yield f"| {' | '.join(str(cell) for cell in row)} |"
+    yield ""
+
+
+def main() -> int:
+    """Write page and database, or with --check see that those there are those that would be written."""
+    wanted = {PAGE: page(), DATABASE: text_of_database()}
+    if "--check" in sys.argv[1:]:
+        return int(any(not file.exists() or file.read_text("utf-8") != text for file, text in wanted.items()))
+    for file, text in wanted.items():
+        file.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
