@@ -58,7 +58,12 @@ def test_identify_is_one_read_and_fills_the_node() -> None:
     node = Node(3)
     found = play(identify(node), reads(3, 0, 3, 10, 0, 9, 3))
     assert (found.node, found.model, found.firmware, found.table) == (3, "STS3215", "3.10", "sts")
-    assert found.details == {"model_number": 777, "byte_order": "little", "register_map": "sts"}
+    assert found.details == {
+        "model_number": 777,
+        "byte_order": "little",
+        "register_map": "sts",
+        "writable": True,
+    }
     assert (node.identity, node.table, node.settings) == (found, STS, None)
     assert node.writable
 

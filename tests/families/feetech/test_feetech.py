@@ -78,8 +78,10 @@ def test_described_models_are_axes(model: str) -> None:
     assert all(map(callable, axis.values()))
 
 
-@pytest.mark.parametrize("model", ["SCS0009", "HLS3950", "unknown model 9.99", "STS9999", ""])
-def test_models_of_maps_not_described_are_none(model: str) -> None:
+@pytest.mark.parametrize(
+    "model", ["SCS0009", "SCS15-2", "SM85BLHV", "SM100-360M", "HLS3950", "unknown model 9.99", "STS9999", ""]
+)
+def test_models_of_maps_not_commanded_have_no_axis(model: str) -> None:
     assert FAMILY.axis(model) == {}
 
 

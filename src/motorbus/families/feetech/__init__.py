@@ -25,6 +25,7 @@ from motorbus.core.family import (
 from motorbus.core.operation import Answer, Exchange, Operation, Runnable
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
+    COMMANDED,
     AsyncServo,
     GroupResult,
     Node,
@@ -75,8 +76,6 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "move": driver.move,
     "stop": driver.stop,
 }
-_DESCRIBED: Final = ("STS", "HTS")
-"""Models whose names begin so have the STS map; identify() tells for sure."""
 
 
 class Feetech:
@@ -139,8 +138,8 @@ class Feetech:
         return scan(ids, rates)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        names = {known.name for known in MODELS.values()}
-        return _AXIS if model.upper() in names and model.upper().startswith(_DESCRIBED) else {}
+        moved = {known.name for known in MODELS.values() if COMMANDED.issuperset(known.maps)}
+        return _AXIS if model.upper() in moved else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.feetech.simulator import simulate

@@ -19,7 +19,7 @@ from motorbus.families.feetech.driver.group import GroupResult, prepare_all, syn
 from motorbus.families.feetech.driver.identity import identify, ping, prepare
 from motorbus.families.feetech.driver.loop import Positions, sync_read_positions, sync_write_positions
 from motorbus.families.feetech.driver.motion import Promise, enable_torque, move, stop
-from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.driver.node import COMMANDED, Node, Settings
 from motorbus.families.feetech.driver.registers import action, action_all, read, read_raw, reg_write, write
 from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import scan
@@ -27,6 +27,7 @@ from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
 
 __all__ = [
+    "COMMANDED",
     "AsyncServo",
     "GroupResult",
     "Node",

@@ -132,6 +132,7 @@ def identity_of(node: int, head: bytes) -> Identity:
             "model_number": model_number(major, minor, chosen.order),
             "byte_order": chosen.order,
             "register_map": chosen.table or "unknown",
+            "writable": chosen.table in COMMANDED,
         },
     )
 
