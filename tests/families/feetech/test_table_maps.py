@@ -208,3 +208,16 @@ def test_signed_rows_are_sign_magnitude_and_no_others_are() -> None:
     for _, row in ALL:
         assert (row.coding is Coding.SIGN_MAGNITUDE) == (row.sign_bit is not None)
         assert row.access in (Access.READ, Access.READ_WRITE)
+
+
+@OF_EACH
+def test_notes_speak_only_of_registers_that_the_map_has(table: Table) -> None:
+    every = {row.name for other in TABLES.values() for row in other.values()}
+    for row in table.values():
+        named = {word.strip(".,:;()") for word in row.note.split()} & every - {
+            "id",
+            "lock",
+            "phase",
+            "moving",
+        }
+        assert named <= set(table), row.name

@@ -92,7 +92,10 @@ def load(node: Node) -> Runnable[float]:
 
 
 def current(node: Node) -> Runnable[float]:
-    """Supply current, A. Raises DeviceError when the register map is not known."""
+    """Current, A: of the supply, on HLS of the motor's phase.
+
+    Raises DeviceError when the register map is not known, or nobody has published whether it tells its current.
+    """
     return _quantity(node, "present_current")
 
 

@@ -92,7 +92,7 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
 
     Registers in EEPROM go through the guarded sequence: torque off (the servo goes limp and stays so), unlock,
     write, read back, lock. Raises RequestError for what cannot or must not be written so, DeviceError when the
-    register map is not known, VerificationFailed when EEPROM reads back different.
+    register map is not known or not commanded here, VerificationFailed when EEPROM reads back different.
     """
     check_values(values)
     table = yield from writable(node)

@@ -3,6 +3,9 @@
 SMBL is laid out as STS. SMCL has its offset, mode and protection elsewhere, no torque limit, and its lock at 48, where
 SMBL, STS and HLS have the torque limit: unlocking it by the wrong map leaves a servo limp.
 
+FD lists firmware 1.0 to 1.19 and 1.20 to 1.39 apart. The published extract has the rows of the first and gives both the
+same map, and so does this file; SDK headers of that time are of two kinds, too (see `protection_current`).
+
 What these servos ship with is published for few rows; the others have no default here. What FD puts in its column
 "default" is no proof of it.
 """
@@ -124,6 +127,7 @@ SMCL: Final = _OLD.derive(
         "baud_rate", high=7, choices=rates("smcl"), source=f"{FD}; {SMS_PAGE}",
         note="SMS servos ship with 115200 bit/s; FD allows 0 to 254, the SDK names 0 to 7. Chosen: 0 to 7",
     ),
+    _smcl("max_torque", note="of the stall torque"),
     _smcl("return_delay", source=f"{FD}; {SMS_PAGE}", note=SMBL["return_delay"].note),
     _smcl("phase", bits=PHASE_BITS["smcl"], high=254, note=f"{STS['phase'].note}; its bits are not published"),
     _smcl("min_start_force", size=2, high=1000, source=f"{FD}; {SDK_SMSCL}"),
