@@ -6,9 +6,6 @@ back, saved and read back again (`keeping.py`). Source of each object: its row i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
-
 from motorbus.core.entry import Entry
 from motorbus.core.operation import Alone, Operation, Rank
 from motorbus.errors import RequestError
@@ -19,9 +16,6 @@ from motorbus.families.kst.driver.motion import start_exchange
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.refusals import lacking
 from motorbus.families.kst.table import REVERSED
-
-MID_POINT: Final[Mapping[str, int]] = {"xqpower": 1}
-"""What is written to set the mid point, by profile: 1 by the XQPOWER module, 0 by the public demo driver for KST."""
 
 
 def start_reports(node: Node, interval: float | None = None) -> Operation[None]:
@@ -62,7 +56,7 @@ def set_mid_point(node: Node) -> Operation[float]:
 
 def _mid_point(node: Node, row: Entry) -> Operation[float]:
     node.limits = None
-    yield from order(node, row, MID_POINT.get(node.profile.name, 0), rank=Rank.CONFIGURATION)
+    yield from order(node, row, node.profile.mid_point_value, rank=Rank.CONFIGURATION)
     yield from save(node)
     yield from settled(node)
     return (yield from position_exchange(node))
