@@ -139,12 +139,13 @@ def on_socket(make: Callable[[], Adapter], url: str) -> Iterator[Peer]:
 
 
 def _hear(peer: Peer, connection: socket.socket) -> bool:
+    """A host may hang up at any moment, also right behind its last word, so that the answer finds nobody."""
     try:
         data = connection.recv(4096)
+        if data:
+            peer.hear(data)
     except OSError:
         return False
-    if data:
-        peer.hear(data)
     return bool(data)
 
 
