@@ -27,7 +27,10 @@ SAME_EVERYWHERE: Final[Mapping[str, int]] = {
     "reg_write_pending": 0,
     "hardware_error": 0,
 }
-"""Defaults that FD 1.9.8.5 has in every map that has the row, and that no other source contradicts."""
+"""Defaults that FD 1.9.8.5 has in every map that has the row, and that no other source contradicts.
+
+Two are not FD's: servos ship with the id 1, where FD has 0; and FD has no row for the byte order.
+"""
 _TRUE_OF_THE_THING: Final = frozenset(
     (
         *(
@@ -38,6 +41,7 @@ _TRUE_OF_THE_THING: Final = frozenset(
             "unload_mask",
             "position_d",
             "protective_torque",
+            "overload_torque",
         ),
         *("present_load", "reg_write_pending", "moving"),
     )

@@ -23,7 +23,7 @@ _STS: Final[Mapping[int, str]] = {
     7: "position feedback reversed",
 }
 _HLS: Final[Mapping[int, str]] = {
-    0: "drive phase reversed (ignored from firmware 3.42 on)",
+    0: "current drive phase reversed (ignored from firmware 3.42 on)",
     1: "current feedback phase reversed",
     2: "bridge phase",
     3: "velocity feedback phase reversed",

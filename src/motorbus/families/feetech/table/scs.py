@@ -2,7 +2,8 @@
 
 A word has its high byte at the lower address, the other way round than in all other maps, and no checksum can tell: a
 little-endian goal is a good packet for another position. There is no operating mode: both limits 0 make a motor of it,
-which register 44 drives. The lock is at 48, where STS, SMBL and HLS have the torque limit.
+which register 44 drives. The lock is at 48, where STS, SMBL and HLS have the torque limit. There is no acceleration:
+lerobot and rustypot list one at 41, and neither FD, nor the SCS table, nor the SDK has it.
 
 A count is reckoned as 300/1024 degrees, the arc of an SCS0009; what other models turn through is their own affair.
 Defaults are those of the SCS memory table 1902.
@@ -83,11 +84,12 @@ _SETTINGS = (
     *(
         _position(
             name, **_UNSIGNED, high=1023, effect=Effect.MOTION,
-            note=f"both limits 0 make a motor of it, which goal_time then drives; {_ARC}",
+            note="both limits 0 make a motor of it, which goal_time then drives; FD gives it a sign at bit 15, chosen: "
+            f"none; {_ARC}",
         )
         for name in ("min_position_limit", "max_position_limit")
     ),
-    _row("max_torque", note="of the stall torque"),
+    _row("max_torque", effect=Effect.TORQUE, note="of the stall torque; there is no torque limit beside it"),
     _row("phase", bits=PHASE_BITS["scs"], source=f"{SPECIAL_SCS}; {_BOTH}"),
     _row("unload_mask", bits=ALARM_BITS_OF["scs"]),
     _row("led_mask", bits=ALARM_BITS_OF["scs"]),
@@ -116,7 +118,7 @@ _COMMANDS = (
     ),
     _position(
         "goal_velocity", **_UNSIGNED, source=_ALL,
-        note=f"0 means the time counts, or the maximum; {_ARC}",
+        note=f"0 means the time counts, and without one what bit 3 of phase says; {_ARC}",
     ),
     _row(
         "lock", address=48, source=_ALL,
@@ -184,11 +186,16 @@ SCS2: Final = _SECOND.derive(
         _scs2(name)
         for name in (
             *("min_position_limit", "max_position_limit", "dead_band_cw", "dead_band_ccw"),
-            *("overload_time", "torque_enable", "goal_position", "goal_time", "goal_velocity", "lock"),
+            *("overload_time", "torque_enable", "goal_position", "goal_velocity", "lock"),
             *("present_position", "present_velocity"),
         )
     ),
     _scs2("baud_rate", high=7, choices=rates("scs2"), note="FD allows 0 to 7"),
+    _scs2(
+        "goal_time",
+        note="motor mode: duty in 0.1 %, sign at bit 10, which is all that FD has it for; position mode: the time of "
+        "the way in ms, heeded when the velocity is 0, is taken from SCS",
+    ),
     _scs2("return_delay", source=SCS_TABLE, note=f"FD: reserved; {_UNPUBLISHED}"),
     _scs2("hysteresis", source=SCS_TABLE, note=_UNPUBLISHED),
     changed(
@@ -204,7 +211,10 @@ SCS2: Final = _SECOND.derive(
         source=FD, note=f"one byte, sign at bit 7; {_ARC}",
     ),
     _scs2("present_current", unit="A", scale=AMPERE, note="the unit is that of other maps"),
-    *(_scs2(row.name, source=LEROBOT) for row in _FACTORY),
+    *(
+        _scs2(row.name, source=LEROBOT, note="; ".join(filter(None, (row.note, _UNPUBLISHED))))
+        for row in _FACTORY
+    ),
     without=("position_i",),
     title="SCS servos of the second kind (SCSXX-2), firmware 3.20 to 3.39, big-endian",
 )  # fmt: skip

@@ -15,14 +15,24 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.entry import Entry, changed
+from motorbus.core.operation import Effect
 from motorbus.families.feetech.table.borrowed import borrowed
 from motorbus.families.feetech.table.codes import rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
-from motorbus.families.feetech.table.sources import CLI, FD, LEROBOT, MANUAL, SDK, SDK_SMSCL, SMS_PAGE
+from motorbus.families.feetech.table.sources import (
+    CLI,
+    FD,
+    HLS_TABLE,
+    LEROBOT,
+    MANUAL,
+    SDK,
+    SDK_SMSCL,
+    SMS_PAGE,
+)
 from motorbus.families.feetech.table.sts import STS
 
 _BOTH = f"{FD}; {SDK}"
-_ROWS = borrowed(STS, source=_BOTH, defaults={"firmware_major": 2, "model_major": 8})
+_ROWS = borrowed(STS, source=FD, defaults={"firmware_major": 2, "model_major": 8})
 _LIKE_STS = "laid out as in the STS map; nobody has published this for SMS servos"
 
 
@@ -30,6 +40,12 @@ def _smbl(name: str, **differences: object) -> Entry:
     return changed(_ROWS[name], **differences)
 
 
+_NAMED_BY_SDK = (
+    *("model_major", "model_minor", "status_return_level", "max_temperature", "max_voltage", "min_voltage"),
+    *("max_torque", "led_mask", "dead_band_cw", "dead_band_ccw", "protection_current", "present_load"),
+    *("present_voltage", "present_temperature", "moving"),
+)
+"""Rows that need no other word than that the SDK header, in one of its editions, names the register, as FD does."""
 _FACTORY = ("moving_threshold", "dts", "velocity_unit", "hts", "max_velocity_limit", "max_acceleration")
 
 SMBL: Final = _ROWS.derive(
@@ -45,23 +61,33 @@ SMBL: Final = _ROWS.derive(
         "return_delay", default=250, source=f"{FD}; {SMS_PAGE}",
         note="in 2 µs; values below 50 act as 50 (100 µs), 0 is that minimum too",
     ),
-    _smbl("min_position_limit", note="both limits 0 mean many turns, as on STS"),
-    _smbl("max_position_limit", note="both limits 0 mean many turns, as on STS"),
-    _smbl("phase", bits=PHASE_BITS["smbl"], source=FD, note=f"{STS['phase'].note}; bits {_LIKE_STS}"),
-    _smbl("integral_limit", source=FD, note="the greatest integral is 4 times this, 0 is none"),
-    _smbl("min_start_force", source=FD),
-    _smbl("angular_resolution", high=128, source=FD, note="multiplies the angle of a count"),
+    *(
+        _smbl(name, source=_BOTH, note="both limits 0 mean many turns, as on STS")
+        for name in ("min_position_limit", "max_position_limit")
+    ),
+    *(_smbl(name, source=_BOTH) for name in _NAMED_BY_SDK),
+    _smbl("phase", bits=PHASE_BITS["smbl"], note=f"{STS['phase'].note}; bits {_LIKE_STS}"),
     _smbl(
-        "homing_offset", source=FD,
+        "integral_limit", source=f"{FD}; {HLS_TABLE}",
+        note="the greatest integral is 4 times this, 0 is none; lerobot takes it for the high byte of "
+        "min_start_force",
+    ),
+    _smbl("min_start_force", note="FD: one byte, 0 to 254; lerobot: two bytes. Chosen: one byte"),
+    _smbl("angular_resolution", high=128, note="multiplies the angle of a count"),
+    _smbl(
+        "homing_offset", source=_BOTH,
         note="present = (encoder - offset) mod 4096, measured on STS in position mode only",
     ),
-    _smbl("operating_mode", note="that it takes effect at once, even when locked, was measured on STS"),
+    _smbl(
+        "operating_mode", source=_BOTH,
+        note="that it takes effect at once, even when locked, was measured on STS",
+    ),
     _smbl(
         "torque_enable", source=f"{_BOTH}; {CLI}",
         note="128 writes homing_offset; its state after power-up varies; that writing a goal "
         "position turns it on was measured on STS",
     ),
-    _smbl("acceleration", note="0 means the maximum"),
+    _smbl("acceleration", source=_BOTH, note="0 means the maximum"),
     _smbl(
         "goal_position", source=f"{MANUAL}, example 4; {_BOTH}",
         note="relative in step mode, where writing it again moves again",
@@ -74,15 +100,22 @@ SMBL: Final = _ROWS.derive(
         "goal_velocity", source=f"{MANUAL}, example 4; {_BOTH}",
         note=f"1 count/s when bit 2 of phase is set, else 50: {_LIKE_STS}",
     ),
-    _smbl("torque_limit", note="loaded from max_torque at power-up; on SCS and SMCL this is the lock"),
-    _smbl("lock", note="a locked write still changes the live value: measured on STS"),
-    _smbl("present_position", source=f"{MANUAL}, example 2; {_BOTH}"),
-    _smbl("present_velocity", note=f"1 count/s when bit 2 of phase is set, else 50: {_LIKE_STS}"),
     _smbl(
-        "goal_position_echo", source=LEROBOT,
-        note="laid out as in the STS map, where it is in doubt too: do not rely on it",
+        "torque_limit", source=_BOTH,
+        note="loaded from max_torque at power-up; on SCS and SMCL this is the lock",
     ),
-    _smbl("present_current", note="supply side on STS; always 0 there when bit 5 of phase is set"),
+    _smbl("lock", source=_BOTH, note="a locked write still changes the live value: measured on STS"),
+    _smbl("present_position", source=f"{MANUAL}, example 2; {_BOTH}"),
+    _smbl(
+        "present_velocity", source=_BOTH,
+        note=f"1 count/s when bit 2 of phase is set, else 50: {_LIKE_STS}",
+    ),
+    _smbl(
+        "goal_position_echo", source=f"{HLS_TABLE}; {LEROBOT}",
+        note="laid out as in the STS map, where it is in doubt too: documented for HLS, and lerobot names address 71 "
+        "instead, so do not rely on it",
+    ),
+    _smbl("present_current", source=_BOTH, note="supply side on STS; always 0 there when bit 5 of phase is set"),
     *(_smbl(name, source=LEROBOT, note=STS[name].note) for name in _FACTORY),
     _smbl(
         "acceleration_multiplier", source=LEROBOT, note=STS["acceleration_multiplier"].note
@@ -127,7 +160,7 @@ SMCL: Final = _OLD.derive(
         "baud_rate", high=7, choices=rates("smcl"), source=f"{FD}; {SMS_PAGE}",
         note="SMS servos ship with 115200 bit/s; FD allows 0 to 254, the SDK names 0 to 7. Chosen: 0 to 7",
     ),
-    _smcl("max_torque", note="of the stall torque"),
+    _smcl("max_torque", effect=Effect.TORQUE, note="of the stall torque; there is no torque limit beside it"),
     _smcl("return_delay", source=f"{FD}; {SMS_PAGE}", note=SMBL["return_delay"].note),
     _smcl("phase", bits=PHASE_BITS["smcl"], high=254, note=f"{STS['phase'].note}; its bits are not published"),
     _smcl("min_start_force", size=2, high=1000, source=f"{FD}; {SDK_SMSCL}"),

@@ -6,6 +6,7 @@ A note stands where sources disagree, and says what was chosen. The effect of a 
   angular resolution, the direction bits of the phase). A servo that holds may move when one of those is
   written, even with the lock closed, for a locked write changes the live value; only a limp one does not.
 - TORQUE: the torque limit as much as the torque switch, for raising it from 0 lets a servo go for its goal.
+  In maps without a torque limit, max_torque is what bounds the present torque, and has this effect.
 - IDENTITY: afterwards the servo no longer answers as it did. PERSISTENT: kept in EEPROM, when unlocked.
 - The lock is PERSISTENT although it lies in RAM and moves nothing: opening it makes every later write to
   EEPROM survive, so whoever promises to change nothing for good may not touch it.
@@ -31,6 +32,7 @@ from motorbus.families.feetech.table.sources import (
     MANUAL,
     SDK,
     SERVOLAB,
+    SMS_PAGE,
     SPECIAL,
     V36,
 )
@@ -56,14 +58,14 @@ _factory = partial(
 )
 
 _IDENTITY_ROWS = (
-    _identity(name="firmware_major", address=0, default=3),
+    _identity(name="firmware_major", address=0, default=3, source=FD),
     _identity(
-        name="firmware_minor", address=1, default=10,
+        name="firmware_minor", address=1, default=10, source=FD,
         note="3.9 and 3.10 are both common; the default is the one most was measured on",
     ),
     _identity(
         name="byte_order", address=2, high=1, default=0, choices={0: "little", 1: "big"},
-        source=f"{FD}; {HLS_TABLE}",
+        source=f"{HLS_TABLE}; {SMS_PAGE}",
         note="called END by the vendor; 0 is documented for STS, SMS and HLS, 1 on SCS is an assumption",
     ),
     _identity(name="model_major", address=3, default=9),
@@ -154,10 +156,13 @@ _SETTING_ROWS = (
     ),
     _setting(
         name="protective_torque", address=34, high=100, default=20, unit="fraction", scale=0.01,
-        note="what is left of the torque after an overload",
+        note="what is left of the torque after an overload; a percentage, though FD allows up to 254",
     ),
     _setting(name="overload_time", address=35, high=254, default=200, unit="s", scale=0.01),
-    _setting(name="overload_torque", address=36, high=100, default=80, unit="fraction", scale=0.01),
+    _setting(
+        name="overload_torque", address=36, high=100, default=80, unit="fraction", scale=0.01,
+        note="a percentage, though FD allows up to 254",
+    ),
     _setting(name="velocity_p", address=37, high=254, default=10, note="velocity mode"),
     _setting(name="overcurrent_time", address=38, high=254, default=200, unit="s", scale=0.01),
     _setting(
@@ -234,7 +239,7 @@ _FEEDBACK_ROWS = (
     ),
     _feedback(
         name="hardware_error", address=65, size=1, high=255, default=0, bits=ALARM_BITS,
-        source=_BOTH,
+        source=_BOTH, note="bit 4 by V3.6 and in the masks too; newer pages leave it unused",
     ),
     _feedback(
         name="moving", address=66, size=1, high=1, bits={0: "moving"},
