@@ -87,8 +87,12 @@ def serving(source: Readable, hear: Callable[[], bool]) -> Iterator[None]:
     over = Event()
 
     def run() -> None:
-        while not over.is_set():
-            if select((source,), (), (), 0.02)[0] and not hear():
+        while True:
+            ending = over.is_set()  # what was said before the end is still heard
+            if select((source,), (), (), 0.0 if ending else 0.02)[0]:
+                if not hear():
+                    return
+            elif ending:
                 return
 
     thread = Thread(target=run, daemon=True)
