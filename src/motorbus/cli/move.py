@@ -11,6 +11,7 @@ from motorbus.cli import dry, faces
 from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
+from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import able, face, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -40,7 +41,6 @@ Examples:
 )
 
 
-Flag = Annotated[bool, Parameter(negative="")]
 Goals = dict[int, float]
 
 
@@ -51,7 +51,7 @@ def move(
     acceleration: str = "",
     wait: bool = True,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -69,8 +69,6 @@ def move(
         Return when all are in position, or at once.
     yes
         Do not ask before a way of more than 180 degrees.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """

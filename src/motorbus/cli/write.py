@@ -11,6 +11,7 @@ from motorbus.cli import dry, quantity, registers
 from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
+from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import check_names, device, face, opened, table_of
 from motorbus.core.entry import Storage
 from motorbus.core.operation import Effect
@@ -41,8 +42,6 @@ Examples:
     motorbus write feetech:/dev/ttyACM0#3 torque_limit=50% --dry-run""",
 )
 
-Flag = Annotated[bool, Parameter(negative="")]
-
 
 class Order(NamedTuple):
     """One register, the value it shall have in the row's unit, and whether it was given as a raw number."""
@@ -60,7 +59,7 @@ def write(
     raw: Flag = False,
     expert: Flag = False,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -78,8 +77,6 @@ def write(
         Allow raw values in registers that move the device.
     yes
         Do not ask before writing to EEPROM, or before a way of more than 180 degrees.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """

@@ -14,6 +14,7 @@ from motorbus.cli import dry, quantity, registers
 from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
+from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
 from motorbus.core.operation import ANY, Answer, Exchange, Pause, Rank, Together
 from motorbus.errors import RequestError
@@ -34,7 +35,6 @@ NAME: Final = "feetech"
 app = App(name=NAME, help="What only feetech devices can do.", help_epilogue="")
 
 Names = Annotated[str, Parameter(name="NAME=VALUE")]
-Flag = Annotated[bool, Parameter(negative="")]
 Silent = Annotated[Output, Parameter(parse=False)]
 
 
@@ -141,7 +141,7 @@ def reg_write(
     /,
     *assignments: Names,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -155,8 +155,6 @@ def reg_write(
         Registers that follow each other, in RAM.
     yes
         Do not ask before a way of more than 180 degrees.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -191,7 +189,7 @@ def action(
     bus: Annotated[str, Parameter(name="BUS[#ID]")],
     /,
     *,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -201,8 +199,6 @@ def action(
     ----------
     bus
         feetech:PORT for everyone, or feetech:PORT#ID.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -299,7 +295,7 @@ def sync_write(
     /,
     *assignments: Annotated[str, Parameter(name="ID=VALUE")],
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -315,8 +311,6 @@ def sync_write(
         For each servo, what the register shall hold.
     yes
         Do not ask before a way of more than 180 degrees.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
@@ -368,7 +362,7 @@ def factory_restore(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
     **options: str,
 ) -> Exit:
@@ -380,8 +374,6 @@ def factory_restore(
         feetech:PORT#ID, as feetech:/dev/ttyACM0#3
     yes
         Do not ask before everything in EEPROM is overwritten.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """

@@ -11,7 +11,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours, reads_only
+from motorbus.cli.kst.servo import BusOption, Device, app, named, on_servo, one_of_ours, reads_only
+from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver import Node
@@ -36,24 +37,18 @@ def node_id(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Read the id that a servo has or will have, or give it another one.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     new
         Its new id, 1 to 127; left out, the id is read.
     yes
         Do not ask before the id is written.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (old,) = one_of_ours(device_)
     if not new:
@@ -91,24 +86,18 @@ def bit_rate(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Read the bit rate that a servo will have, where it tells, or give it another one.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     rate
         20k, 50k, 100k, 125k, 250k, 500k, 800k or 1000k; left out, the rate is read.
     yes
         Do not ask before the rate is written.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     if not rate:
@@ -141,22 +130,16 @@ def save(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Keep id, bit rate, limits and function bits over power-off.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     yes
         Do not ask before the memory is written.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     consent = "" if yes else f"save the settings of {named(node)}, where they survive power-off"

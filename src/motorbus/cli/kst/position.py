@@ -10,7 +10,8 @@ from cyclopts import Parameter
 from motorbus.cli import dry
 from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, on_servo, one_of_ours, reads_only
+from motorbus.cli.kst.servo import BusOption, Device, app, on_servo, one_of_ours, reads_only
+from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
 from motorbus.families.kst.driver import RawStatus, Servo
 
@@ -35,26 +36,20 @@ def position(
     *,
     wait: Flag = False,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Read the position of a servo, or send it to one.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     value
         Where it shall go; left out, its position is read.
     wait
         Return when it is there; else as soon as it has acknowledged.
     yes
         Do not ask before a way of more than 180 degrees.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     one_of_ours(device_)
     if not value:
@@ -91,16 +86,8 @@ Examples:
     motorbus kst status kst:can://slcan/dev/ttyACM0#0x25
     motorbus kst status kst:sim,ids=0x25,profile=kst-ext#0x25""",
 )
-def status(device_: Device, /, *, output: Silent, **options: str) -> Exit:
-    """Read the status of a servo.
-
-    Parameters
-    ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
-    """
+def status(device_: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+    """Read the status of a servo."""
     node, told = on_servo(device_, options, output, lambda servo: servo.status())
     output.document("motorbus.kst.status/1", {"id": node, **told._asdict()})
     if isinstance(told, RawStatus):
@@ -119,16 +106,8 @@ def status(device_: Device, /, *, output: Silent, **options: str) -> Exit:
     motorbus kst version kst:can://slcan/dev/ttyACM0#0x25
     motorbus kst version kst:sim,ids=0x25#0x25 --json""",
 )
-def version(device_: Device, /, *, output: Silent, **options: str) -> Exit:
-    """Read the firmware version of a servo.
-
-    Parameters
-    ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
-    """
+def version(device_: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+    """Read the firmware version of a servo."""
     node, text = on_servo(device_, options, output, lambda servo: servo.version())
     output.document("motorbus.kst.version/1", {"id": node, "version": text})
     output.text(text)

@@ -14,7 +14,8 @@ from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit
 from motorbus.cli.kst.identity import bits_per_second, whole
 from motorbus.cli.kst.offers import say
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, one_of_ours
+from motorbus.cli.kst.servo import BusOption, Device, app, named, one_of_ours
+from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import face, opened
 from motorbus.core import units
 from motorbus.core.operation import Progress
@@ -50,16 +51,14 @@ def provision(
     new_bitrate: str = "",
     patience: str = "120s",
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Give a servo its id or its bit rate, or both, and see it come back with them.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     new_id
         The id it shall have, 1 to 127.
     new_bitrate
@@ -68,10 +67,6 @@ def provision(
         How long to wait for the power cycle.
     yes
         Do not ask before its memory is written.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     bus, _, (node,) = one_of_ours(device_)
     wanted = _wanted(new_id, new_bitrate)

@@ -24,9 +24,10 @@ NAME: Final = "kst"
 
 app = App(name=NAME, help="What only kst devices can do.", help_epilogue="")
 
-Device = Annotated[str, Parameter(name="BUS#ID")]
-Flag = Annotated[bool, Parameter(negative="")]
-Silent = Annotated[Output, Parameter(parse=False)]
+Device = Annotated[str, Parameter(name="BUS#ID", help="kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25")]
+BusOption = Annotated[
+    str, Parameter(help="Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.")
+]
 
 
 def ours(found: Target) -> Target:

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.kst.servo import Device, Flag, Silent, app, named, on_servo, one_of_ours, reads_only
+from motorbus.cli.kst.servo import BusOption, Device, app, named, on_servo, one_of_ours, reads_only
+from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -30,9 +31,9 @@ def reports(
     /,
     *,
     interval: str = "",
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Let a servo report its position by itself, or no more.
 
@@ -40,14 +41,8 @@ def reports(
     ----------
     switch
         on or off
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     interval
         How often, as 10ms; as the servo is set when left out.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     one_of_ours(device_)
     seconds = units.parse(interval, "time") if interval else None
@@ -78,22 +73,16 @@ def mid_point(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Make the present position of a servo its zero, and save that.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     yes
         Do not ask before the zero is moved for good.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     consent = "" if yes else f"make the present position of {named(node)} its zero, for good"
@@ -125,26 +114,20 @@ def limits(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Read the travel limits of a servo, or set and save them.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     low
         Lowest position, at most 0, in rad or as -45deg.
     high
         Highest position, at least 0.
     yes
         Do not ask before the limits are written for good.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     if bool(low) != bool(high):
@@ -181,24 +164,18 @@ def reverse(
     /,
     *,
     yes: Flag = False,
-    dry_run: Flag = False,
+    dry_run: DryRun = False,
     output: Silent,
-    **options: str,
+    **options: BusOption,
 ) -> Exit:
     """Say whether the sense of rotation of a servo is reversed, or reverse it.
 
     Parameters
     ----------
-    device_
-        kst:PORT#ID, as kst:can://slcan/dev/ttyACM0#0x25
     switch
         on or off; left out, it is read.
     yes
         Do not ask before it is written for good.
-    dry_run
-        Read as usual; show the frames that would change something, and send none of those.
-    options
-        Any option of the bus string, as a flag: --profile kst-ext, --bitrate 1000000.
     """
     _, _, (node,) = one_of_ours(device_)
     if switch:

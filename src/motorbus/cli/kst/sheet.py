@@ -7,7 +7,8 @@ from pathlib import Path
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.kst.identity import whole
-from motorbus.cli.kst.servo import Flag, Silent, app
+from motorbus.cli.kst.servo import app
+from motorbus.cli.parameters import Flag, Silent
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver import Node
 from motorbus.families.kst.table import PROFILES
