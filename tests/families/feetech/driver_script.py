@@ -16,7 +16,6 @@ from motorbus.core.operation import (
     Answer,
     Effect,
     Exchange,
-    Operation,
     Pause,
     Reply,
     Report,
@@ -25,6 +24,7 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech.driver import Node
+from tests.families.player import played
 
 T = TypeVar("T")
 
@@ -122,20 +122,7 @@ class Played:
 
     def run(self, runnable: Runnable[T]) -> T:
         """Carry it out to its end; at exchange number `interrupt_at` a KeyboardInterrupt is thrown in instead."""
-        operation: Operation[T] = iter(runnable) if isinstance(runnable, Exchange) else runnable
-        value: Any = None
-        error: BaseException | None = None
-        while True:
-            try:
-                step = operation.throw(error) if error is not None else operation.send(value)
-            except StopIteration as end:
-                result: T = end.value
-                return result
-            value, error = None, None
-            try:
-                value = self._carry_out(step)
-            except BaseException as raised:
-                error = raised
+        return played(runnable, self._carry_out)
 
     def _carry_out(self, step: Any) -> Any:
         if isinstance(step, Exchange):

@@ -21,7 +21,6 @@ from motorbus.core.operation import (
     Effect,
     Exchange,
     Listen,
-    Operation,
     Pause,
     Reply,
     Report,
@@ -37,6 +36,7 @@ from motorbus.families.kst.simulator import Servo as SimulatedServo
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
+from tests.families.player import played
 
 T = TypeVar("T")
 
@@ -130,20 +130,7 @@ class Played:
 
     def run(self, runnable: Runnable[T]) -> T:
         """Carry it out to its end."""
-        operation: Operation[T] = iter(runnable) if isinstance(runnable, Exchange) else runnable
-        value: Any = None
-        error: BaseException | None = None
-        while True:
-            try:
-                step = operation.throw(error) if error is not None else operation.send(value)
-            except StopIteration as end:
-                result: T = end.value
-                return result
-            value, error = None, None
-            try:
-                value = self._carry_out(step)
-            except Exception as raised:
-                error = raised
+        return played(runnable, self._carry_out)
 
     def _carry_out(self, step: Any) -> Any:
         if isinstance(step, Exchange):
