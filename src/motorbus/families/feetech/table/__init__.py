@@ -21,6 +21,7 @@ from motorbus.families.feetech.table.codes import (
     map_for,
     model_number,
 )
+from motorbus.families.feetech.table.control import CONTROL, Control, Middle, Mode, mode_of
 from motorbus.families.feetech.table.hls import HLS
 from motorbus.families.feetech.table.phase import PHASE_BITS, tells_current, velocity_scale, zero_is_maximum
 from motorbus.families.feetech.table.scs import SCS, SCS2, SCS_COUNT
@@ -38,6 +39,7 @@ __all__ = [
     "AMPERE",
     "BAUD_CODES",
     "BAUD_CODES_OF",
+    "CONTROL",
     "COUNT",
     "FIRMWARE",
     "HLS",
@@ -51,10 +53,14 @@ __all__ = [
     "STS",
     "TABLES",
     "Choice",
+    "Control",
+    "Middle",
+    "Mode",
     "Model",
     "alarms",
     "choose",
     "map_for",
+    "mode_of",
     "model_number",
     "tells_current",
     "velocity_scale",
