@@ -80,7 +80,7 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         if LOG.isEnabledFor(logging.DEBUG):
             found.trace.add(_Told(0))
-        for warning in found.link.warnings:
+        for warning in found.warnings:
             output.note(f"note: {warning}")
         try:
             yield found

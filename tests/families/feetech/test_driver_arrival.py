@@ -9,13 +9,27 @@ import pytest
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.table import STS
-from tests.families.feetech.driver_script import Line, Played, low_high, prepared, reads
+from tests.families.feetech.driver_script import (
+    Line,
+    Played,
+    image,
+    low_high,
+    prepared,
+    prepares,
+    reads,
+    unheard,
+)
 
 COUNT = tau / 4096
 
 
 def sample(raw: int, moving: int = 1, error: int = 0) -> Line:
     return reads(3, 56, *low_high(raw), *[0] * 8, moving, 0, 0, 0, 0, error=error)
+
+
+def stalls(*samples: Line, after: int = 24) -> list[Line]:
+    """The last of these again and again until it counts as stalled; and nobody answers what is in the way then."""
+    return [*samples, *[samples[-1]] * after, unheard(prepares())]
 
 
 def wait_for(goal: int, samples: list[Line], **wish: float) -> Played:
@@ -45,12 +59,13 @@ def test_passing_through_the_goal_is_not_in_position() -> None:
 def test_the_tolerance_decides() -> None:
     wait_for(2048, [sample(2048 - 32, 0)])
     with pytest.raises(Stalled):
-        wait_for(2048, [sample(2048 - 32, 0)] * 100, tolerance=31 * COUNT)
+        wait_for(2048, stalls(sample(2048 - 32, 0)), tolerance=31 * COUNT)
 
 
 @pytest.mark.parametrize("moving", [0, 1])
 def test_standing_off_the_goal_is_a_stall_whatever_the_flag_says(moving: int) -> None:
-    played = Played([sample(1000, moving, error=0x20)] * 100)
+    bounds = reads(3, 13, 70, 80, 40, error=0x20)
+    played = Played([*stalls(sample(1000, moving, error=0x20)), bounds])
     with pytest.raises(
         Stalled, match=r"stands at 1\.534 rad, 1\.608 rad off its goal.*alarms: overload"
     ) as caught:
@@ -64,7 +79,22 @@ def test_progress_of_two_counts_is_progress_and_one_count_is_noise() -> None:
     slow = [sample(1000 + 2 * (index // 20), 1) for index in range(200)]
     wait_for(1020, [*slow, sample(1020, 0)], tolerance=0.0, timeout=60.0)
     with pytest.raises(Stalled):
-        wait_for(2048, [sample(1000 + index % 2, 1) for index in range(200)])
+        wait_for(2048, stalls(*[sample(1000 + index % 2, 1) for index in range(24)], after=1))
+
+
+def test_a_stall_says_which_setting_is_in_the_way() -> None:
+    limp = [*(0, 0, 0, 8, 0, 0, 0, 0), 0xE8, 3]
+    masks = image()[9:20]
+    script = [
+        *stalls(sample(1000, 0))[:-1],
+        prepares(),
+        reads(3, 9, *masks),
+        reads(3, 40, *limp),
+        reads(3, 65, 0),
+    ]
+    with pytest.raises(Stalled, match="2048|off its goal") as caught:
+        wait_for(2048, script)
+    assert caught.value.cause == "its torque is off (torque_enable 0): enable_torque()"
 
 
 def test_a_slow_move_is_given_time_for_its_counts() -> None:

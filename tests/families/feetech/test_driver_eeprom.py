@@ -7,6 +7,7 @@ import pytest
 from motorbus.core.operation import Effect, Rank, Timeout
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
+from motorbus.families.feetech.table import Mode
 from tests.families.feetech.driver_script import (
     Line,
     Played,
@@ -60,7 +61,7 @@ def test_settings_are_read_again_afterwards() -> None:
     play(write(node, operating_mode=1), OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), LOCK, LOCKED)
     assert node.settings is None
     play(write(node, torque_enable=0), prepares(at_33=1), OFF)
-    assert node.mode == 1
+    assert node.known_mode is Mode.VELOCITY
 
 
 def test_reading_back_different_is_an_error_and_the_lock_is_closed() -> None:

@@ -77,7 +77,7 @@ def test_servos_that_are_not_prepared_are_refused_with_advice() -> None:
 
 
 def test_servos_in_other_modes_are_refused() -> None:
-    with pytest.raises(RequestError, match="operating mode 1"):
+    with pytest.raises(RequestError, match="operating mode velocity"):
         sync_write_positions([prepared(1, at_33=1)], [0.0])
 
 

@@ -13,6 +13,7 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Due, Reply, Timeout
 from motorbus.families import feetech
 from motorbus.families.feetech import FAMILY, AsyncServo, Servo
+from motorbus.families.feetech.table import MODELS
 from tests.families.feetech.driver_script import PING, Line, packet, play, reads
 
 
@@ -71,17 +72,21 @@ def test_what_explains_a_frame_is_the_family_s() -> None:
     assert explanation.fault == ""
 
 
-@pytest.mark.parametrize("model", ["STS3215", "sts3215", "STS3032", "HTS3235", "STS3025BL"])
-def test_described_models_are_axes(model: str) -> None:
+@pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()} | {"sts3215", "scs0009"}))
+def test_every_known_model_is_an_axis(model: str) -> None:
     axis = FAMILY.axis(model)
     assert {"position", "move", "stop", "state", "enable_torque", "disable_torque"} <= set(axis)
     assert all(map(callable, axis.values()))
 
 
-@pytest.mark.parametrize(
-    "model", ["SCS0009", "SCS15-2", "SM85BLHV", "SM100-360M", "HLS3950", "unknown model 9.99", "STS9999", ""]
-)
-def test_models_of_maps_not_commanded_have_no_axis(model: str) -> None:
+def test_a_model_whose_map_tells_no_current_lacks_that() -> None:
+    assert "current" in FAMILY.axis("STS3215")
+    assert "current" in FAMILY.axis("SCS15-2")
+    assert "current" not in FAMILY.axis("SCS0009")
+
+
+@pytest.mark.parametrize("model", ["unknown model 9.99", "STS9999", ""])
+def test_other_models_have_no_axis(model: str) -> None:
     assert FAMILY.axis(model) == {}
 
 

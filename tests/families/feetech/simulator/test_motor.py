@@ -7,24 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.plant import Drive, rest
-from motorbus.families.feetech.simulator.motor import Settings, plan, reading, step, zero_for
+from motorbus.families.feetech.simulator.motor import Settings, mirrored, plan, reading, step, zero_for
 from motorbus.families.feetech.simulator.switches import Switches
+from motorbus.families.feetech.table import Mode
 
 DRIVE = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
-SHIPPED = Settings(
-    strong=True,
-    mode=0,
-    goal=0,
-    duty=0,
-    goal_velocity=0,
-    velocity_unit=1,
-    acceleration=0,
-    low=0,
-    high=4095,
-    phase=12,
-    zero=0,
-    turn=4096,
-)
+SHIPPED = Settings(torque=1.0)
 FULL_TURNS = 16
 
 
@@ -60,8 +48,8 @@ def test_a_goal_within_the_limits_is_what_is_read_at_the_end(shaft: float, offse
 
 
 def test_a_weak_motor_rests_whatever_it_is_told() -> None:
-    for mode in range(4):
-        settings = SHIPPED._replace(strong=False, mode=mode, goal=1000, goal_velocity=1000, duty=500)
+    for mode in Mode:
+        settings = SHIPPED._replace(torque=0.009, mode=mode, goal=1000, velocity=1000, duty=0.5, current=0.5)
         for motion in (
             plan(settings, rest(0.0, 7.0), 0.0, DRIVE, Switches()),
             step(settings, rest(0.0, 7.0), 0.0, DRIVE, Switches()),
@@ -70,11 +58,49 @@ def test_a_weak_motor_rests_whatever_it_is_told() -> None:
 
 
 def test_a_wheel_is_not_faster_than_its_motor() -> None:
-    settings = SHIPPED._replace(mode=1, goal_velocity=100, velocity_unit=50)
+    settings = SHIPPED._replace(mode=Mode.VELOCITY, velocity=5000)
     assert plan(settings, rest(0.0, 0.0), 0.0, DRIVE, Switches()).velocity(10.0) == 3400
 
 
 def test_a_step_from_a_turning_wheel_counts_from_here() -> None:
-    wheel = plan(SHIPPED._replace(mode=1, goal_velocity=1000), rest(0.0, 0.0), 0.0, DRIVE, Switches())
-    motion = step(SHIPPED._replace(mode=3, goal=100), wheel, 5.0, DRIVE, Switches())
+    wheeling = SHIPPED._replace(mode=Mode.VELOCITY, velocity=1000)
+    wheel = plan(wheeling, rest(0.0, 0.0), 0.0, DRIVE, Switches())
+    motion = step(SHIPPED._replace(mode=Mode.STEP, goal=100), wheel, 5.0, DRIVE, Switches())
     assert motion.position(motion.done_at) == round(wheel.position(5.0)) + 100
+
+
+@pytest.mark.parametrize(
+    ("current", "burden", "goes"), [(0.3, 0.0, 1), (0.3, 0.4, -1), (-0.2, 0.0, -1), (0.3, 0.3, 0)]
+)
+def test_a_constant_current_wins_or_loses_against_the_outside(
+    current: float, burden: float, goes: int
+) -> None:
+    settings = SHIPPED._replace(mode=Mode.CURRENT, current=current, burden=burden)
+    assert plan(settings, rest(0.0, 0.0), 0.0, DRIVE, Switches()).velocity(100.0) == goes * 3400
+
+
+@given(st.floats(0, 4000), st.floats(0.05, 5))
+def test_a_way_takes_the_time_it_is_given_or_as_long_as_it_must(way: float, time: float) -> None:
+    settings = SHIPPED._replace(goal=round(way), time=time)
+    motion = plan(settings, rest(0.0, 0.0), 0.0, DRIVE, Switches())
+    fastest = plan(SHIPPED._replace(goal=round(way)), rest(0.0, 0.0), 0.0, DRIVE, Switches())
+    wanted = max(time, fastest.done_at) if round(way) else 0.0
+    assert motion.done_at == pytest.approx(wanted, rel=1e-5)
+
+
+def test_a_mirror_shows_the_same_movement_the_other_way_round() -> None:
+    there = plan(SHIPPED._replace(goal=4000), rest(0.0, 100.0), 0.0, DRIVE, Switches())
+    back = mirrored(there)
+    for at in (0.0, 0.1, 0.7, 5.0):
+        assert back.position(at) == -there.position(at)
+        assert back.velocity(at) == -there.velocity(at)
+    assert mirrored(back) == there
+
+
+def test_a_loop_of_the_wrong_sign_runs_from_its_goal() -> None:
+    away = plan(SHIPPED._replace(goal=3000, runs_away=True), rest(0.0, 2000.0), 0.0, DRIVE, Switches())
+    assert away.velocity(10.0) == -3400
+    still = plan(SHIPPED._replace(goal=2000, runs_away=True), rest(0.0, 2000.0), 0.0, DRIVE, Switches())
+    assert not still.moving(0.0)
+    wheel = SHIPPED._replace(mode=Mode.VELOCITY, velocity=10, runs_away=True)
+    assert plan(wheel, rest(0.0, 2000.0), 0.0, DRIVE, Switches()).velocity(10.0) == -3400

@@ -109,6 +109,16 @@ def provision(
     return (yield from Alone(afterwards(_verified(job, place), lambda: iter(Tune(rate)))))
 
 
+def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+    """Give this servo the id `new`; as `provision`, which see. It is in force after the power cycle this waits for."""
+    return (yield from provision(node, new_id=new, patience=patience))
+
+
+def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+    """Let this servo speak at `rate` bit/s; as `provision`, which see. The bus keeps its own rate."""
+    return (yield from provision(node, new_rate=rate, patience=patience))
+
+
 # --- find out where things stand, and write what is missing -------------------------------------------------
 
 
