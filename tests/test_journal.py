@@ -216,9 +216,10 @@ def test_an_unfinished_change_is_told_at_open_and_hinders_nothing_else() -> None
             servo.move(3.0)
             servo.stop()
             servo.disable_torque()
-            for work in (lambda: servo.set_id(7), lambda: servo.set_baud(500_000)):
-                with pytest.raises(RequestError, match="unfinished"):
-                    work()
+            with pytest.raises(RequestError, match="unfinished"):
+                servo.set_id(7)
+            with pytest.raises(RequestError, match="unfinished"):
+                servo.set_baud(500_000)
         assert simulation[3].memory.wear.total() == 0
 
 

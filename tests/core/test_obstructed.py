@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import inf, isclose
 
 import pytest
@@ -22,8 +23,8 @@ def test_a_movement_in_parts_of_one_direction() -> None:
     parts = list(motion.stretches())
     assert [part.way for part in parts] == [-1.0, 1.0, 1.0, 1.0, 0.0]
     assert (parts[0].begin, parts[0].end, parts[0].velocity) == (1.0, 1.2, -20.0)
-    assert (parts[1].position, parts[1].velocity) == (pytest.approx(-2.0), 0.0)
-    assert all(one.end == other.begin for one, other in zip(parts, parts[1:], strict=False))
+    assert (parts[1].position, parts[1].velocity) == pytest.approx((-2.0, 0.0))
+    assert all(one.end == other.begin for one, other in pairwise(parts))
     assert parts[-1] == Stretch(motion.done_at, inf, 100.0, 0.0, 0.0)
 
 
@@ -37,7 +38,12 @@ def test_it_ends_at_the_obstacle_worked_out_by_hand() -> None:
     # 50 counts in the first second, then 100 counts/s: 250 is reached after 3 s, at once and at rest
     motion = obstructed(move(5.0, 0.0, 1000.0, speed=100.0, acceleration=100.0), -10.0, 250.0)
     assert motion.phases == (Phase(1.0, 0.0, 0.0, 100.0), Phase(2.0, 50.0, 100.0, 0.0))
-    assert (motion.done_at, motion.goal, motion.position(99.0), motion.velocity(8.0)) == (8.0, 250.0, 250.0, 0.0)
+    assert (motion.done_at, motion.goal, motion.position(99.0), motion.velocity(8.0)) == (
+        8.0,
+        250.0,
+        250.0,
+        0.0,
+    )
 
 
 def test_within_a_ramp_the_moment_is_that_of_the_ramp() -> None:

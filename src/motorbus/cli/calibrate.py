@@ -16,6 +16,8 @@ from motorbus.core import units
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from motorbus.cli.output import Output
 
 app = App(
@@ -78,17 +80,24 @@ def calibrate(
             _tell(f"Zero of #{node}", "motorbus.calibrate.zero/1", node, able(one, "zero")(), output)
             return Exit.OK
         takes(one, "calibrate", wanted)
-        rehearsal = dry.DryBus(opening)
-        rehearse = partial(face(rehearsal, node).calibrate, **wanted)
-        if dry_run:
-            rehearse()
-            dry.show(rehearsal, output)
-            return Exit.OK
-        what = f"move the zero of #{node} for good, and let it go limp"
-        consent_to(what, output, yes=yes, rehearse=rehearse)
-        told = one.calibrate(**wanted)
+        told = _calibrated(one, wanted, output, yes=yes, dry_run=dry_run)
+    if dry_run:
+        return Exit.OK
     _tell(f"#{node} is calibrated", "motorbus.calibrate/1", node, told, output)
     return Exit.OK
+
+
+def _calibrated(one: Any, wanted: Mapping[str, Any], output: Output, *, yes: bool, dry_run: bool) -> Any:
+    """Carry it out once somebody has agreed, or only show it."""
+    rehearsal = dry.DryBus(one.bus)
+    rehearse = partial(face(rehearsal, one.node).calibrate, **wanted)
+    if dry_run:
+        rehearse()
+        dry.show(rehearsal, output)
+        return None
+    what = f"move the zero of #{one.node} for good, and let it go limp"
+    consent_to(what, output, yes=yes, rehearse=rehearse)
+    return one.calibrate(**wanted)
 
 
 def _tell(title: str, schema: str, node: int, told: Any, output: Output) -> None:

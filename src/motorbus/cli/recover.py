@@ -92,7 +92,7 @@ def recover(
         outcome = _forgotten(opening, change) if forget else _ended(opening, change, output, **extra)
     told = {"new": "finished", "old": "taken back"}.get(outcome, "forgotten")
     output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome})
-    output.text(f"{told}: {_called(change)}; the {outcome} one holds" if outcome != "forgotten" else told)
+    output.text(f"{told}: {_called(change)}")
     return Exit.OK
 
 
@@ -118,7 +118,7 @@ def _facts(change: Change) -> dict[str, object]:
 
 def _called(change: Change) -> str:
     facts = change.facts
-    to = f"at {facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
+    to = f"{facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
     return f"the change of #{change.node} to {to}"
 
 

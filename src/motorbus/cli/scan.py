@@ -88,9 +88,6 @@ def scan(
             with output.progress("scanning") as bar:
                 found = opening.run(operation, report=partial(_heard, wanted.family.name, early, bar, notes))
         finally:
-            notes += mixed_firmware(early if found is None else found, wanted.family)
-            for text in notes:
-                output.note(f"note: {text}")
             _show(wanted, early if found is None else found, notes, output)
         if not found:
             raise nobody(bus)
@@ -180,6 +177,9 @@ def _model(one: Found) -> str:
 
 
 def _show(wanted: Target, found: list[Found], notes: list[str], output: Output) -> None:
+    notes = [*notes, *mixed_firmware(found, wanted.family)]
+    for text in notes:
+        output.note(f"note: {text}")
     word = rate_word(wanted.family)
     devices = [facts(one, word) for one in found]
     output.document("motorbus.scan/1", {"bus": wanted.bus, "devices": devices, "notes": notes})

@@ -147,7 +147,10 @@ class SimulatedNode(Protocol):
 
 
 class Simulator(Protocol):
-    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own."""
+    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own.
+
+    One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s).
+    """
 
     @property
     def nodes(self) -> Mapping[int, SimulatedNode]: ...

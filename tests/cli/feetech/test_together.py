@@ -10,6 +10,7 @@ import motorbus
 from motorbus.cli import feetech
 from motorbus.errors import NoReply, RequestError
 from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
 
 
 def test_a_train_sends_all_goals_and_reads_all_positions(arm: Simulation) -> None:
@@ -74,3 +75,11 @@ def test_one_broadcast_finds_who_is_there(arm: Simulation) -> None:
     arm[3].unplug()
     with motorbus.open(arm.url) as bus:
         assert feetech.ping_everyone(bus) == [1]
+
+
+def test_a_servo_that_had_no_force_is_told_of(run: Run) -> None:
+    with motorbus.simulate("feetech", ids="1", model="hls3925") as simulation:
+        simulation[1].memory["goal_torque"] = 0
+        ran = run("move", f"{simulation.url}#1=3.0", "--yes")
+        assert ran.code == 0
+        assert "note: node 1 had a goal torque of 0" in ran.err

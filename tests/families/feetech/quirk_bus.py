@@ -30,6 +30,11 @@ class Bench(NamedTuple):
         """One servo as it really is."""
         return self.simulation[id]
 
+    def wait(self, seconds: float) -> None:
+        """Let time pass on the bus, whatever arrives meanwhile."""
+        link: Any = self.bus.link
+        link.advance(seconds)
+
     @contextmanager
     def traffic(self) -> Iterator[list[bytes]]:
         """Fills with the requests that leave meanwhile."""

@@ -7,7 +7,7 @@ from math import tau
 import pytest
 
 from motorbus.errors import MotionError, Stalled
-from motorbus.families.feetech.driver.arrival import Move, arrive
+from motorbus.families.feetech.driver.arrival import POLL, Move, arrive
 from motorbus.families.feetech.table import STS
 from tests.families.feetech.driver_script import (
     Line,
@@ -119,3 +119,41 @@ def test_too_late_is_told_with_where_it_is() -> None:
 def test_polls_leave_the_bus_to_others() -> None:
     played = wait_for(2048, [sample(0), sample(1024), sample(2048, 0)])
     assert played.now - 100 == pytest.approx(2 * 0.02 + 3 * 0.001)
+
+
+# -- positions told within a turn ----------------------------------------------------------------------------
+
+TURN = 4096 * COUNT
+
+
+def ways(move: Move, *samples: Line) -> Played:
+    played = Played(list(samples))
+    played.run(arrive(prepared(), STS, move))
+    assert played.script == []
+    return played
+
+
+def test_a_goal_turns_away_is_compared_within_a_turn_and_not_before_it_could_move() -> None:
+    goal = (2 * 4096 + 100) * COUNT
+    played = ways(
+        Move(goal, None, None, 0.05, None, turn=TURN), sample(3000), sample(4000), sample(102), sample(90, 0)
+    )
+    assert played.now - 100 > POLL
+
+
+def test_a_way_from_a_start_is_followed_over_the_seam_in_both_directions() -> None:
+    for sign in (1, -1):
+        samples = [sample((2000 + sign * gone) % 4096) for gone in range(0, 8000, 1000)]
+        goal = (2000 + sign * 8000) * COUNT
+        there = sample((2000 + sign * 8000) % 4096, 0)
+        ways(
+            Move(goal, None, None, 0.05, None, turn=TURN, start=2000 * COUNT),
+            *(sample(2000), *samples, there),
+        )
+
+
+def test_a_coarse_servo_makes_no_progress_by_a_count_to_and_fro() -> None:
+    played = Played(stalls(*[sample(1000 + number % 2) for number in range(26)], after=0))
+    with pytest.raises(Stalled):
+        played.run(arrive(prepared(), STS, Move(2048 * COUNT, None, None, 0.05, None, resolution=0.01)))
+    assert played.now - 100 < 0.6

@@ -39,7 +39,7 @@ def test_a_new_bound_is_sent_and_kept_and_nothing_is_read() -> None:
 def test_a_bound_of_0_is_replaced_by_the_protection_current_and_told() -> None:
     played = Played([reads(3, 44, 0, 0), goes((0xF4, 1)), ON])
     played.run(driver.move(met("hls"), GOAL, wait=False))
-    assert played.events == [Powerless(3, pytest.approx(3.25))]
+    assert played.events == [Powerless(3, 500 * HLS["goal_torque"].scale)]
     assert "never moves" in str(played.events[0])
 
 

@@ -115,6 +115,35 @@ def test_hls_are_told_the_position_by_an_instruction() -> None:
     assert told.how == "instruction"
 
 
+def test_old_sms_have_the_offset_at_33_and_the_lock_at_48() -> None:
+    before = (reads(3, 33, 0, 0), reads(3, 56, *low_high(2000)))
+    told = play(
+        calibrate(Node(3)),
+        *(prepares_as("smcl"), *before, OFF, writes(3, 48, 0), *before, MIDDLE, OFF),
+        *(reads(3, 33, 48, 8), reads(3, 56, *low_high(2048)), writes(3, 48, 1), reads(3, 48, 1)),
+    )
+    assert (told.how, told.raw_new_offset) == ("switch", -48)
+
+
+def test_scs2_have_one_byte_for_it_and_the_high_byte_first() -> None:
+    before = (reads(3, 34, 0), reads(3, 56, 2, 100))
+    told = play(
+        calibrate(Node(3)),
+        *(prepares_as("scs2"), *before, OFF, writes(3, 48, 0), *before),
+        *(writes(3, 34, 100), reads(3, 34, 100), reads(3, 34, 100), reads(3, 56, 2, 0)),
+        *(writes(3, 48, 1), reads(3, 48, 1)),
+    )
+    assert (told.how, told.raw_new_offset) == ("offset", 100)
+    assert told.new_offset == pytest.approx(100 * math.radians(300) / 1024)
+    below = (reads(3, 34, 100), reads(3, 56, 1, 0x9C))
+    play(
+        calibrate(Node(3)),
+        *(prepares_as("scs2"), *below, OFF, writes(3, 48, 0), *below),
+        *(writes(3, 34, 0), reads(3, 34, 0), reads(3, 34, 0), reads(3, 56, 2, 0)),
+        *(writes(3, 48, 1), reads(3, 48, 1)),
+    )
+
+
 def test_a_servo_that_acknowledges_nothing_is_judged_by_its_readings() -> None:
     level_0 = prepares_as("sts", status_return_level=0)
     play(

@@ -228,6 +228,20 @@ def test_many_turns_are_gone_and_told_when_the_phase_says_so(name: str) -> None:
         assert servo.position() == pytest.approx(3 * tau, abs=0.06)
 
 
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_many_turns_are_gone_and_judged_within_one_as_shipped(name: str) -> None:
+    with world(name) as (bus, servo, simulated):
+        servo.write(min_position_limit=0, max_position_limit=0)
+        before = simulated.motion.position(bus.link.now())
+        goal = servo.position() + 2 * tau
+        servo.move(goal, timeout=60.0)
+        assert (simulated.motion.position(bus.link.now()) - before) * COUNT == pytest.approx(
+            2 * tau, abs=0.06
+        )
+        with pytest.raises(RequestError, match="nobody knows on which turn"):
+            servo.stop()
+
+
 def test_a_bus_of_all_maps_is_read_and_moved_as_one() -> None:
     names = ["sts", "scs", "hls", "scs2"]
     model = "+".join(MODELS[name] for name in names)

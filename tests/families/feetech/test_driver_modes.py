@@ -67,8 +67,8 @@ def test_it_is_set_guarded_and_what_the_new_mode_heeds_becomes_0(name: str, code
         *AT_REST.get(wanted, []),
     )
     assert played.alone == 1
-    (stored,) = (one for one in played.exchanges if one.request[5:6] == bytes([at]) and one.request[4] == 3)
-    assert stored.effect is Effect.PERSISTENT
+    stored = played.sent.index(writes(3, at, code).sent)
+    assert played.exchanges[stored].effect is Effect.PERSISTENT
 
 
 @pytest.mark.parametrize("name", ["scs", "scs2"])
@@ -78,10 +78,11 @@ def test_scs_servos_become_motors_and_servos_again_by_their_limits(name: str) ->
         set_mode(node, Mode.PWM),
         *(asked(name, at_10=20), *guarded(name, 9, 0, 0, 0, 0), asked(name, **zero), *AT_REST[Mode.PWM]),
     )
-    assert node.known_mode is Mode.PWM
+    assert node.limits is None
     back = [asked(name, **zero), *guarded(name, 9, 0, 20, 3, 0xFF), asked(name, at_10=20)]
     play(set_mode(node, Mode.POSITION), *back)
     assert node.known_mode is Mode.POSITION
+    assert node.limits == pytest.approx((20 * SCS_COUNT, 1023 * SCS_COUNT))
 
 
 def test_limits_of_a_motor_that_others_made_are_asked_for() -> None:

@@ -80,6 +80,19 @@ def test_where_nobody_is_known_to_obey_nothing_is_sent(name: str) -> None:
     assert "hls" in caught.value.expected
 
 
+def test_turns_of_a_simulated_hls_are_counted_and_forgotten() -> None:
+    with simulated("hls") as (real, servo):
+        for name, raw in (("phase", 16), ("min_position_limit", 0), ("max_position_limit", 0)):
+            real.memory[name] = raw
+        servo.enable_torque()
+        servo.move(9000 * COUNT)
+        assert servo.position() == pytest.approx(9000 * COUNT, abs=0.05)
+        assert servo.clear_turns() == pytest.approx(808 * COUNT, abs=0.05)
+        assert real.memory["torque_enable"] == 0
+        servo.enable_torque()
+        assert servo.position() == pytest.approx(808 * COUNT, abs=0.05)
+
+
 def test_a_simulated_hls_forgets_and_an_sts_is_silent() -> None:
     with simulated("hls") as (real, servo):
         assert servo.clear_turns() == pytest.approx(math.pi)

@@ -14,7 +14,7 @@ from motorbus.core.operation import Due, Reply, Timeout
 from motorbus.families import feetech
 from motorbus.families.feetech import FAMILY, AsyncServo, Servo
 from motorbus.families.feetech.table import MODELS
-from tests.families.feetech.driver_script import PING, Line, packet, play, reads
+from tests.families.feetech.driver_script import packet, play, reads
 
 
 def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
@@ -63,7 +63,8 @@ def test_stop_lets_go_of_every_node_it_is_given() -> None:
 def test_identify_and_scan_need_no_servo_object() -> None:
     head = reads(3, 0, 3, 10, 0, 9, 3)
     assert play(FAMILY.identify(3), head).model == "STS3215"
-    found = play(FAMILY.scan((3,)), Line(packet(3, PING), packet(3, 0)), head)
+    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
+        found = bus.run(FAMILY.scan((3,)))
     assert [(one.node, one.rate) for one in found] == [(3, 1_000_000)]
 
 

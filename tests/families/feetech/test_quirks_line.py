@@ -71,7 +71,7 @@ def test_quirk_02_what_would_move_twice_is_never_sent_twice() -> None:
                 order(goal_position=100 * COUNT)
             assert [instruction(one) for one in sent if instruction(one) in (WRITE, REG_WRITE)] == [code]
             there.simulation.line = PerfectLine()
-        there.bus.link.read(there.bus.link.now() + 3.0)
+        there.wait(3.0)
         assert there.simulated().raw_position == start + 100
 
 

@@ -72,7 +72,7 @@ def test_quirk_11_the_homing_offset_holds_in_every_mode(name: str) -> None:
         assert simulated.raw_position == middle
         control = CONTROL[name]
         has = [mode for mode in control.modes.values() if mode is not Mode.PWM or control.duty]
-        for mode in has or [Mode.POSITION, Mode.PWM]:
+        for mode in [*has, Mode.POSITION] if has else [Mode.POSITION, Mode.PWM]:
             servo.set_mode(mode)
             assert servo.position() == pytest.approx(here)
             assert servo.telemetry().position == pytest.approx(here)
@@ -89,7 +89,7 @@ def test_quirk_14_an_overload_latch_is_no_obstacle_to_torque_off() -> None:
         simulated, servo = there.simulated(), there.servo()
         servo.enable_torque()
         simulated.torque = 0.9
-        there.bus.link.read(there.bus.link.now() + 3.0)
+        there.wait(3.0)
         assert servo.telemetry().alarm == ("overload",)
         simulated.torque = 0.0
         servo.disable_torque()
@@ -147,11 +147,11 @@ def test_quirk_19_holding_a_load_warms_it_and_too_much_of_it_is_an_overload() ->
         servo.enable_torque()
         before = servo.temperature()
         simulated.torque = 0.5
-        there.bus.link.read(there.bus.link.now() + 600.0)
+        there.wait(600.0)
         assert servo.temperature() - before == pytest.approx(15.0, abs=5.0)
         assert servo.telemetry().alarm == ()
         simulated.torque = 0.9
-        there.bus.link.read(there.bus.link.now() + 3.0)
+        there.wait(3.0)
         assert servo.telemetry().alarm == ("overload",)
 
 
@@ -200,7 +200,7 @@ def test_quirk_27_torque_goes_on_where_the_servo_stands() -> None:
         there.simulated().raw_position = 3000
         assert there.simulated().memory["goal_position"] == 0
         motorbus.feetech.Servo(there.bus, 1).enable_torque()
-        there.bus.link.read(there.bus.link.now() + 2.0)
+        there.wait(2.0)
         assert there.simulated().raw_position == 3000
 
 
@@ -221,7 +221,7 @@ def test_quirk_26_what_keeps_a_servo_from_moving_is_told() -> None:
         servo.enable_torque()
         servo.set_velocity(1.0)
         assert servo.blockers() == ()
-        there.bus.link.read(there.bus.link.now() + 1.0)
+        there.wait(1.0)
         assert servo.velocity() == pytest.approx(1.0, abs=0.01)
 
 
@@ -234,5 +234,5 @@ def test_quirk_26_the_unit_of_velocity_is_that_of_the_phase_register() -> None:
         servo.enable_torque()
         servo.set_velocity(2.0)
         assert simulated.memory["goal_velocity"] == round(2.0 / COUNT / 50)
-        there.bus.link.read(there.bus.link.now() + 1.0)
+        there.wait(1.0)
         assert servo.velocity() == pytest.approx(2.0, abs=50 * COUNT)

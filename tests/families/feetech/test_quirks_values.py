@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.cli.scan import mixed_firmware
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.families.feetech.driver.copying import copyable
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.quirk_bus import bench, instruction
+from tests.families.feetech.simulator.host import packet
 
 COUNT = 2 * 3.141592653589793 / 4096
 WRITE = 3
@@ -57,14 +59,15 @@ def test_quirk_12_servos_of_one_bus_may_have_several_firmware_versions() -> None
 
     huggingface/lerobot#1010, #532, #1793.
     """
-    with bench("1-2") as there:
-        there.simulated(1).memory["firmware_minor"] = 9
+    with bench("1-2", firmware="3.9+3.10") as there:
         found = there.bus.run(FAMILY.scan((1, 2)))
         assert [one.identity.firmware for one in found if one.identity] == ["3.9", "3.10"]
         for id in (1, 2):
             servo = there.servo(id)
             servo.move(1.0)
             assert servo.position() == pytest.approx(1.0, abs=0.05)
+        (note,) = mixed_firmware(found, FAMILY)  # which `motorbus scan` prints
+        assert "3.9 (#1), 3.10 (#2)" in note
 
 
 def test_quirk_13_a_wrong_supply_is_an_alarm_with_its_figures_and_no_fault_of_the_line() -> None:
@@ -118,6 +121,21 @@ def test_quirk_15_a_whole_template_is_refused_before_the_first_byte() -> None:
         assert sent == []
 
 
+def test_quirk_15_a_servo_that_such_a_template_has_ruined_is_recognised() -> None:
+    """The same afterwards: 0.0 V and a voltage alarm, for good. That the phase register is the cause is a guess."""
+    with bench(wrong_bridge="blind") as there:
+        servo, simulated = there.servo(), there.simulated()
+        servo.prepare()
+        now, phase = there.bus.link.now(), simulated.memory["phase"]
+        there.simulation.simulator.receive(packet(1, 3, 55, 0), now)
+        there.simulation.simulator.receive(packet(1, 3, 18, phase ^ 1 << 5), now)  # not by motorbus
+        there.wait(0.5)
+        simulated.power_cycle()
+        (told,) = servo.alarms()
+        assert "0.0 V" in told
+        assert "phase register" in told
+
+
 def test_quirk_20_the_load_is_the_duty_and_not_the_torque() -> None:
     """The load is the duty of the power stage: a servo that touches nothing shows a great one when it runs fast.
 
@@ -127,7 +145,7 @@ def test_quirk_20_the_load_is_the_duty_and_not_the_torque() -> None:
         servo = there.servo()
         simulated = there.simulated()
         servo.move(0.0, wait=False)
-        there.bus.link.read(there.bus.link.now() + 0.3)
+        there.wait(0.3)
         running = servo.telemetry()
         assert simulated.torque == 0.0
         assert abs(running.load) > 0.5

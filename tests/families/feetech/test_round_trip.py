@@ -21,7 +21,16 @@ from motorbus.families.feetech.table import MODELS as NUMBERS
 from tests.conformance.world import samples
 from tests.families.feetech.maps import MODELS
 from tests.families.feetech.quirk_bus import Bench, bench
-from tests.families.feetech.simulator.host import READ, WRITE, Host, packet
+from tests.families.feetech.simulator.host import (
+    ACTION,
+    ALL,
+    READ,
+    REG_WRITE,
+    SYNC_WRITE,
+    WRITE,
+    Host,
+    packet,
+)
 
 ID = 1
 POWERLESS = "goal_torque", 0
@@ -53,9 +62,16 @@ class Raw:
         self.servo = self.host.bus.servos[0]
         self.lock = TABLES[name]["lock"].address
 
-    def write(self, address: int, data: bytes) -> None:
-        """A WRITE, and time for what it may have to store."""
-        self.host.write(self.servo.id, address, *data)
+    def write(self, address: int, data: bytes, way: str = "write") -> None:
+        """Write in one of three ways, and give time for what it may have to store."""
+        id = self.servo.id
+        requests = {
+            "write": [packet(id, WRITE, address, *data)],
+            "reg_write": [packet(id, REG_WRITE, address, *data), packet(id, ACTION)],
+            "sync_write": [packet(ALL, SYNC_WRITE, address, len(data), id, *data)],
+        }
+        for request in requests[way]:
+            self.host.say(request)
         self.host.wait(1.0)
 
     def read(self, row: Entry) -> bytes:
@@ -74,9 +90,9 @@ class Raw:
 
 
 def others(raw: Raw, row: Entry) -> list[int]:
-    """Samples of this row other than what it has: that one proves nothing."""
+    """Samples of this row other than what it has, for that proves nothing; nor 128 at the torque switch, an order."""
     held = raw.servo.memory[row.name]
-    return [one for one in samples(row) if one != held]
+    return [one for one in samples(row) if one != held and (row.name, one) != ("torque_enable", 128)]
 
 
 def bytes_of(row: Entry, raw: int) -> bytes:
@@ -150,6 +166,24 @@ def test_what_can_only_be_read_stays_as_it_is_whoever_writes(name: str, row: Ent
     assert raw.read(row) == before
 
 
+@pytest.mark.parametrize("way", ["reg_write", "sync_write"])
+@pytest.mark.parametrize("name", TABLES)
+def test_every_way_of_writing_obeys_access_and_lock_alike(name: str, way: str) -> None:
+    for row in TABLES[name].values():
+        for unlocked in (False, True):
+            raw = Raw(name)
+            if unlocked:
+                raw.unlock()
+            before = raw.read(row)
+            value = others(raw, row)[-1]
+            raw.write(row.address, bytes_of(row, value), way)
+            assert raw.read(row) == (bytes_of(row, value) if row.writable else before), row.name
+            raw.power_cycle()
+            if row.storage is not Storage.RAM:
+                stays = row.writable and unlocked
+                assert raw.read(row) == (bytes_of(row, value) if stays else before), row.name
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_what_is_not_in_eeprom_is_as_at_the_beginning_after_a_power_cycle(name: str) -> None:
     kept = [row for row in TABLES[name].values() if row.writable and row.storage is Storage.RAM]
@@ -157,7 +191,7 @@ def test_what_is_not_in_eeprom_is_as_at_the_beginning_after_a_power_cycle(name: 
         raw = Raw(name)
         raw.power_cycle()
         before = raw.read(row)
-        value = next(one for one in others(raw, row) if (row.name, one) != ("torque_enable", 128))
+        value = others(raw, row)[0]
         raw.write(row.address, bytes_of(row, value))
         assert raw.read(row) == bytes_of(row, value), row.name
         raw.power_cycle()
@@ -192,7 +226,7 @@ def test_a_negative_zero_is_zero(name: str, row: Entry) -> None:
         servo.prepare()
         data = code.to_bytes(row.size, "little" if row.order == "little" else "big")
         there.simulation.simulator.receive(packet(ID, WRITE, row.address, *data), there.bus.link.now())
-        there.bus.link.read(there.bus.link.now() + 0.5)
+        there.wait(0.5)
         servo = there.servo()
         assert servo.read_raw(row.name) == {row.name: 0}
         assert servo.read(row.name) == {row.name: 0}
@@ -251,9 +285,9 @@ def test_what_moves_and_is_kept_is_written_by_name_and_outlives_a_power_cycle(th
         for raw in samples(row):
             servo = there.servo()
             servo.write(**{row.name: servo.value(row, raw)})
-            there.bus.link.read(there.bus.link.now() + 0.5)
+            there.wait(0.5)
             there.simulated().power_cycle()
-            there.bus.link.read(there.bus.link.now() + 0.5)
+            there.wait(0.5)
             assert there.simulated().memory[row.name] == raw, row.name
             assert servo.read_raw(row.name) == {row.name: raw}
 
@@ -299,7 +333,7 @@ def assert_kept(there: Bench, id: int, row: Entry, raw: int) -> None:
     simulated = there.simulated(id)
     assert (simulated.memory[row.name], simulated.memory["lock"]) == (raw, 1)
     simulated.power_cycle()
-    there.bus.link.read(there.bus.link.now() + 0.5)
+    there.wait(0.5)
     assert there.simulated(id).memory[row.name] == raw
     assert there.servo(id).read_raw(row.name) == {row.name: raw}
 

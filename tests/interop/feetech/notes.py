@@ -97,7 +97,8 @@ NOTES: Final[Mapping[str, Note]] = MappingProxyType(
             "All twelve rates can be opened, those without a code of their own in termios too.",
         ),
         "wall-clock": Note(
-            "Timeouts follow the wall clock and are fixed: 34 ms more than the wire needs, or 50 ms.",
+            "Timeouts follow the wall clock and are fixed: 34 ms more than the wire needs, or 50 ms. In the newer SDK "
+            "`syncReadTx` sets none, so `readRx` after it has what the last call has left.",
             "Timeouts follow a clock that never jumps; the deadline is worked out from rate, return delay and store "
             "time, and can be set.",
         ),

@@ -20,6 +20,8 @@ GAIN, SPEED, TIME, MIN_LIMIT, MODE, TORQUE, ACCELERATION, GOAL, POSITION = 21, 4
 ALARMS: Final = {(1, 14): [30], (1, 13): [20]}
 """Highest voltage 3.0 V and highest temperature 20 °C: a servo at rest then raises both alarms."""
 BOTH: Final = 0x05
+PATIENCE: Final = Call("port", "setPacketTimeoutMillis", (2000,))
+"""What their user may do between asking and listening: 34 ms are little on a busy machine."""
 PING: Final = [0xFF, 0xFF, 1, 2, 1, 0xFB]
 PONG: Final = [0xFF, 0xFF, 1, 2, 0, 0xFC]
 
@@ -100,7 +102,7 @@ def _packets(sdk: Sdk) -> Iterator[Step]:
     bare = [0, 0, 1, 2, 1, 0]
     yield Step(
         (
-            Call("port", "setPacketTimeout", (6,)),
+            PATIENCE,
             sdk.call("txPacket", bare, gives=SUCCESS),
             sdk.call("txPacket", bare, gives=BUSY),
             sdk.call("rxPacket", gives=[PONG, SUCCESS]),
@@ -128,6 +130,7 @@ def _reads(sdk: Sdk) -> Iterator[Step]:
             yield Step(
                 (
                     sdk.call("readTx", 1, address, count, gives=SUCCESS),
+                    PATIENCE,
                     sdk.call("readRx", 1, count, gives=[data, SUCCESS, 0]),
                 )
             )
@@ -136,6 +139,7 @@ def _reads(sdk: Sdk) -> Iterator[Step]:
         yield Step(
             (
                 sdk.call(f"read{count}ByteTx", 1, address, gives=SUCCESS),
+                PATIENCE,
                 sdk.call(f"read{count}ByteRx", 1, gives=[value, SUCCESS, 0]),
             )
         )
@@ -154,6 +158,7 @@ def _longs(sdk: Sdk) -> Iterator[Step]:
     yield Step(
         (
             sdk.call("read4ByteTx", 1, TIME, gives=SUCCESS),
+            PATIENCE,
             sdk.call("read4ByteRx", 1, gives=[value, SUCCESS, 0]),
         ),
         **more,

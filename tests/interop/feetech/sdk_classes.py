@@ -43,16 +43,21 @@ def _on(owner: str, why: str, name: str, *arguments: Any, gives: Any = DONE, **m
 
 def _reads(owner: str, kind: Kind, order: str) -> Iterator[Step]:
     why = "" if kind.order == order else "wrong-class"
-    place = Held(1, POSITION) if kind.order == order else _swapped(Held(1, POSITION))
+    place = Held(1, POSITION) if kind.order == order else _swapped(order == "little")
     yield _on(owner, why, "ReadPos", 1, gives=[place, SUCCESS, 0])
     yield _on(owner, why, "ReadSpeed", 1, gives=[Held(1, POSITION + 2), SUCCESS, 0])
     yield _on(owner, why, "ReadPosSpeed", 1, gives=[place, 0, SUCCESS, 0])
     yield _on(owner, why, "ReadMoving", 1, gives=[Held(1, MOVING, 1), SUCCESS, 0])
 
 
-def _swapped(held: Held) -> Through:
-    """The number of the same two bytes in the other order."""
-    return Through(lambda value: value >> 8 | (value & 255) << 8, held, "held, bytes swapped")
+def _swapped(signed: bool) -> Through:
+    """The number of the same two bytes in the other order; that of `sms_sts` has a sign."""
+
+    def convert(value: int) -> int:
+        other = value >> 8 | (value & 255) << 8
+        return 0x8000 - other if signed and other & 0x8000 else other
+
+    return Through(convert, Held(1, POSITION), "held, bytes swapped")
 
 
 def _burst(kind: Kind, goal: int, speed: int) -> Memory:

@@ -1,4 +1,4 @@
-"""The rest of what both FEETECH SDKs have: groups for SYNC READ and SYNC WRITE, the port, the functions of the module."""
+"""What else both FEETECH SDKs have: groups for SYNC READ and SYNC WRITE, the port, the functions of the module."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import CONTROL
 from tests.interop.feetech.sdk import (
     CORRUPT,
+    PATIENCE,
     POSITION,
     SPEED,
     SUCCESS,
@@ -73,7 +74,7 @@ def _had(sdk: Sdk, node: int) -> tuple[Call, ...]:
 def _reading(sdk: Sdk) -> Iterator[Step]:
     good = (*_had(sdk, 1), *_had(sdk, 2))
     yield Step((*_collect(1, 2), Call("reader", "txRxPacket", (), SUCCESS), *good))
-    halves = (Call("reader", "txPacket", (), SUCCESS), Call("reader", "rxPacket", (), SUCCESS))
+    halves = (Call("reader", "txPacket", (), SUCCESS), PATIENCE, Call("reader", "rxPacket", (), SUCCESS))
     yield Step((*_collect(2, 1), *halves, *good))
     lost = False if sdk.old else [False, 0]
     missing = Call("reader", "isAvailable", (ABSENT, POSITION, 2), lost)
@@ -90,9 +91,9 @@ def _reading(sdk: Sdk) -> Iterator[Step]:
     one = sdk.call("syncReadTx", POSITION, 2, [1], 1, gives=SUCCESS)
     data = Held(1, POSITION, 2, True)
     if sdk.old:
-        yield Step((one, sdk.call("readRx", 1, 2, gives=[data, SUCCESS, 0])))
+        yield Step((one, PATIENCE, sdk.call("readRx", 1, 2, gives=[data, SUCCESS, 0])))
     else:
-        yield Step((one, sdk.call("readRx", 1, 2, gives=[data, SUCCESS, 0])))
+        yield Step((one, PATIENCE, sdk.call("readRx", 1, 2, gives=[data, SUCCESS, 0])))
         yield Step((one, sdk.call("syncReadRx", 2, 1, gives=[SUCCESS, _packet(1)])))
         packets = [0xFF, 0xFF, 1, 4, 5, 0, 8, 0xED]
         found = Call("reader", "readRx", (packets, 1, 2), [[5, 0, 8], SUCCESS])

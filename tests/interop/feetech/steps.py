@@ -77,7 +77,7 @@ class Step:
     lasting: bool = False
 
 
-TRIES: Final = 8
+TRIES: Final = 20
 
 
 def carry_out(step: Step, peer: Peer, twin: Twin) -> None:

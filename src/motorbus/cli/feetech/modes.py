@@ -28,7 +28,9 @@ from motorbus.errors import MotionError, RequestError
 from motorbus.families.feetech.driver import Servo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+    from motorbus.core.family import Family
 
 ORDERS: Final[Mapping[str, tuple[str, str]]] = {
     "velocity": ("set_velocity", "velocity"),
@@ -41,24 +43,25 @@ ORDERS: Final[Mapping[str, tuple[str, str]]] = {
 
 @app.command(
     usage="Usage: motorbus feetech mode BUS#ID [MODE] [OPTIONS]",
-    help_epilogue="""Every servo has position and pwm; STS and newer SMS velocity and step too, old
-SMS velocity, HLS velocity and current. On SCS servos pwm is both limits 0, and
-position needs --low and --high. Without MODE it says what the servo heeds, and
-what would keep it from obeying an order: a torque limit of 0, a goal torque of
-0, limits without a way between them, an alarm that lets its torque drop.
+    help_epilogue="""STS and newer SMS have position, velocity, pwm and step, old SMS all but step,
+HLS position, velocity and current, SCS position and pwm. On SCS servos pwm is
+both limits 0, and position needs --low and --high. Without MODE it says what
+the servo heeds, and what would keep it from obeying an order: a torque limit
+of 0, a goal torque of 0, limits without a way between them, an alarm that lets
+its torque drop.
 
 Examples:
 
     motorbus feetech mode feetech:/dev/ttyACM0#3
     motorbus feetech mode feetech:/dev/ttyACM0#3 velocity --yes
-    motorbus feetech mode feetech:/dev/ttyACM0#3 position --low 20deg --high 290deg --yes
+    motorbus feetech mode feetech:COM7#2 position --low 0.4 --high 5 --yes
     motorbus feetech mode feetech:/dev/ttyACM0#3 step --dry-run""",
 )
 def mode(
     device_: Device,
     mode_: Annotated[
-        Literal["position", "velocity", "pwm", "step", "current", ""], Parameter(name="MODE")
-    ] = "",
+        Literal["position", "velocity", "pwm", "step", "current"] | None, Parameter(name="MODE")
+    ] = None,
     /,
     *,
     low: str = "",
@@ -81,14 +84,10 @@ def mode(
     yes
         Do not ask before the mode is written for good and the servo goes limp.
     """
-    family = one_of_ours(device_).family
+    one_of_ours(device_)
     limits = _limits(low, high)
     if not mode_:
-        reads_only(dry_run)
-        if limits:
-            raise RequestError(
-                "limits without a mode", expected="MODE, as position", advice="nothing was sent"
-            )
+        _only_read(limits, dry_run)
 
     def change(one: Servo) -> dict[str, Any] | None:
         if mode_:
@@ -99,13 +98,18 @@ def mode(
         return f"put #{one.node} into {mode_} mode, for good, and let it go limp" if mode_ and not yes else ""
 
     node, told = on_servo(device_, options, output, change, dry_run=dry_run, consent=consent)
-    if told is None:
-        return Exit.OK
-    blockers = [shell_words(words, family) for words in told.pop("blockers")]
-    output.document("motorbus.feetech.mode/1", {"id": node, **told, "blockers": blockers})
-    rows = [("mode", told["mode"] or f"{told['code']}, which is not documented"), ("lock", told["lock"])]
-    output.table(f"#{node}", ["", ""], rows + [("blocked", words) for words in blockers])
+    if told is not None:
+        output.document("motorbus.feetech.mode/1", {"id": node, **told})
+        heeded = told["mode"] or f"{told['code']}, which is not documented"
+        rows = [("mode", heeded), ("lock", told["lock"])]
+        output.table(f"#{node}", ["", ""], rows + [("blocked", words) for words in told["blockers"]])
     return Exit.OK
+
+
+def _only_read(limits: tuple[float, float] | None, dry_run: bool) -> None:
+    reads_only(dry_run)
+    if limits:
+        raise RequestError("limits without a mode", expected="MODE, as position", advice="nothing was sent")
 
 
 def _limits(low: str, high: str) -> tuple[float, float] | None:
@@ -115,7 +119,7 @@ def _limits(low: str, high: str) -> tuple[float, float] | None:
 
 
 def _heeds(one: Servo) -> dict[str, Any]:
-    blockers = one.blockers()
+    blockers = _blockers(one)
     locked = one.read_raw("lock")["lock"]
     assert one.table is not None
     assert one.settings is not None
@@ -130,12 +134,11 @@ def _heeds(one: Servo) -> dict[str, Any]:
 
 @app.command(
     usage="Usage: motorbus feetech drive BUS#ID ORDER=VALUE [OPTIONS]",
-    help_epilogue="""ORDER is velocity (velocity mode), duty (pwm mode), current (HLS, current mode)
-or step (step mode); `motorbus feetech mode` sets the mode, `motorbus torque on`
-the torque, which comes on at rest. What turns without end needs --yes, and so
-does a step of more than 180 degrees; `motorbus stop` or an order of 0 ends it.
-Ends with exit code 1 and the reason where a setting keeps the servo from
-obeying.
+    help_epilogue="""ORDER is velocity, duty, current (HLS) or step, each in the mode for it:
+`motorbus feetech mode` sets the mode, `motorbus torque on` the torque, which
+comes on at rest. What turns without end needs --yes, and so does a step of
+more than 180 degrees; `motorbus stop` or an order of 0 ends it. Ends with exit
+code 1 and the reason where a setting keeps the servo from obeying.
 
 Examples:
 
@@ -173,35 +176,52 @@ def drive(
     yes
         Do not ask before it turns without end, or by more than 180 degrees.
     """
-    family = one_of_ours(device_).family
-    ((name, text),) = assigned([order], ORDERS).items()
-    verb, quantity = ORDERS[name]
-    value = units.parse(text, quantity)
-    bounds = {"velocity": velocity, "acceleration": acceleration, "current": current}
-    given = {bound: units.parse(text, bound) for bound, text in bounds.items() if text}
+    one_of_ours(device_)
+    name, verb, quantity, value = _order(order)
+    given = _given(velocity=velocity, acceleration=acceleration, current=current)
 
-    def go(one: Servo) -> tuple[str, ...]:
+    def go(one: Servo) -> list[str]:
         takes(one, verb, given)
         rehearsal = Servo(dry.DryBus(one.bus), one.node)  # type: ignore[arg-type]
-        rehearse = partial(getattr(rehearsal, verb), value, **given)
         what = _far(one.node, name, value)
+        rehearse = partial(getattr(rehearsal, verb), value, **given)
         consent_to(what, output, yes=yes or dry_run or not what, rehearse=rehearse)
-        getattr(one, verb)(value, **{**given, **({"wait": False} if dry_run and verb == "step" else {})})
-        return () if dry_run or value == 0 else one.blockers()
+        getattr(one, verb)(value, **given, **({"wait": False} if dry_run and verb == "step" else {}))
+        return [] if dry_run or value == 0 else _blockers(one)
 
-    node, blockers = on_servo(device_, options, output, go, dry_run=dry_run)
-    if dry_run:
-        return Exit.OK
-    said = [shell_words(words, family) for words in blockers or ()]
-    output.document("motorbus.feetech.drive/1", {"id": node, "order": name, "value": value, "blockers": said})
-    if said:
-        raise MotionError(
-            f"#{node} took the order {name}={text}, and will not obey it: {'; '.join(said)}",
-            advice="`motorbus feetech mode` says this without an order",
-            node=node,
-        )
-    output.text(f"#{node}: {name} {units.show(value, quantity)}")
+    node, said = on_servo(device_, options, output, go, dry_run=dry_run)
+    if not dry_run:
+        told = {"id": node, "order": name, "value": value, "blockers": said}
+        output.document("motorbus.feetech.drive/1", told)
+        if said:
+            raise _powerless(node, order, said)
+        output.text(f"#{node}: {name} {units.show(value, quantity)}")
     return Exit.OK
+
+
+def _order(text: str) -> tuple[str, str, str, float]:
+    """Its word, the verb that gives it, and the quantity and number of its value."""
+    ((name, said),) = assigned([text], ORDERS).items()
+    verb, quantity = ORDERS[name]
+    return name, verb, quantity, units.parse(said, quantity)
+
+
+def _given(**texts: str) -> dict[str, float]:
+    """Those bounds that were said, each by its quantity."""
+    return {name: units.parse(text, name) for name, text in texts.items() if text}
+
+
+def _blockers(one: Servo) -> list[str]:
+    family: Family = one.bus.family  # type: ignore[attr-defined]
+    return [shell_words(words, family) for words in one.blockers()]
+
+
+def _powerless(node: int, order: str, said: Sequence[str]) -> MotionError:
+    return MotionError(
+        f"#{node} took the order {order}, and will not obey it: {'; '.join(said)}",
+        advice="`motorbus feetech mode` says this without an order",
+        node=node,
+    )
 
 
 def _far(node: int, order: str, value: float) -> str:

@@ -6,7 +6,9 @@ from motorbus.families.feetech import driver
 
 
 def say(event: object) -> str:
-    """What an event of a scan or of a change says, in words; "" for one that says nothing to people."""
+    """What an event of a scan, a change or a move says, in words; "" for one that says nothing to people."""
+    if isinstance(event, driver.Powerless):
+        return str(event)
     if isinstance(event, driver.Suspicion):
         return (
             f"#{event.node} at {event.rate} bit/s: two servos seem to have this id ({event.evidence}); "

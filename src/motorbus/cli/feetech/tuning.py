@@ -98,9 +98,9 @@ def torque_limit(
     usage="Usage: motorbus feetech gains BUS#ID [NAME=VALUE...] [OPTIONS]",
     help_epilogue="""p, i, d are of the position loop; velocity_p and velocity_i of the velocity
 loop; current_p and current_i of the current loop of HLS servos. Those are kept
-in EEPROM, and the servo goes limp while they are written: --yes. live_p, live_i
-and live_d of HLS servos act at once, until power-off. Which of them a servo has
-is shown without a value.
+in EEPROM, and the servo goes limp while they are written: --yes. live_p,
+live_i and live_d of HLS servos act at once, until power-off. Which of them a
+servo has is shown without a value.
 
 Examples:
 
@@ -160,18 +160,18 @@ def _whole(name: str, text: str) -> int:
 
 @app.command(
     usage="Usage: motorbus feetech protection BUS#ID [NAME=VALUE...] [OPTIONS]",
-    help_epilogue="""A duty above `threshold` for `time` is an overload, after which `torque` is left
-of the torque; `current` for `current_time` is too much current. `unload` names
-the alarms that let the torque drop and `led` those that blink, with commas, or
-none. All of it is kept in EEPROM: --yes. Which parts a servo has is shown
-without a value; HLS servos protect themselves by their current.
+    help_epilogue="""A duty above `threshold` for `time` is an overload, after which `torque` is
+left of the torque; `current` for `current_time` is too much current. `unload`
+names the alarms that let the torque drop and `led` those that blink, with
+commas, or none. All of it is kept in EEPROM: --yes. Which parts a servo has is
+shown without a value; HLS servos protect themselves by their current.
 
 Examples:
 
     motorbus feetech protection feetech:/dev/ttyACM0#3
-    motorbus feetech protection feetech:/dev/ttyACM0#3 torque=30% time=1.5s --yes
-    motorbus feetech protection feetech:/dev/ttyACM0#3 unload=temperature,overload --yes
-    motorbus feetech protection feetech:/dev/ttyACM0#3 max_temperature=60 --dry-run""",
+    motorbus feetech protection feetech:COM7#3 torque=30% time=1.5s --yes
+    motorbus feetech protection feetech:COM7#3 unload=current,overload --yes
+    motorbus feetech protection feetech:COM7#3 max_temperature=60 --dry-run""",
 )
 def protection(
     device_: Device,

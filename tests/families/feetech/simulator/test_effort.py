@@ -15,7 +15,9 @@ from motorbus.families.feetech.table import Mode
 DRIVE = Drive(top_speed=1000.0, idle_current=0.1, stall_current=2.0)
 
 
-def going(way: float, speed: float = 1000.0, mode: Mode = Mode.POSITION, duty: float = 0.0, **world: object) -> Carried:
+def going(
+    way: float, speed: float = 1000.0, mode: Mode = Mode.POSITION, duty: float = 0.0, **world: object
+) -> Carried:
     """A way from 0 at a speed, with no inertia, in a world."""
     torque = float(str(world.pop("available", 1.0)))
     switches = Switches(**{name: world.pop(name) for name in ("overpowered", "droop") if name in world})  # type: ignore[arg-type]
@@ -45,7 +47,8 @@ def test_nothing_in_the_way_leaves_the_plan_alone() -> None:
 )
 def test_speed_and_torque_share_the_duty(way: float, torque: float, available: float, time: float) -> None:
     carried = going(way, torque=torque, available=available)
-    assert (carried.motion.done_at, carried.motion.goal, carried.push) == (pytest.approx(time), way, None)
+    assert (carried.motion.goal, carried.push) == (way, None)
+    assert carried.motion.done_at == pytest.approx(time)
 
 
 def test_a_slow_way_is_as_slow_under_a_burden() -> None:
@@ -60,7 +63,7 @@ def test_against_more_than_it_may_use_it_stays_and_pushes_with_all_it_has() -> N
 
 def test_or_it_is_pushed_along_by_what_it_cannot_hold() -> None:
     carried = going(500.0, torque=0.6, available=0.5, overpowered="yields")
-    assert (carried.motion.cruise, carried.push) == (pytest.approx(-100.0), 0.5)
+    assert (round(carried.motion.cruise, 9), carried.push) == (-100.0, 0.5)
 
 
 def test_holding_is_no_way_and_can_be_too_much_as_well() -> None:
@@ -72,7 +75,7 @@ def test_holding_is_no_way_and_can_be_too_much_as_well() -> None:
 def test_a_limp_shaft_stays_or_goes_where_it_is_pushed() -> None:
     assert going(0.0, torque=0.6, available=0.0).motion.cruise == 0.0
     carried = going(0.0, torque=0.6, available=0.0, overpowered="yields")
-    assert (carried.motion.cruise, carried.push) == (pytest.approx(-600.0), 0.0)
+    assert (round(carried.motion.cruise, 9), carried.push) == (-600.0, 0.0)
 
 
 def test_a_wall_ends_the_way_and_is_pressed_with_all_it_may_use() -> None:
@@ -109,12 +112,12 @@ def test_a_wall_in_an_overshoot_is_left_again() -> None:
 )
 def test_a_duty_turns_with_what_is_left_of_it(torque: float, cruise: float, push: float | None) -> None:
     carried = going(500.0, mode=Mode.PWM, duty=0.5, torque=torque)
-    assert (carried.motion.cruise, carried.push) == (pytest.approx(cruise), push)
+    assert (round(carried.motion.cruise, 9), carried.push) == (cruise, push)
 
 
 def test_a_duty_that_is_overcome_turns_back_where_shafts_yield() -> None:
     carried = going(500.0, mode=Mode.PWM, duty=0.5, torque=0.8, overpowered="yields")
-    assert (carried.motion.cruise, carried.push) == (pytest.approx(-300.0), 0.5)
+    assert (round(carried.motion.cruise, 9), carried.push) == (-300.0, 0.5)
 
 
 def test_loads_by_hand() -> None:
@@ -130,7 +133,7 @@ def test_loads_by_hand() -> None:
 
 def test_loads_of_one_who_presses_end_in_that() -> None:
     motion = Motion(0.0, (), 10.0)
-    assert list(loads(motion, -0.5, World(), 1.0, DRIVE, 0.0)) == [Load(0.0, inf, -0.5, 0.0, 1.0, -0.5)]
+    assert list(loads(motion, -0.5, World(), 1.0, DRIVE, 0.0)) == [Load(0.0, inf, -0.5, 0.0, -1.0, -0.5)]
 
 
 def test_no_more_torque_is_given_than_is_available() -> None:

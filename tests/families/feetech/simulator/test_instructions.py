@@ -178,3 +178,20 @@ def test_an_id_is_changed_and_locked_by_the_register_of_the_map(name: str) -> No
     host.wait(1.0).write(7, LOCK[name], 1)
     host.bus.nodes[7].power_cycle()
     assert host.say(packet(7, PING)) == ["FF FF 07 02 00 F6"]
+
+
+# While the EEPROM is at work.
+
+
+@pytest.mark.parametrize(("switch", "later"), [("buffer", 0.02), ("answer", 0.0)])
+def test_what_is_asked_during_flash_work_comes_in_a_burst_or_at_once(switch: str, later: float) -> None:
+    host = Host(while_storing=switch)
+    host.write(1, LOCK["sts"], 0)
+    host.bus.receive(packet(1, WRITE, 13, 60) + packet(1, PING) + packet(1, READ, 13, 1), host.now)
+    replies = host.timed(packet(ALL, SYNC_READ, 13, 1, 1))
+    assert sorted((reply[:14], at) for at, reply in replies) == [
+        ("FF FF 01 02 00", min(later, 0.02)),
+        ("FF FF 01 02 00", 0.02),
+        ("FF FF 01 03 00", later),
+        ("FF FF 01 03 00", later),
+    ]

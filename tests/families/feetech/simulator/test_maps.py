@@ -132,3 +132,14 @@ def test_0x06_brings_back_what_was_shipped(name: str) -> None:
     assert host.say(packet(1, 0x06)) == ["FF FF 01 02 00 FC"]
     host.wait(2.0)
     assert bytes(servo.memory.stored) == shipped
+
+
+@pytest.mark.parametrize(("name", "bit"), [("sts", 32), ("smbl", 32), ("scs", 64), ("scs2", 64), ("hls", 32)])
+def test_the_phase_of_another_board_may_cost_the_servo_its_voltage(name: str, bit: int) -> None:
+    for switch, alarm in (("harmless", 0), ("blind", 1)):
+        host = host_of(name, wrong_bridge=switch)
+        shipped = host.read(1, 18, 1)
+        host.write(1, 18, shipped ^ bit)
+        assert (host.read(1, 65, 1), host.read(1, 62, 1) == 0) == (alarm, bool(alarm))
+        host.write(1, 18, shipped)
+        assert host.read(1, 65, 1) == 0

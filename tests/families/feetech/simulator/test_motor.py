@@ -13,23 +13,27 @@ from motorbus.families.feetech.table import Mode
 
 DRIVE = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
 SHIPPED = Settings(torque=1.0)
-FULL_TURNS = 16
 
 
 @pytest.mark.parametrize(
-    ("shaft", "zero", "phase", "says"),
+    ("shaft", "zero", "told", "says"),
     [
-        (2048.0, 0, 12, 2048),
-        (2048.4, 0, 12, 2048),
-        (4095.6, 0, 12, 0),
-        (-1.0, 0, 12, 4095),
-        (-1.0, 0, 12 + FULL_TURNS, -1),
-        (6015.0, 0, 12 + FULL_TURNS, 6015),
-        (2048.0, 85, 12, 1963),
+        (2048.0, 0, False, 2048),
+        (2048.4, 0, False, 2048),
+        (4095.6, 0, False, 0),
+        (-1.0, 0, False, 4095),
+        (-1.0, 0, True, -1),
+        (6015.0, 0, True, 6015),
+        (2048.0, 85, False, 1963),
     ],
 )
-def test_reading(shaft: float, zero: int, phase: int, says: int) -> None:
-    assert reading(shaft, zero, phase, 4096) == says
+def test_reading(shaft: float, zero: int, told: bool, says: int) -> None:
+    assert reading(shaft, zero, told, 4096) == says
+
+
+def test_a_reading_in_steps_of_several_counts() -> None:
+    assert reading(6015.0, 15, True, 4096, 3) == 2000
+    assert reading(3 * 4097.0, 0, False, 4096, 3) == 1
 
 
 @given(st.floats(-1e5, 1e5), st.integers(-2047, 2047))
@@ -37,14 +41,14 @@ def test_a_new_zero_keeps_the_reading_within_the_turn_and_the_offset_in_force(
     shaft: float, offset: int
 ) -> None:
     zero = zero_for(shaft, offset, 4096)
-    assert reading(shaft, zero, FULL_TURNS, 4096) == (round(shaft) - offset) % 4096
+    assert reading(shaft, zero, True, 4096) == (round(shaft) - offset) % 4096
 
 
 @given(st.floats(0, 4095), st.integers(-2047, 2047), st.integers(0, 4095))
 def test_a_goal_within_the_limits_is_what_is_read_at_the_end(shaft: float, offset: int, goal: int) -> None:
     settings = SHIPPED._replace(goal=goal, zero=zero_for(shaft, offset, 4096))
     motion = plan(settings, rest(0.0, shaft), 0.0, DRIVE, Switches())
-    assert reading(motion.position(motion.done_at), settings.zero, 12, 4096) == goal
+    assert reading(motion.position(motion.done_at), settings.zero, False, 4096) == goal
 
 
 def test_a_weak_motor_rests_whatever_it_is_told() -> None:

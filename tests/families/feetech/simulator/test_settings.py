@@ -384,3 +384,12 @@ def test_a_read_of_everything_works_in_every_mode() -> None:
                 host.write(1, MODE[name], code)
             host.write(1, TORQUE, 1)
             assert len(host.wait(0.5).say(packet(1, READ, 0, 100))) == 1
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_bit_4_of_phase_counts_turns_where_it_has_that_meaning(name: str) -> None:
+    host = host_of(name, position=300)
+    host.write(1, 18, 16)
+    servo = host.bus.nodes[1]
+    servo.raw_position -= 400
+    assert servo.raw_position == (-100 if name in ("sts", "smbl", "hls") else CONTROL[name].turn - 100)

@@ -66,6 +66,8 @@ class Move(NamedTuple):
 def arrive(node: Node, table: Table, move: Move) -> Operation[None]:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
     look = state_exchange(node, table)
+    if move.turn is not None:
+        yield from Pause(POLL)  # a goal that is whole turns away looks like this place until it moves
     state = yield from look
     begun = progressed = state.at
     mark = place = _place(state, move, move.start)

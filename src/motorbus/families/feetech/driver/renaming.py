@@ -85,6 +85,6 @@ def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> Operation[None]:
             f"servo {id} has {second} as its second id: it would obey every write to {second} without a word",
             expected="no servo whose second id is one of " + " and ".join(map(str, ids)),
             cause="HLS servos hear writes to a second id (register 7)",
-            advice=f"give it another second id first, write(second_id=...) to node {id}; nothing was written",
+            advice=f"take servo {id} off the bus meanwhile; nothing was written",
             node=id,
         )

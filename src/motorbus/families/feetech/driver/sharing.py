@@ -9,9 +9,10 @@ listening: their answers are one answer. Nothing but connecting one at a time ru
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Operation, Pause, Progress, Report, Timeout, Tune
+from motorbus.core.operation import Answer, Due, Exchange, Operation, Progress, Report, Timeout, Tune, outcome
 from motorbus.errors import MotorbusError, NoReply, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
@@ -22,12 +23,12 @@ FEEDBACK: Final = 15
 """Bytes from the present position on: everything a servo measures, in every map."""
 BLOCKS: Final = ((PRESENT, FEEDBACK), (0, IMAGE))
 """What is read in turn: the feedback, which moves, and the EEPROM, which cannot differ from one read to the next."""
-GARBLED: Final = 2
-"""Garbled answers that make a suspicion; a single one may be noise."""
+SIGNS: Final = 4
+"""Garbled answers that make a suspicion; fewer may be noise. Where few questions are asked, half as many do."""
+FEW: Final = 20
 ENOUGH: Final = 10
 """Signs after which nobody need look any further."""
-QUIET: Final = 0.05
-"""s after a silence: an answer that comes late must not be taken for a second one."""
+_ID: Final = 5
 
 
 class Suspicion(NamedTuple):
@@ -57,7 +58,8 @@ class Suspicion(NamedTuple):
     @property
     def suspected(self) -> bool:
         """Two servos probably have this id, or the line is so bad that it looks like it."""
-        return bool(self.doubled or self.changed) or self.garbled >= GARBLED
+        weight = self.garbled + 2 * (self.doubled + self.changed)
+        return weight >= (SIGNS if self.polls > FEW else SIGNS // 2)
 
     @property
     def evidence(self) -> str:
@@ -85,20 +87,15 @@ def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operat
     silence: MotorbusError | None = None
     for number in range(polls):
         block = BLOCKS[number // 2 % len(BLOCKS)]
-        try:
-            answers = yield from (_alone if number % 2 == 0 else _twice)(node, *block)
-        except WireError:
-            seen = seen._replace(garbled=seen.garbled + 1)
-        except NoReply as error:
-            silence = error
-            seen = seen._replace(silent=seen.silent + 1)
-            yield from Pause(QUIET)
-        else:
-            first = first or (answers[0] if block[0] == 0 else b"")
-            changed = block[0] == 0 and any(answer != first for answer in answers)
-            seen = seen._replace(
-                doubled=seen.doubled + (len(answers) > 1), changed=seen.changed + int(changed)
-            )
+        answers = yield from outcome((_alone if number % 2 == 0 else _twice)(node, *block))
+        if isinstance(answers, NoReply):
+            silence = answers
+        if block[0] == 0 and not first and not isinstance(answers, MotorbusError):
+            first = answers[0]
+        told = _told(answers, first if block[0] == 0 else None)
+        if told:
+            told = (yield from _in_step(node)) or told
+            seen = seen._replace(**{told: getattr(seen, told) + 1})
         seen = seen._replace(polls=number + 1)
         if not quiet:
             yield from Report(Progress(number + 1, polls, f"does one servo answer as {node.node}?"))
@@ -107,6 +104,25 @@ def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operat
     if silence is not None and seen.silent == seen.polls:
         raise silence
     return seen
+
+
+def _told(answers: Sequence[bytes] | MotorbusError, first: bytes | None) -> str:
+    """Which count of a `Suspicion` this is, "" for what one servo does; `first` is what it cannot differ from."""
+    if isinstance(answers, WireError):
+        return "garbled"
+    if isinstance(answers, NoReply):
+        return "silent"
+    if isinstance(answers, MotorbusError):
+        raise answers
+    if len(answers) > 1:
+        return "doubled"
+    return "changed" if first is not None and answers[0] != first else ""
+
+
+def _in_step(node: Node) -> Operation[str]:
+    """Ask something that no late answer can be taken for, so that none is heard twice; "garbled" when that is."""
+    found = yield from outcome(read_block(node, _ID, 1, bytes))
+    return "garbled" if isinstance(found, WireError) else ""
 
 
 def refuse_duplicates(node: Node, polls: int = POLLS) -> Operation[None]:

@@ -13,7 +13,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from motorbus.core.plant import Drive, Motion, rest
-from motorbus.families.feetech.simulator.effort import World, carried_out, loads
+from motorbus.families.feetech.simulator.effort import Load, World, carried_out, loads
 from motorbus.families.feetech.simulator.flash import Flash
 from motorbus.families.feetech.simulator.memory import Layout, Memory
 from motorbus.families.feetech.simulator.model import Model
@@ -180,12 +180,18 @@ class Body(ABC):
             self.protection.fire(at)
         self.move(at)
 
+    def duty(self, at: float) -> float:
+        """The share of its supply that the motor gets at this moment, signed as the movement: FEETECH calls it load."""
+        if self.push is None and not self._world.torque:
+            return self.model.drive.duty(self.motion.velocity(at))
+        load = self._load(at)
+        return max(-1.0, min(1.0, load.duty + load.slope * (max(at, load.begin) - load.begin)))
+
     def current(self, at: float) -> float:
-        """A that it draws at this moment."""
-        for load in loads(self.motion, self.push, self._world, self._given, self.model.drive, at):
-            if load.end > at:
-                return load.current
-        return 0.0
+        """A that it takes at this moment, signed as the effort."""
+        if self.push is None and not self._world.torque:
+            return self.model.drive.current(self.motion.velocity(at))
+        return self._load(at).current
 
     def turning_points(self, since: float) -> list[float]:
         """Later moments at which its current changes."""
@@ -196,11 +202,8 @@ class Body(ABC):
         """Whether its supply suffices at this moment."""
         return self._supply is None or self._voltage - self._supply.sag(at) >= self.threshold
 
-    def effort(self, at: float) -> float:
-        """The share of its stall torque that the motor gives at this moment, signed against the outside's."""
-        if self.push is not None and not self.motion.moving(at):
-            return self.push
-        return max(-self._given, min(self._given, self._world.torque))
+    def _load(self, at: float) -> Load:
+        return next(loads(self.motion, self.push, self._world, self._given, self.model.drive, at))
 
     def _carry(self, motion: Motion, push: float | None, again: float, at: float) -> None:
         self.motion, self.push, self._again = motion, push, again

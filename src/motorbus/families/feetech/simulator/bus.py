@@ -208,7 +208,8 @@ class FeetechBus:
             listed = self._hearing(self._ids().get(id, _NOBODY), at)
             servos = [servo for servo in listed if self._syncs(servo)]
             if servos:
-                answers = [(servo, Answer(servo.read(order.address, order.length, at))) for servo in servos]
+                asked = bytes((order.address, order.length))
+                answers = [(servo, OBEY[Instruction.READ](servo, asked, at) or Answer()) for servo in servos]
                 moment = self._at_once(answers, moment)
             elif self.switches.sync_read_missing == "silent":
                 return
@@ -229,7 +230,9 @@ class FeetechBus:
         spoken = list(self._spoken(speaking, at))
         for together in overlapping(spoken) if len(spoken) > 1 else [spoken] * len(spoken):
             servo = together[0].servo
-            data = heard(together, self._byte_time(None) / BITS, drop_unframed=self.switches.framing == "drop")
+            data = heard(
+                together, self._byte_time(None) / BITS, drop_unframed=self.switches.framing == "drop"
+            )
             if data:
                 heappush(self._voices, Voice(together[0].start, next(self._order), data, servo, servo.lives))
             end = max(end, *(one.end for one in together))

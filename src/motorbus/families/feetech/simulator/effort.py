@@ -47,8 +47,8 @@ class Carried(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What the motor does for a while: from when to when (s), duty at first and its change per s, current in A, and
-    the share of the stall torque that it gives."""
+    """What the motor does for a while: from when to when (s), duty at first and its change per s, current in A, and the
+    share of the stall torque that it gives, all signed."""
 
     begin: float
     end: float
@@ -101,11 +101,11 @@ def loads(
     torque = max(-available, min(available, world.torque))
     for begin, end, _, velocity, acceleration in motion.stretches(since):
         if end == inf and push is not None:
-            yield Load(begin, end, push, 0.0, abs(drive.current(0.0, push)), push)
+            yield Load(begin, end, push, 0.0, drive.current(0.0, push), push)
         else:
             turning = velocity or acceleration
             duty = velocity / drive.top_speed + torque
-            current = abs(drive.current(turning, torque))
+            current = drive.current(turning, torque)
             yield Load(begin, end, duty, acceleration / drive.top_speed, current, torque)
 
 

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.families.feetech.simulator import motor
 from motorbus.families.feetech.table import AMPERE, tells_current
+from motorbus.families.feetech.table.phase import many_turns_are_told
 
 if TYPE_CHECKING:
     from motorbus.families.feetech.simulator.servo import Servo
 
 
 def _position(servo: Servo, at: float) -> int:
-    return motor.reading(servo.encoder(at), servo.zero, servo.memory["phase"], servo.model.turn, servo.fold)
+    model = servo.model
+    told = many_turns_are_told(servo.memory["phase"], model.table.name)
+    return motor.reading(servo.encoder(at), servo.zero, told, model.turn, servo.fold)
 
 
 def _velocity(servo: Servo, at: float) -> int:
@@ -27,11 +30,11 @@ def _velocity(servo: Servo, at: float) -> int:
 
 
 def _load(servo: Servo, at: float) -> int:
-    return round(1000 * servo.facing * servo.model.drive.duty(servo.motion.velocity(at), servo.effort(at)))
+    return round(1000 * servo.facing * servo.duty(at))
 
 
 def _voltage(servo: Servo, at: float) -> int:
-    return round(servo.voltage * 10)
+    return servo.told_voltage
 
 
 def _temperature(servo: Servo, at: float) -> int:
@@ -61,9 +64,7 @@ def _goal(servo: Servo, at: float) -> int:
 def _current(servo: Servo, at: float) -> int:
     if not tells_current(servo.memory["phase"], servo.model.table.name):
         return 0
-    return round(
-        servo.facing * servo.model.drive.current(servo.motion.velocity(at), servo.effort(at)) / AMPERE
-    )
+    return round(servo.facing * servo.current(at) / AMPERE)
 
 
 FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(

@@ -27,14 +27,19 @@ class Answer(NamedTuple):
     later: float = 0.0
 
 
+def _busy(servo: Servo, at: float) -> float:
+    """How much later (s) it answers because its EEPROM is at work (feetech-cli: a burst follows)."""
+    return servo.storing(at) if servo.switches.while_storing == "buffer" else 0.0
+
+
 def _ping(servo: Servo, parameters: bytes, at: float) -> Answer | None:
-    return None if parameters else Answer()
+    return None if parameters else Answer(later=_busy(servo, at))
 
 
 def _read(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) != 2 or parameters[1] > MOST:
         return None
-    return Answer(servo.read(parameters[0], parameters[1], at))
+    return Answer(servo.read(parameters[0], parameters[1], at), later=_busy(servo, at))
 
 
 def _write(servo: Servo, parameters: bytes, at: float) -> Answer | None:
@@ -47,7 +52,7 @@ def _reg_write(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) < 2:
         return _empty(servo, parameters)
     servo.reg_write(parameters[0], parameters[1:])
-    return Answer()
+    return Answer(later=_busy(servo, at))
 
 
 def _empty(servo: Servo, parameters: bytes) -> Answer | None:

@@ -26,6 +26,7 @@ class Layout:
 
     def __init__(self, table: Table, defaults: Mapping[str, int]) -> None:
         self.table = table
+        self._touched: dict[tuple[int, int], tuple[Entry, ...]] = {}
         self.rows: list[Entry | None] = [None] * SIZE
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
@@ -42,10 +43,13 @@ class Layout:
         row = self.rows[address]
         return row is not None and row.storage is not Storage.RAM
 
-    def touched(self, address: int, count: int) -> list[Entry]:
+    def touched(self, address: int, count: int) -> tuple[Entry, ...]:
         """The rows of which at least one byte lies in this range, in order."""
-        found = dict.fromkeys(row.name for row in self.rows[address : address + count] if row is not None)
-        return [self.table[name] for name in found]
+        known = self._touched.get((address, count))  # hosts ask for the same ranges again and again
+        if known is None:
+            found = dict.fromkeys(row.name for row in self.rows[address : address + count] if row is not None)
+            known = self._touched[address, count] = tuple(self.table[name] for name in found)
+        return known
 
 
 class Written(NamedTuple):

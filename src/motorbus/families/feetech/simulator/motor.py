@@ -16,8 +16,6 @@ from motorbus.core.plant import Drive, Motion, Phase, move, rest, run
 from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.table import Mode
 
-_FULL_TURNS = 1 << 4
-"""Bit of the phase register; source: FEETECH notes on special bytes of STS and HLS servos."""
 _MOST_TURNS = 7.5
 """How far a goal over many turns may lie to either side (STS3215 memory table V3.6: 30719 counts)."""
 
@@ -36,6 +34,7 @@ class Settings(NamedTuple):
     `velocity`      goal velocity, signed; `fastest`: a velocity of 0 means as fast as it can
     `time`          s that a way takes when the velocity is 0; 0: it does not count
     `acceleration`  counts/s²
+    `told`          readings count on beyond one turn
     `runs_away`     drive and feedback disagree about the direction
     `fold`          counts of the encoder for one count of a position
     """
@@ -55,18 +54,21 @@ class Settings(NamedTuple):
     time: float = 0.0
     acceleration: float = 25_400.0
     runs_away: bool = False
-    phase: int = 12
+    told: bool = False
     zero: int = 0
     turn: int = 4096
     fold: int = 1
 
 
-def reading(encoder: float, zero: int, phase: int, turn: int, fold: int = 1) -> int:
-    """What the present position register says when the encoder is here; `fold` counts of it make one that is told."""
+def reading(encoder: float, zero: int, told: bool, turn: int, fold: int = 1) -> int:
+    """What the present position register says when the encoder is here: within one turn unless `told` in full.
+
+    `fold` counts of the encoder make one that is said.
+    """
     counts = round(encoder) - zero
     if fold != 1:
         counts = round(counts / fold)
-    return counts if phase & _FULL_TURNS else counts % turn
+    return counts if told else counts % turn
 
 
 def zero_for(encoder: float, offset: int, turn: int) -> int:
@@ -143,8 +145,8 @@ def _place(settings: Settings, encoder: float, switches: Switches) -> float:
         return encoder
     if settings.turns:
         return settings.zero + goal * settings.fold
-    told = reading(encoder, settings.zero, settings.phase, settings.turn, settings.fold)
-    return round(encoder) + (goal - told) * settings.fold
+    present = reading(encoder, settings.zero, settings.told, settings.turn, settings.fold)
+    return round(encoder) + (goal - present) * settings.fold
 
 
 def _rests(settings: Settings, encoder: float, place: float, switches: Switches) -> float:

@@ -33,6 +33,7 @@ class Personality:
     `heeds_time`      whether the time of the way counts when the velocity is 0
     `calibrates`      whether 0x0B is known to be obeyed
     `turns_cleared`   whether every model obeys 0x0A; else only those whose name ends in BL, if the map knows it at all
+    `bridge_bit`      phase bit that tells how the supply is sampled, which is a property of the board
     `reversed_by`     phase bits that reverse drive and feedback; where both are one bit, it reverses the two together
     """
 
@@ -47,12 +48,13 @@ class Personality:
     calibrates: bool = False
     turns_cleared: bool = False
     reversed_by: tuple[int, int] | None = None
+    bridge_bit: int | None = None
 
 
 _STS: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
 
 # An SMS or HLS ships with something like the values of an STS3215, for want of better: limits over the whole turn,
-# 70 °C, the masks and gains of memory table V3.6. The supply is what their data sheets are titled with.
+# 70 °C, the masks and gains of memory table V3.6. A supply of 12 V and limits around it are assumed as well.
 _LIKE_STS: Final = {
     "min_position_limit": 0, "max_position_limit": 4095, "max_temperature": 70,
     "unload_mask": 44, "led_mask": 47, "position_p": 32, "position_d": 32, "position_i": 0, "min_start_force": 16,
@@ -72,7 +74,7 @@ _LIKE_SCS: Final = {
     "overcurrent_time": 50, "protection_current": 500, "protective_torque": 20, "overload_time": 100,
     "overload_torque": 80,
 }  # fmt: skip
-# 60 degrees in 0.1 s, as an SCS0009 is sold, are 2048 counts/s; its currents are assumed.
+# Assumed: 60 degrees in 0.1 s, which are 2048 counts/s, and currents of a small servo.
 _SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
 _LEAST_SMS: Final = 100e-6  # FEETECH page on SMS servos: values of register 7 below 50 act as 50
 
@@ -86,6 +88,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             goal_enables=True,  # feetech-cli, measured on STS3215
             calibrates=True,  # 0x0B is in the dispatcher of firmware 3.10 (kuterd/feetech-fw-util)
             reversed_by=(0, 7),
+            bridge_bit=5,
         ),
         "smbl": Personality(
             firmware=(2, 45),
@@ -94,6 +97,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={**_SMS, "phase": 12, "torque_limit": 1000},  # phase as an STS ships: velocity in counts/s
             least_delay=_LEAST_SMS,
             reversed_by=(0, 7),
+            bridge_bit=5,
         ),
         "smcl": Personality(
             firmware=(1, 10), voltage=12.0, drive=_STS, shipped={**_OLD_SMS, "phase": 0}, least_delay=_LEAST_SMS
@@ -105,6 +109,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={"baud_rate": 0},  # 1000000 or 500000 by model
             heeds_time=True,
             reversed_by=(0, 0),
+            bridge_bit=6,
         ),
         "scs2": Personality(
             firmware=(3, 25),
@@ -113,6 +118,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={**_LIKE_SCS, "baud_rate": 0},
             heeds_time=True,  # taken from SCS
             reversed_by=(0, 0),
+            bridge_bit=6,
         ),
         "hls": Personality(
             firmware=(3, 43),  # met on HLS3955 and HLS3915
@@ -126,6 +132,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             turns_cleared=True,  # FTServo_Python, hls/reset.py
             # Bit 0 is ignored from firmware 3.42 on, so bit 7 is taken to reverse drive and feedback together.
             reversed_by=(7, 7),
+            bridge_bit=5,
         ),
     }
 )  # fmt: skip

@@ -140,8 +140,7 @@ class Protection:
     def forget(self) -> None:
         """Nothing has tripped: its controller starts anew. It does not get cooler by that."""
         self.error = 0
-        for watch in self._watches.values():
-            watch.since = None
+        self._keep_limits()
 
     def torque_off(self) -> None:
         """Torque was switched off, which may or may not end what is latched."""
@@ -161,6 +160,8 @@ class Protection:
         """From this moment on the motor does this; None: nothing that heats it or that it could trip over."""
         self._roll(at)
         self._loads = [] if loads is None else list(loads)
+        if not self._loads:
+            self._keep_limits()
         self._quiet = not (self._loads or self.error & HEAT or abs(self._degrees - self._ambient) > _CLOSE)
         if self._quiet:
             self._degrees, self.next = self._ambient, inf
@@ -231,6 +232,10 @@ class Protection:
                     return moment
             degrees = thermal.after(load.end - begin, degrees, target)
         return inf
+
+    def _keep_limits(self) -> None:
+        for watch in self._watches.values():
+            watch.since = None
 
     def _tell(self, bit: int, yes: bool) -> None:
         self.error = self.error | bit if yes else self.error & ~bit

@@ -19,6 +19,7 @@ from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.power import power_up, stand
 from motorbus.families.feetech.simulator.protection import OVERLOAD
 from motorbus.families.feetech.simulator.settings import (
+    blind,
     facing_of,
     fold_of,
     mode_now,
@@ -70,10 +71,8 @@ class Servo(Body):
         self._all_codes = switches.baud_codes == "all"
         self._steps = velocity_steps(model)
         self._delays = "return_delay" in model.table and switches.return_delay == "heed"
-        for name in (
-            "id",
-            "second_id",
-        ):  # what the second id ships as is not known: at first it is the main id
+        # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
+        for name in ("id", "second_id"):
             if name in model.table:
                 self.memory[name] = id
         for name, raw in model.set_to.items():
@@ -185,10 +184,15 @@ class Servo(Body):
         return self.memory["lock"] != 0
 
     @property
+    def told_voltage(self) -> int:
+        """What register 62 says of its supply, in 0.1 V."""
+        return 0 if self.switches.wrong_bridge == "blind" and blind(self) else round(self.voltage * 10)
+
+    @property
     def error(self) -> int:
         """The error byte of its status packets, which register 65 repeats: alarms and nothing else."""
         memory, bits = self.memory, self._alarm | self.protection.error
-        if not memory["min_voltage"] <= round(self.voltage * 10) <= memory["max_voltage"]:
+        if not memory["min_voltage"] <= self.told_voltage <= memory["max_voltage"]:
             bits |= _VOLTAGE
         return bits
 

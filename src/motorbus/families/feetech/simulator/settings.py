@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.families.feetech.simulator.motor import Settings
 from motorbus.families.feetech.table import AMPERE, Mode, mode_of, zero_is_maximum
+from motorbus.families.feetech.table.phase import many_turns_are_told
 
 if TYPE_CHECKING:
     from motorbus.families.feetech.simulator.model import Model
@@ -47,6 +48,13 @@ def facing_of(servo: Servo) -> int:
     return -1 if bits and servo.memory["phase"] >> bits[1] & 1 else 1
 
 
+def blind(servo: Servo) -> bool:
+    """Whether its phase register tells of another board than it has, as after copying that of another servo."""
+    bit, model = servo.model.personality.bridge_bit, servo.model
+    shipped = model.defaults.get("phase", model.table["phase"].default) or 0
+    return bit is not None and bool((servo.memory["phase"] ^ shipped) >> bit & 1)
+
+
 def fold_of(servo: Servo) -> int:
     """Counts of the encoder for one count of its positions: its angular resolution (STS3215 memory table V3.6)."""
     if "angular_resolution" not in servo.model.table or servo.switches.angular_resolution == "ignore":
@@ -58,7 +66,7 @@ def torque_limit(servo: Servo) -> float:
     """The share of the stall torque that its registers allow: torque limit, and where there is one the current cap.
 
     A map without a torque limit has `max_torque` of its EEPROM for it. An HLS with 0 as its goal torque never moves in
-    position and velocity mode (measured by users of HLS: the burst of seven bytes that suits an STS writes it).
+    position and velocity mode (seen on hardware, where the burst of seven bytes that suits an STS had written it).
     """
     memory, control = servo.memory, servo.model.control
     share = memory[control.limit or "max_torque"] / 1000
@@ -92,7 +100,7 @@ def settings(servo: Servo, at: float) -> Settings:
         time=0.0 if velocity else _time(servo),
         acceleration=_acceleration(servo),
         runs_away=switches.half_reversed == "runaway" and _drive(servo) != servo.facing,
-        phase=phase,
+        told=many_turns_are_told(phase, servo.model.table.name),
         zero=servo.zero,
         turn=servo.model.turn,
         fold=servo.fold,

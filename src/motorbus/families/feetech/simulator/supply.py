@@ -37,7 +37,7 @@ class Supply:
         """By how many V it is lower at this moment than without current."""
         if not self.resistance:
             return 0.0
-        return self.resistance * sum(servo.current(at) for servo in self._servos if servo.plugged)
+        return self.resistance * sum(abs(servo.current(at)) for servo in self._servos if servo.plugged)
 
     def next(self, since: float) -> float:
         """When the next servo falls, if nothing else happens; infinity when none does."""

@@ -25,6 +25,13 @@ class Switches(FaultSwitches):
         "drop",
         source="not documented; no error code for it exists",
     )
+    wrong_bridge: str = switch(
+        "harmless",
+        "a phase register copied from a servo with another board changes nothing more, or makes it read 0 V for ever",
+        "harmless",
+        "blind",
+        source="iotdesignshop/Feetech-tuna#2: 0.0 V and a lasting voltage alarm; that this is the cause is a guess",
+    )
     restore_id: str = switch(
         "keep",
         "a factory restore keeps the id or sets it to 1",

@@ -24,6 +24,13 @@ class FaultSwitches(MotionSwitches):
         "after_ack",
         source="public recovery tool for STS3215, measured: the acknowledgement can take 21 ms, as if it waited",
     )
+    while_storing: str = switch(
+        "buffer",
+        "what is asked while the EEPROM is at work is answered when it is done, all in one burst, or at once",
+        "buffer",
+        "answer",
+        source="feetech-cli: a servo that comes back from flash work answers what was buffered in a burst",
+    )
     lock_drops: bool = switch(
         False,
         "closing the lock drops what is not committed yet; else it is finished, having been accepted",
