@@ -79,6 +79,13 @@ def test_nothing_begins_while_another_change_is_unfinished(path: Path, state: st
     assert len(lines(path)) == 2
 
 
+def test_a_step_of_another_change_is_refused() -> None:
+    kept = begun(None)
+    with pytest.raises(RequestError, match="unfinished"):
+        kept(Journal("set_baud", OUTCOME, {"outcome": "new"}))
+    assert kept.unfinished() is not None
+
+
 def test_the_file_says_its_format_and_is_the_users_alone(path: Path) -> None:
     begun(path)
     assert lines(path)[0]["format"] == 1

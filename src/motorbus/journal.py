@@ -53,11 +53,15 @@ class BusJournal:
         self._memory = b""
 
     def __call__(self, event: object) -> None:
-        """Record it; it is on disk when this returns. Raises RequestError while another change is unfinished, and for
-        a file that a later version wrote; LinkError when the file cannot be written."""
+        """Record it; it is on disk when this returns.
+
+        Raises RequestError while another change is unfinished, and for a file that a later version wrote; LinkError
+        when the file cannot be written.
+        """
         assert isinstance(event, Journal)
         open_change = self.unfinished()
-        if event.state in (ASKED, INTENT) and open_change is not None:
+        begins = event.state in (ASKED, INTENT)
+        if open_change is not None and (begins or event.change != open_change.verb):
             raise _unfinished(open_change)
         if event.state == ASKED or (event.state == OUTCOME and open_change is None):
             return

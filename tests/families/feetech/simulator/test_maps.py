@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
 from motorbus.core.entry import Entry, Storage
 from motorbus.families.feetech.simulator.feedback import FEEDBACK
 from motorbus.families.feetech.table import TABLES, alarms
-from tests.families.feetech.simulator.host import READ, Host, packet
+from tests.families.feetech.simulator.host import ALL, READ, WRITE, Host, packet
 
 USUAL = {
     "sts": "sts3215", "smbl": "sm85blhv", "smcl": "sm80-360m", "scs": "scs0009", "scs2": "scs215-2", "hls": "hls3925",
@@ -143,3 +145,23 @@ def test_the_phase_of_another_board_may_cost_the_servo_its_voltage(name: str, bi
         assert (host.read(1, 65, 1), host.read(1, 62, 1) == 0) == (alarm, bool(alarm))
         host.write(1, 18, shipped)
         assert host.read(1, 65, 1) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_is_written_and_done_to_it_a_mixed_bus_goes_on(seed: int) -> None:
+    dice = random.Random(seed)
+    host = Host((1, 2, 3, 4, 5, 6), "+".join(USUAL.values()))
+    instructions = (WRITE, WRITE, WRITE, READ, 0x04, 0x05, 0x06, 0x08, 0x0A, 0x0B)
+    for _ in range(400):
+        servo = dice.choice(host.bus.servos)
+        id, address = dice.choice((servo.id, servo.id, ALL)), dice.randrange(7, 88)
+        data = dice.randbytes(dice.choice((1, 2, 4, 7)))
+        host.wait(dice.random() / 5).say(packet(id, dice.choice(instructions), address, *data))
+        host.say(packet(servo.id, WRITE, 40, dice.choice((0, 1, 1, 2, 128))))
+        servo.torque, servo.voltage = dice.uniform(-1, 1), dice.uniform(3, 15)
+        assert servo.status()["model"] == servo.model.name
+    for servo in host.bus.servos:
+        servo.torque, servo.voltage = 0.0, servo.model.voltage
+        servo.power_cycle()
+    for id in range(1, 7):
+        assert len(host.wait(5.0).say(packet(id, READ, 0, 90))) == 1

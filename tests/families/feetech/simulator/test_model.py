@@ -114,3 +114,11 @@ def test_figures_are_those_of_the_map() -> None:
         low, high = (simulate((1,), one.name).nodes[1].memory[row] for row in ("min_voltage", "max_voltage"))
         assert low < one.voltage * 10 < high
     assert model("sm85blhv").voltage == 24.0
+
+
+def test_motors_of_which_a_data_sheet_says_more() -> None:
+    # 60 degrees are 4096/6 counts in 0.133 s; 55 rpm are 330 degrees/s, and 1024 counts are 300 degrees
+    assert model("sts3250").drive.top_speed == pytest.approx(4096 / 6 / 0.133, abs=1)
+    assert model("scs15").drive.top_speed == pytest.approx(330 * 1024 / 300, abs=1)
+    assert model("scs15").drive.stall_current == 1.5
+    assert model("sts3032").drive is model("sts3215").drive

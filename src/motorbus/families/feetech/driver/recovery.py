@@ -129,6 +129,8 @@ def _found(job: Job, course: Course, alone: bool) -> Operation[Seen]:
             return mine[0]
         yield from Report(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
         yield from Pause(AWAKE)
+    if alone:
+        yield from _refuse_others(job)
     lost = yield from _lost(job, alone)
     if lost is not None:
         return lost
@@ -156,7 +158,7 @@ def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
 
     Whoever answered there before the change began is somebody else, and may look just like it.
     """
-    taken = set(job.others) - ({SHIPPED_ID} if alone else set())
+    taken = _others(job, alone)
     rates = (job.old.rate, job.new.rate)
     possible = (job.old.id, job.new.id, *((SHIPPED_ID,) if job.verb == SET_ID else ()))
     ids = [id for id in possible if id not in taken]
@@ -170,6 +172,11 @@ def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
     if SHIPPED_ID in taken and job.verb == SET_ID:
         yield from _hidden(job)
     return None
+
+
+def _others(job: Job, alone: bool) -> set[int]:
+    """Ids of other servos; when it is alone now, the one as shipped may be its own meanwhile."""
+    return set(job.others) - ({SHIPPED_ID} if alone else set())
 
 
 def _glimpsed(job: Job, place: Place) -> Operation[Seen | None]:
@@ -194,16 +201,8 @@ def _hidden(job: Job) -> Operation[None]:
 
 
 def _called_back(job: Job, course: Course) -> Operation[Seen]:
-    """Give a servo that answers to no id its old one by broadcast, when nobody else is there to hear it."""
+    """Give a servo that answers to no id its old one by broadcast; nobody else is there to hear it."""
     yield from Tune(job.old.rate)
-    others = yield from _anybody()
-    if others:
-        raise RequestError(
-            f"a servo answers as {others[0]}: a broadcast would give it the id {job.old.id} too",
-            expected="no other servo on this bus",
-            advice="take every other servo off this bus; nothing was written",
-            node=others[0],
-        )
     limp = wire.write(wire.BROADCAST, LIMP.address, LIMP.data)
     yield from unanswered(limp, LIMP.effect, rank=Rank.STOP)
     yield from course.reach(WRITING, job.old)
@@ -222,13 +221,26 @@ def _called_back(job: Job, course: Course) -> Operation[Seen]:
     return found[0]
 
 
-def _anybody() -> Operation[Sequence[int]]:
+def _refuse_others(job: Job) -> Operation[None]:
+    """Raise RequestError when somebody answers who cannot be the servo, or more than one does."""
+    yield from Tune(job.old.rate)
     there = []
     for id in range(wire.MAX_ID + 1):
-        answer = yield from outcome(read_block(Node(id), 0, 1, bytes, timeout=Timeout.SCAN))
+        answer = yield from outcome(read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+        if isinstance(answer, LinkLost):
+            raise answer
         if not isinstance(answer, NoReply):
-            there.append(id)
-    return there
+            known = id in _others(job, alone=True)
+            there.append((id, isinstance(answer, bytes) and job.is_it(answer) and not known))
+    others = [id for id, is_it in there if not is_it or len(there) > 1]
+    if others:
+        raise RequestError(
+            f"the servo is not alone: {', '.join(map(str, others))} answer",
+            expected="no other servo on this bus",
+            cause="servos of one kind, set alike, cannot be told apart, and a broadcast reaches them all",
+            advice="take every other servo off this bus; nothing was written",
+            node=others[0],
+        )
 
 
 def _nowhere(job: Job) -> NoReply:

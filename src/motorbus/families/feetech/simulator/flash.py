@@ -70,7 +70,8 @@ class Flash:
     @property
     def busy_until(self) -> float:
         """When the last of them will be done; minus infinity when nothing waits."""
-        self._settle()
+        if self._waiting:
+            self._settle()
         return self._waiting[-1].moment if self._waiting else -inf
 
     def program(self, cells: Iterable[tuple[int, int]], time: float | None = None) -> None:

@@ -17,6 +17,7 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator.personality import (
     HIGH_LIMITS,
     HIGH_VOLTAGE,
+    MOTORS,
     PERSONALITIES,
     Personality,
 )
@@ -67,7 +68,7 @@ def _models() -> Iterator[tuple[str, Model]]:
                 name=known.name.lower(),
                 table=TABLES[name],
                 turn=CONTROL[name].turn,
-                drive=personality.drive,
+                drive=MOTORS.get(known.name.lower(), personality.drive),
                 voltage=personality.voltage,
                 control=CONTROL[name],
                 personality=personality,

@@ -138,6 +138,16 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
 )  # fmt: skip
 """Map -> what its servos are like."""
 
+MOTORS: Final[Mapping[str, Drive]] = MappingProxyType(
+    {
+        # FEETECH data sheet of the STS3250 (A/0): 60 degrees in 0.133 s at 12 V; its currents are assumed.
+        "sts3250": Drive(top_speed=5133.0, idle_current=0.15, stall_current=3.25),
+        # FEETECH data sheet of the SCS15: 55 rpm at 6 V, 1.5 A at stall (7.4 V); its idle current is assumed.
+        "scs15": Drive(top_speed=1126.0, idle_current=0.1, stall_current=1.5),
+    }
+)
+"""Models whose data sheets say more of the motor than its map does."""
+
 HIGH_VOLTAGE: Final = 24.0
 """V, what models with HV in their name are made for."""
 HIGH_LIMITS: Final[Mapping[str, int]] = MappingProxyType({"max_voltage": 250, "min_voltage": 180})

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 from motorbus.core.plant import Drive, Motion
 from motorbus.families.feetech.simulator import thermal
 from motorbus.families.feetech.simulator.effort import Load
+from motorbus.families.feetech.table import AMPERE
 
 if TYPE_CHECKING:
     from motorbus.families.feetech.simulator.body import Body
@@ -179,7 +180,7 @@ class Protection:
 
     def lets_run(self, motion: Motion, drive: Drive) -> bool:
         """Whether a motor that moves so without a burden could trip over nothing."""
-        if self._has[CURRENT] and 0 < self._number("protection_current") < drive.idle_current:
+        if self._has[CURRENT] and 0 < self._servo.memory["protection_current"] < drive.idle_current / AMPERE:
             return False
         if not self._by_duty or not self._has[OVERLOAD]:
             return True
