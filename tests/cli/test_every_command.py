@@ -98,7 +98,6 @@ KST = [
     "kst save BUS#1 --dry-run",
     "set-id BUS#1 1 --yes",
     "set-id BUS#1 9 --dry-run",
-    "set-baud BUS#1 1M --dry-run",
     "recover BUS",
     "kst provision BUS#1 --new-id 1 --yes",
     "kst provision BUS#1 --new-id 9 --new-bitrate 1M --dry-run",

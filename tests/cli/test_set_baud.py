@@ -78,3 +78,14 @@ def test_a_kst_servo_is_provisioned(run: Run) -> None:
         ran = run(*words[:1], f"{simulation.url}#37", *words[2:])
         assert ran.code == 0, ran.err
         assert f"{simulation.url},bitrate=1000000#37" in ran.out
+
+
+def test_a_dry_run_of_a_kst_servo_shows_what_is_written_and_sees_who_else_is_there(run: Run) -> None:
+    with motorbus.simulate("kst", ids="37") as simulation:
+        ran = run("set-baud", f"{simulation.url}#37", "1M", "--dry-run")
+    assert ran.code == 0
+    assert "write bit_rate_code = 7" in ran.out
+    with motorbus.simulate("kst", ids="37-38") as simulation:
+        ran = run("set-baud", f"{simulation.url}#37", "1M", "--dry-run")
+    assert ran.code == 2
+    assert "is not alone" in ran.err

@@ -9,6 +9,7 @@ from motorbus.cli import dry, faces
 from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.target import face, rate_word, takes
+from motorbus.core import units
 from motorbus.core.operation import Progress
 
 if TYPE_CHECKING:
@@ -17,6 +18,16 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Family
+
+
+def said_of_others(among: str, patience: str) -> dict[str, object]:
+    """--among and --patience as the verbs take them, where they were said. Raises RequestError."""
+    from motorbus import session
+
+    return {
+        **({"among": session.parse_ids(among)} if among else {}),
+        **({"patience": units.parse(patience, "time")} if patience else {}),
+    }
 
 
 def rehearsed(

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 app = App(
     name="recover",
     usage="Usage: motorbus recover [BUS] [OPTIONS]",
-    help_epilogue="""`set-id` and `set-baud` write down what they are about to do. When the program is
-killed or the power goes in the middle, this finds the device, finishes the
+    help_epilogue="""`set-id` and `set-baud` write down what they are about to do. When the program
+is killed or the power goes in the middle, this finds the device, finishes the
 change or takes it back, locks the device, and says which. It may be said again
 at any time. A device that answers under no id any more hears broadcasts at the
 most: --alone allows them, when it is the only one on its bus. --forget gives
@@ -68,12 +68,10 @@ def recover(
     options
         Any option of the bus string, as a flag.
     """
-    if not bus:
-        if alone or forget or dry_run or options:
-            raise RequestError("which bus?", expected="BUS, as feetech:/dev/ttyACM0")
-        return _listed(output)
     from motorbus import session
 
+    if not bus:
+        return _listed(output, more=bool(alone or forget or dry_run or options))
     family = target(bus).family
     with opened(target(bus).bus, options, output) as opening:
         change = session.unfinished(opening)
@@ -96,9 +94,11 @@ def recover(
     return Exit.OK
 
 
-def _listed(output: Output) -> Exit:
+def _listed(output: Output, *, more: bool) -> Exit:
     from motorbus import journal
 
+    if more:
+        raise RequestError("which bus?", expected="BUS, as feetech:/dev/ttyACM0")
     found = journal.everywhere()
     output.document("motorbus.recover.list/1", {"changes": [_facts(one) for one in found]})
     rows = [(one.bus, _called(one), one.begun, f"motorbus recover {one.bus}") for one in found]

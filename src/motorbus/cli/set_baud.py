@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.identity import address, agreed, carried_out, rehearsed
+from motorbus.cli.identity import address, agreed, carried_out, rehearsed, said_of_others
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import everyone, face, offers, opened, takes, target
 from motorbus.cli.wording import in_words_of_the_shell
@@ -65,15 +65,10 @@ def set_baud(
     options
         Any option of the bus string, as a flag.
     """
-    from motorbus import session
-
     bus, family, named = target(devices)
     offers(family, "set_baud")
     wanted = units.rate(rate)
-    extra: dict[str, object] = {
-        **({"among": session.parse_ids(among)} if among else {}),
-        **({"patience": units.parse(patience, "time")} if patience else {}),
-    }
+    extra = said_of_others(among, patience)
     with opened(bus, options, output) as opening:
         nodes = everyone(bus, opening, named, output)
         takes(face(opening, nodes[0]), "set_baud", extra)

@@ -7,10 +7,9 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.identity import address, agreed, carried_out, rehearsed
+from motorbus.cli.identity import address, agreed, carried_out, rehearsed, said_of_others
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import device, face, id_shown, offers, opened, takes
-from motorbus.core import units
 from motorbus.errors import RequestError
 
 app = App(
@@ -60,16 +59,11 @@ def set_id(
     options
         Any option of the bus string, as a flag.
     """
-    from motorbus import session
-
     bus, family, (node,) = device(device_)
     offers(family, "set_id")
     wanted = _id(new)
     family.devices.blocking(None, wanted)  # raises when it is no id
-    extra = {
-        **({"among": session.parse_ids(among)} if among else {}),
-        **({"patience": units.parse(patience, "time")} if patience else {}),
-    }
+    extra = said_of_others(among, patience)
     with opened(bus, options, output) as opening:
         takes(face(opening, node), "set_id", extra)
         if dry_run:

@@ -139,6 +139,13 @@ class World:
         """Where the servo is."""
         return Place(self.servo.id, self.servo.baud_rate or 0)
 
+    @property
+    def state(self) -> object:
+        """All that what comes next depends on: the servo's memory, and how far the journal has come."""
+        memory, change = self.servo.memory, self.journal.unfinished()
+        reached = tuple(change.facts["reached"]) if change is not None else ()
+        return bytes(memory.live), bytes(memory.stored), tuple(memory.commits), reached
+
     def run(self, operation: Callable[[Bus], Any], cut: Cut = NEVER) -> Any:
         """A host does this until it is cut; its value, or the error it ended with."""
         self.link = link = Doomed(self, cut, self.rate)

@@ -27,7 +27,7 @@ from tests.families.feetech.maps import eeprom, met, prepares_as, simulated
 
 COUNT = math.tau / 4096
 OFF, OPEN, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
-MIDDLE, DONE = writes(3, 40, 128), (LOCK, LOCKED)
+MIDDLE, DONE, GIVEN_UP = writes(3, 40, 128), (reads(3, 55, 0), LOCK, LOCKED), (LOCK, LOCKED)
 
 
 def pose(position: int, offset: int, sign: int = 0x800) -> tuple[Line, Line]:
@@ -120,7 +120,8 @@ def test_old_sms_have_the_offset_at_33_and_the_lock_at_48() -> None:
     told = play(
         calibrate(Node(3)),
         *(prepares_as("smcl"), *before, OFF, writes(3, 48, 0), *before, MIDDLE, OFF),
-        *(reads(3, 33, 48, 8), reads(3, 56, *low_high(2048)), writes(3, 48, 1), reads(3, 48, 1)),
+        *(reads(3, 33, 48, 8), reads(3, 56, *low_high(2048)), reads(3, 48, 0)),
+        *(writes(3, 48, 1), reads(3, 48, 1)),
     )
     assert (told.how, told.raw_new_offset) == ("switch", -48)
 
@@ -131,7 +132,7 @@ def test_scs2_have_one_byte_for_it_and_the_high_byte_first() -> None:
         calibrate(Node(3)),
         *(prepares_as("scs2"), *before, OFF, writes(3, 48, 0), *before),
         *(writes(3, 34, 100), reads(3, 34, 100), reads(3, 34, 100), reads(3, 56, 2, 0)),
-        *(writes(3, 48, 1), reads(3, 48, 1)),
+        *(reads(3, 48, 0), writes(3, 48, 1), reads(3, 48, 1)),
     )
     assert (told.how, told.raw_new_offset) == ("offset", 100)
     assert told.new_offset == pytest.approx(100 * math.radians(300) / 1024)
@@ -140,7 +141,7 @@ def test_scs2_have_one_byte_for_it_and_the_high_byte_first() -> None:
         calibrate(Node(3)),
         *(prepares_as("scs2"), *below, OFF, writes(3, 48, 0), *below),
         *(writes(3, 34, 0), reads(3, 34, 0), reads(3, 34, 0), reads(3, 56, 2, 0)),
-        *(writes(3, 48, 1), reads(3, 48, 1)),
+        *(reads(3, 48, 0), writes(3, 48, 1), reads(3, 48, 1)),
     )
 
 
@@ -150,7 +151,7 @@ def test_a_servo_that_acknowledges_nothing_is_judged_by_its_readings() -> None:
         calibrate(Node(3)),
         *(level_0, *pose(600, 0), unheard(OFF), reads(3, 40, 0), unheard(OPEN), reads(3, 55, 0)),
         *(*pose(600, 0), unheard(MIDDLE), unheard(OFF), reads(3, 40, 0), *pose(2048, -1448)),
-        *(unheard(LOCK), LOCKED, LOCKED),
+        *(reads(3, 55, 0), unheard(LOCK), LOCKED, LOCKED),
     )
 
 
@@ -174,7 +175,7 @@ def test_one_that_ignores_the_order_is_told_and_locked() -> None:
     played = Played(
         [
             *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-            *(unheard(MIDDLE), OFF, *pose(600, 0), *DONE),
+            *(unheard(MIDDLE), OFF, *pose(600, 0), *GIVEN_UP),
         ]
     )
     with pytest.raises(DeviceError, match="did not change its homing offset") as caught:
@@ -186,7 +187,7 @@ def test_one_that_ignores_the_order_is_told_and_locked() -> None:
 def test_a_reading_that_is_wrong_afterwards_is_told_with_both() -> None:
     script = [
         *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-        *(MIDDLE, OFF, *pose(2048, -1000), *DONE),
+        *(MIDDLE, OFF, *pose(2048, -1000), *GIVEN_UP),
     ]
     played = Played(script)
     with pytest.raises(VerificationFailed, match="does not read as it must") as caught:

@@ -22,7 +22,7 @@ def guarded(name: str, address: int, *data: int) -> list[Line]:
     lock = LOCK_AT[name]
     return [
         *(writes(3, 40, 0), writes(3, lock, 0), writes(3, address, *data), reads(3, address, *data)),
-        *(writes(3, lock, 1), reads(3, lock, 1)),
+        *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
     ]
 
 

@@ -161,7 +161,7 @@ def test_eeprom_is_unlocked_where_its_map_has_the_lock(name: str, lock: int) -> 
         writes(3, 40, 0),
         writes(3, lock, 0),
         *(writes(3, 20, 1), reads(3, 20, 1)),
-        *(writes(3, lock, 1), reads(3, lock, 1)),
+        *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
     )
 
 

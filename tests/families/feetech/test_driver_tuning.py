@@ -26,7 +26,7 @@ OFF = writes(3, 40, 0)
 
 
 def guarded(*lines: Any, lock: int = 55) -> tuple[Any, ...]:
-    return (OFF, writes(3, lock, 0), *lines, writes(3, lock, 1), reads(3, lock, 1))
+    return (OFF, writes(3, lock, 0), *lines, reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1))
 
 
 # -- torque limit --------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ use, see `motorbus.cli.faces`.
 
 from __future__ import annotations
 
-from motorbus.cli.feetech import duplicates, modes, procedures, tables, tuning
+from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, tables, tuning
 from motorbus.cli.feetech.commands import COMMANDS
 from motorbus.cli.feetech.offers import say
 from motorbus.cli.feetech.orders import app
@@ -17,6 +17,7 @@ __all__ = [
     "Train",
     "app",
     "duplicates",
+    "many_turns",
     "modes",
     "move_together",
     "ping_everyone",

@@ -16,6 +16,7 @@ from motorbus.cli.feetech.servo import (
     BusOption,
     Device,
     assigned,
+    both_limits,
     on_servo,
     one_of_ours,
     reads_only,
@@ -85,7 +86,7 @@ def mode(
         Do not ask before the mode is written for good and the servo goes limp.
     """
     one_of_ours(device_)
-    limits = _limits(low, high)
+    limits = both_limits(low, high)
     if not mode_:
         _only_read(limits, dry_run)
 
@@ -110,12 +111,6 @@ def _only_read(limits: tuple[float, float] | None, dry_run: bool) -> None:
     reads_only(dry_run)
     if limits:
         raise RequestError("limits without a mode", expected="MODE, as position", advice="nothing was sent")
-
-
-def _limits(low: str, high: str) -> tuple[float, float] | None:
-    if bool(low) != bool(high):
-        raise RequestError("one limit alone", expected="both --low and --high", advice="nothing was sent")
-    return (units.parse(low, "position"), units.parse(high, "position")) if low else None
 
 
 def _heeds(one: Servo) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.feetech.orders import NAME
 from motorbus.cli.output import Output
 from motorbus.cli.target import Target, device, face, opened
+from motorbus.core import units
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
@@ -93,6 +94,13 @@ def assigned(texts: Sequence[str], names: Collection[str]) -> dict[str, str]:
     if len(dict(pairs)) < len(pairs):
         raise RequestError("a name is there twice", sent=" ".join(texts), advice="nothing was sent")
     return dict(pairs)
+
+
+def both_limits(low: str, high: str) -> tuple[float, float] | None:
+    """Two limits as typed, in rad; None for none. Raises RequestError for one alone, and for what is no angle."""
+    if bool(low) != bool(high):
+        raise RequestError("one limit alone", expected="both --low and --high", advice="nothing was sent")
+    return (units.parse(low, "position"), units.parse(high, "position")) if low else None
 
 
 def facts(told: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Whatever is done to some servos in whatever order, time goes on, bounds hold, and the same seed gives the same film."""
+"""Whatever is done to some servos in whatever order: time goes on, bounds hold, the same seed gives the same film."""
 
 from __future__ import annotations
 
@@ -13,11 +13,17 @@ from tests.families.feetech.simulator.host import ALL, READ, RESTORE, SYNC_WRITE
 MODELS = "sts3215+scs0009+hls3930+sm40blhv+sm60-360m"
 OPTIONS: tuple[dict[str, object], ...] = (
     {},
-    {"overpowered": "yields", "overload_clears": "torque_off", "overload_of": "duty", "backlash": 8, "droop": 50},
+    {
+        "overpowered": "yields",
+        "overload_clears": "torque_off",
+        "overload_of": "duty",
+        "backlash": 8,
+        "droop": 50,
+    },
     {"supply_resistance": 0.6, "brown_out": 5.0, "reply_jitter": 5e-6, "torque_at_power_up": "yes"},
     {"supply_resistance": 0.3, "brown_out": 6.0, "overpowered": "yields", "ambient": 60, "cool_down": 0.1},
 )
-EVENTS = 250
+EVENTS = 120
 
 
 def poke(servo: Servo, dice: Random) -> None:
@@ -64,7 +70,9 @@ def film(seed: int, options: dict[str, object]) -> list[tuple[float, ...]]:
             poke(servo, dice)
         host.say(order(dice))
         host.say(packet(servo.id if servo.id < 254 else ALL, READ, 56, 15))
-        seen.append((servo.motion.position(host.bus.now), servo.duty(host.bus.now), servo.temperature, servo.error))
+        seen.append(
+            (servo.motion.position(host.bus.now), servo.duty(host.bus.now), servo.temperature, servo.error)
+        )
         assert all(map(isfinite, seen[-1]))
         assert abs(seen[-1][1]) <= 1.0
         assert servo.next >= host.bus.now - 1e-9

@@ -11,6 +11,7 @@ from motorbus.families.feetech.driver.blocked import blockers
 from motorbus.families.feetech.driver.bound import Powerless
 from motorbus.families.feetech.driver.calibration import Calibration, Zero, calibrate, zero
 from motorbus.families.feetech.driver.copying import copyable
+from motorbus.families.feetech.driver.counting import ManyTurns, Recounted, many_turns, set_many_turns
 from motorbus.families.feetech.driver.drive import set_current, set_duty, set_velocity, step
 from motorbus.families.feetech.driver.feedback import (
     current,
@@ -62,11 +63,13 @@ __all__ = [
     "Calibration",
     "Gains",
     "GroupResult",
+    "ManyTurns",
     "Node",
     "Positions",
     "Powerless",
     "Promise",
     "Protection",
+    "Recounted",
     "Recovery",
     "Servo",
     "ServoVerbs",
@@ -91,6 +94,7 @@ __all__ = [
     "gains",
     "identify",
     "load",
+    "many_turns",
     "mode",
     "move",
     "ping",
@@ -111,6 +115,7 @@ __all__ = [
     "set_duty",
     "set_gains",
     "set_id",
+    "set_many_turns",
     "set_mode",
     "set_protection",
     "set_torque_limit",

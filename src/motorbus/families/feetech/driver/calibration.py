@@ -234,8 +234,8 @@ def _turned(node: Node, job: _Job, pose: Pose) -> RequestError:
         cause="bit 4 of its phase register is set: it counts turns"
         if counts
         else "it was turned on in another mode",
-        advice="forget the turns first, by a power cycle or clear_turns(). The phase register is the servo's own "
-        "and is never written here; FEETECH's program FD can clear that bit. Nothing was changed",
+        advice="forget the turns first, by a power cycle or clear_turns(); set_many_turns(False) lets it count within "
+        "one turn again. Nothing was changed",
         node=node.node,
     )
 

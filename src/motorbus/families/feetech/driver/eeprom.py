@@ -14,7 +14,8 @@ from typing import Final, TypeVar
 
 from motorbus.core.entry import Table
 from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
-from motorbus.families.feetech.driver.exchanges import Block, confirmed, verified
+from motorbus.errors import OutcomeUnknown
+from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, verified
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.torque import disable_torque
 
@@ -22,6 +23,7 @@ T = TypeVar("T")
 
 _STATUS_RETURN_LEVEL: Final = 8
 _ATTEMPTS: Final = 2
+_OPEN: Final = b"\0"
 
 
 def store(node: Node, table: Table, blocks: Sequence[Block]) -> Operation[None]:
@@ -54,10 +56,27 @@ def _opened(
     try:
         yield from disable_torque(node)
         yield from _put(node, _lock(lock, 0))
-        return (yield from work())
+        done = yield from work()
+        yield from _still_open(node, lock)
+        return done
     except BaseException as error:
         trouble.append(error)
         raise
+
+
+def _still_open(node: Node, lock: int) -> Operation[None]:
+    """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
+    right, and keeps none. Raises OutcomeUnknown."""
+    found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+    if found != _OPEN:
+        raise OutcomeUnknown(
+            f"node {node.node} has closed its EEPROM lock by itself while it was written to",
+            received=found,
+            expected="an open lock, 0",
+            cause="it has lost its supply for a moment, so that what was written may be gone at the next power-off",
+            advice="see that its supply stays on, then write it again",
+            node=node.node,
+        )
 
 
 def stored(node: Node, block: Block) -> Operation[None]:

@@ -7,6 +7,7 @@ from motorbus.families.feetech.driver import (
     alarm,
     blocked,
     calibration,
+    counting,
     drive,
     feedback,
     identity,
@@ -65,6 +66,8 @@ class ServoVerbs(Node):
     calibrate = verb(calibration.calibrate)
     zero = verb(calibration.zero)
     clear_turns = verb(turns.clear_turns)
+    many_turns = verb(counting.many_turns)
+    set_many_turns = verb(counting.set_many_turns)
     torque_limit = verb(tuning.torque_limit)
     set_torque_limit = verb(tuning.set_torque_limit)
     gains = verb(tuning.gains)

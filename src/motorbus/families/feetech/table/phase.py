@@ -68,6 +68,11 @@ def many_turns_are_told(phase: int, register_map: str = "sts") -> bool:
     return _says(_STS[_TURNS], _TURNS, register_map) and bool(phase >> _TURNS & 1)
 
 
+def with_many_turns_told(phase: int, told: bool) -> int:
+    """This phase byte of a servo with that one bit set or cleared (bit 4); all others stay as they are."""
+    return phase | 1 << _TURNS if told else phase & ~(1 << _TURNS)
+
+
 def tells_current(phase: int, register_map: str = "sts") -> bool:
     """Whether the present current means anything: not with the integrated bridge of STS (bit 5), nor on SCS."""
     if register_map == "scs":

@@ -182,7 +182,7 @@ def _alone_here(job: Job, where: Place) -> Operation[None]:
     """A servo that comes back at another rate breaks the frames of those that stay at this one."""
     there: set[int] = set()
     for extended in sorted(job.old.dialect.formats):
-        there |= {reply.lane for reply in (yield from called(extended)).replies}
+        there |= {reply.lane for reply in (yield from called(extended, Rank.POLL)).replies}
     others = ", ".join(map(hexadecimal, sorted(there - {job.old.node, job.new.node})))
     if others:
         raise RequestError(
