@@ -108,7 +108,11 @@ class Doomed(MemoryLink):
 
 @dataclass
 class World:
-    """Devices that outlive their hosts, and the journal on the disk."""
+    """Devices that outlive their hosts, and the journal on the disk.
+
+    Among the options: `ids`, the old one and the new one, and `volatile`, a setting that was written while the lock was
+    closed, so that the next power-off loses it; the others are the simulator's.
+    """
 
     verb: str
     options: dict[str, Any]
@@ -121,18 +125,22 @@ class World:
 
     def __post_init__(self) -> None:
         options = dict(self.options)
-        self.devices = simulate((OLD, STRANGER), options.pop("model", ""), **options)
+        self.ids: tuple[int, int] = options.pop("ids", (OLD, NEW))
+        volatile = options.pop("volatile", False)
+        self.devices = simulate((self.ids[0], STRANGER), options.pop("model", ""), **options)
         self.servo = self.devices.servos[0]
+        if volatile:
+            self.servo.memory["max_temperature"] = 60
         self.rate = self.servo.baud_rate or 0
         self.other_rate = 500_000 if self.rate != 500_000 else 250_000
 
     @property
     def old(self) -> Place:
-        return Place(OLD, self.rate)
+        return Place(self.ids[0], self.rate)
 
     @property
     def new(self) -> Place:
-        return Place(NEW, self.rate) if self.verb == SET_ID else Place(OLD, self.other_rate)
+        return Place(self.ids[1], self.rate) if self.verb == SET_ID else Place(self.ids[0], self.other_rate)
 
     @property
     def place(self) -> Place:
@@ -171,9 +179,10 @@ class World:
 
     def change(self, bus: Bus) -> None:
         """The guarded part of `set_id` or `set_baud`; what it looks at before changes nothing."""
-        node = Node(OLD)
+        node = Node(self.ids[0])
+        cut, self.link.cut = self.link.cut, NEVER
         bus.run(prepare(node))
-        self.link.left, self.link.sent = 0, []
+        self.link.cut, self.link.left, self.link.sent = cut, 0, []
         bus.run(iter(Alone(changed(self.job(), node, Course(self.job())))))
 
     def job(self) -> Job:
@@ -184,7 +193,7 @@ class World:
         change = self.journal.unfinished()
         if change is None:
             return None
-        return bus.run(recover(Node(OLD), change.verb, change.facts, alone=alone))
+        return bus.run(recover(Node(change.node), change.verb, change.facts, alone=alone))
 
     def faults(self, outcome: object) -> list[str]:
         """What is not as it must be in the end, a power cycle included; `outcome` is what the recovery has said."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
 
+import motorbus
+from motorbus import session
 from motorbus.core.operation import INTENT, Data, Journal
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver.placing import called
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
+from motorbus.simulation.named import Simulation
 from tests.families.feetech.cuts import NEVER, VERBS, Cut, Doomed, World
 
 
@@ -149,3 +153,57 @@ def test_the_journal_of_another_change_stays_open(interrupted: bool, monkeypatch
     assert change.facts["node"] == 9
     assert world.place == world.old
     assert world.servo.memory.wear.total() == 0
+
+
+def meanwhile(simulation: Simulation, *changes: tuple[int, str, int]) -> list[Any]:
+    """Several tasks of one program, each changing a servo (id, verb, value); what each of them ended with."""
+
+    async def work() -> list[Any]:
+        async with motorbus.open_async(simulation.url) as bus:
+            asked = [
+                getattr(motorbus.feetech.AsyncServo(bus, id), verb)(value, among=range(10))
+                for id, verb, value in changes
+            ]
+            ends = await asyncio.gather(*asked, return_exceptions=True)
+            assert session.unfinished(bus) is None
+            return ends
+
+    return asyncio.run(work())
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_two_that_are_changed_at_once_do_not_meet(verb: str) -> None:
+    """What was looked over before is looked at once more when nobody else has the bus."""
+    with motorbus.simulate("feetech", ids="1+2+3") as simulation:
+        simulation[1].raw_position, simulation[2].raw_position = 100, 3000
+        first, second = simulation[1], simulation[2]
+        if verb == "set_id":
+            ends = meanwhile(simulation, (1, verb, 7), (2, verb, 7))
+            assert first.id != second.id
+        else:
+            ends = meanwhile(simulation, (1, verb, 500_000), (1, verb, 115_200))
+        (failed,) = [end for end in ends if isinstance(end, Exception)]
+        assert isinstance(failed, RequestError)
+        assert first.locked
+        assert second.locked
+        assert first.memory.wear.total() + second.memory.wear.total() == 1
+
+
+def test_one_that_is_changed_twice_at_once_is_changed_once() -> None:
+    with motorbus.simulate("feetech", ids="1+2") as simulation:
+        ends = meanwhile(simulation, (1, "set_id", 7), (1, "set_id", 8))
+        (failed,) = [end for end in ends if isinstance(end, Exception)]
+        assert isinstance(failed, RequestError)
+        assert "not what it was a moment ago" in failed.summary
+        (one,) = [id for id in (7, 8) if id in simulation.simulator.nodes]
+        assert simulation[one].memory.wear.total() == 1
+        assert simulation[one].locked
+
+
+def test_one_that_gets_the_id_as_shipped_meanwhile_is_noticed() -> None:
+    """A servo whose id is torn would join it there."""
+    with motorbus.simulate("feetech", ids="3+4") as simulation:
+        ends = meanwhile(simulation, (4, "set_id", 1), (3, "set_id", 7))
+        ids = sorted(simulation.simulator.nodes)
+        failed = [end for end in ends if isinstance(end, Exception)]
+        assert (len(failed), ids) in ((1, [1, 3]), (0, [1, 7]))

@@ -201,18 +201,26 @@ CHANGES: dict[str, Callable[[Any], object]] = {
 }
 
 
+MOVING = (9, 18, 31, 33)
+"""Where the writes begin that would move a servo with torque; 128 to the torque switch is another."""
+
+
 @pytest.mark.parametrize("at", range(14))
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_servo_that_restarts_with_its_torque_on_is_not_moved_by_a_setting(change: str, at: int) -> None:
-    """Whichever packet its supply fails in front of: it is made limp again, and it stands where it stood."""
+    """Whichever packet its supply fails in front of, but the very one that would move it: nothing is written that would
+    move a servo with torque, it is made limp again, and it stands where it stood."""
     with simulated("sts", torque_at_power_up="yes") as (real, servo):
         servo.prepare()
         line, write, packets = servo.bus.link, servo.bus.link.write, []
+        torque: list[int] = []
 
         def wrote(data: bytes) -> None:
             packets.append(data)
             if len(packets) == at + 1:
                 real.power_cycle()
+            elif data[4] == 3 and (data[5] in MOVING or data[5:7] == b"\x28\x80"):
+                torque.append(real.memory["torque_enable"])
             write(data)
 
         line.write = wrote
@@ -223,9 +231,10 @@ def test_a_servo_that_restarts_with_its_torque_on_is_not_moved_by_a_setting(chan
         except MotorbusError as error:
             failure = error
         line.write = write
-        opened = next(n for n, data in enumerate(packets) if data[4:7] == bytes((3, 55, 0)))
+        begun = next(n for n, data in enumerate(packets) if data[4:7] in (b"\x03\x37\0", b"\x03\x28\0"))
         closed = next(n for n, data in enumerate(packets) if data[4:7] == bytes((3, 55, 1)))
-        if opened < at < closed - 1:
+        assert not any(torque)
+        if begun < at < closed - 1:
             assert failure is not None
             assert real.memory["torque_enable"] == 0
         servo.bus.run(iter(Pause(2.0)))

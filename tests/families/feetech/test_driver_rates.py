@@ -106,6 +106,16 @@ def test_an_id_that_is_taken_at_that_rate_is_refused() -> None:
         assert wear(simulation) == 0
 
 
+@pytest.mark.parametrize("code", [4, 7, 9])
+def test_a_twin_at_a_third_rate_is_refused(code: int) -> None:
+    """A servo whose rate is torn might join it there, and would not be told from it."""
+    with motorbus.simulate("feetech", ids=(3, 3)) as simulation:
+        simulation.simulator.servos[1].memory["baud_rate"] = code  # type: ignore[attr-defined]
+        with pytest.raises(RequestError, match=f"the id 3 is taken at {BAUD_CODES[code]} bit/s"):
+            tuned(simulation, 500_000)
+        assert wear(simulation) == 0
+
+
 def test_two_with_its_id_are_refused() -> None:
     with motorbus.simulate("feetech", ids=(3, 3)) as simulation:
         simulation.simulator.servos[1].raw_position = 700  # type: ignore[attr-defined]

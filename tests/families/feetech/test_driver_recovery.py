@@ -264,3 +264,70 @@ def test_facts_of_something_else_are_refused_and_nothing_is_sent() -> None:
         with pytest.raises(RequestError, match="not the facts"):
             motorbus.feetech.Servo(bus, 3).recover(SET_ID, {"node": 3})
         assert 3 not in bus.statistics.nodes
+
+
+@pytest.mark.parametrize(("old", "torn"), [(3, False), (3, True), (1, False)])
+def test_a_setting_that_was_lost_with_the_supply_does_not_hinder(old: int, torn: bool) -> None:
+    """Written while the lock was closed, so the journal has it and the servo has not."""
+    world = World(SET_ID, {"torn": "erased", "ids": (old, 7), "volatile": True})
+    world.run(world.change, Cut(moment=0.01, supply=True) if torn else Cut(record=1, kept=True, supply=True))
+    outcome = world.run(world.recovery)
+    assert outcome == "old"
+    assert world.faults(outcome) == []
+    assert world.servo.memory["max_temperature"] == 70
+
+
+def test_a_recovery_that_fails_closes_the_lock_it_has_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(SET_ID, {"ids": (1, 7)})
+    world.run(world.change, Cut(record=1, kept=True, supply=True))
+    monkeypatch.setattr("motorbus.families.feetech.driver.jobs.Job.is_at", lambda *_: False)
+    failed = world.run(world.recovery)
+    assert isinstance(failed, OutcomeUnknown)
+    assert (world.servo.id, world.servo.locked) == (1, True)
+    assert world.journal.unfinished() is not None
+
+
+@pytest.mark.parametrize("id", [1, 7])
+def test_one_at_another_rate_is_somebody_else_when_an_id_was_changed(id: int) -> None:
+    """Its rate is not touched by that, so it is not looked for at any other."""
+    with motorbus.simulate("feetech", ids=f"3+{id}") as simulation:
+        begin(simulation, "writing 7")
+        other = simulation[id]
+        other.memory["baud_rate"] = other.memory.stored[6] = 4
+        simulation[3].unplug()
+        with pytest.raises(NoReply, match="is nowhere"):
+            end(simulation)
+        assert (other.id, other.memory.wear.total()) == (id, 0)
+
+
+def test_an_hls_servo_whose_second_id_would_follow_is_found_before_anything_is_written() -> None:
+    with motorbus.simulate("feetech", ids="3+9", model="sts3215+hls3925") as simulation:
+        begin(simulation, "writing 7", others=[9])
+        simulation[9].memory["second_id"] = 1
+        servo = simulation[3]
+        servo.memory.stored[5] = 0xFF
+        servo.power_cycle()
+        with pytest.raises(RequestError, match="servo 9 has 1 as its second id"):
+            end(simulation)
+        assert (servo.id, simulation[9].id) == (1, 9)
+        assert is_open(simulation)
+        effects.write(simulation[9], 7, b"\x09", 0.0)
+        assert end(simulation) == "old"
+        assert (servo.id, simulation[9].id) == (3, 9)
+
+
+def test_facts_on_a_bus_whose_journal_is_closed_are_kept_there_whole() -> None:
+    """What fails there can be said again, and what was reached before is not forgotten."""
+    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.simulate("feetech", ids="4") as other:
+        begin(simulation, "writing 7")
+        with motorbus.open(simulation.url) as bus:
+            change = session.unfinished(bus)
+            assert change is not None
+        with motorbus.open(other.url) as bus:
+            with pytest.raises(NoReply):
+                motorbus.feetech.Servo(bus, 3).recover(change.verb, change.facts)
+            kept = session.unfinished(bus)
+            assert kept is not None
+            assert kept.facts == {**change.facts, "reached": [INTENT, "writing 7", "recovering"]}
+        with pytest.raises(NoReply):
+            end(other)

@@ -26,6 +26,11 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"eeprom_commit": "after_ack"},
     {"lock_drops": True},
     {"startup_time": 0.3},
+    {"eeprom_commit": "after_ack", "lock_drops": True},
+    {"volatile": True},
+    {"ids": (1, 7), "volatile": True},
+    {"ids": (3, 1)},
+    {"ids": (3, 1), "volatile": True, "eeprom_commit": "after_ack"},
 )
 FEW = 24
 """Cuts of one kind of servo in `make test`."""
@@ -77,11 +82,11 @@ def test_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds) -> Non
         print(f"\n{verb} of {model}: {counted} cuts, each ended old or new, reachable and locked")
 
 
-def wrecks(verb: str, model: str, torn: str) -> list[Cut]:
+def wrecks(verb: str, options: dict[str, Any]) -> list[Cut]:
     """One first cut for each different state that any first cut leaves behind with the journal open."""
     found: dict[object, Cut] = {}
-    for cut in cuts(partial(World, verb, {"model": model, "torn": torn}), changing):
-        world = World(verb, {"model": model, "torn": torn})
+    for cut in cuts(partial(World, verb, options), changing):
+        world = World(verb, options)
         world.run(world.change, cut)
         if world.journal.unfinished() is not None:
             found.setdefault(world.state, cut)
@@ -94,11 +99,14 @@ def wrecks(verb: str, model: str, torn: str) -> list[Cut]:
 def test_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds) -> None:
     """From every state that a first cut can leave, each cut of the recovery, and a recovery after that."""
     counted, states = 0, 0
-    for torn in TORN if is_thorough(rounds) else TORN[-1:]:
-        for first in wrecks(verb, model, torn):
+    more = {"torn": "erased", **SETTINGS[1 + MODELS.index(model) % (len(SETTINGS) - 1)]}
+    kinds = [*({"torn": torn} for torn in TORN), more] if is_thorough(rounds) else [{"torn": TORN[-1]}]
+    for kind in kinds:
+        options = {"model": model, **kind}
+        for first in wrecks(verb, options):
 
-            def wreck(first: Cut = first, torn: str = torn) -> World:
-                world = World(verb, {"model": model, "torn": torn})
+            def wreck(first: Cut = first, options: dict[str, Any] = options) -> World:
+                world = World(verb, options)
                 world.run(world.change, first)
                 return world
 
@@ -107,7 +115,7 @@ def test_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds) ->
             for second in seconds if is_thorough(rounds) else some(seconds, 2, 5 * states):
                 world = wreck()
                 world.run(world.recovery, second)
-                assert ended(world) == [], f"{torn} {first} {second}"
+                assert ended(world) == [], f"{kind} {first} {second}"
                 counted += 1
     assert states > 3
     if is_thorough(rounds):
@@ -128,6 +136,16 @@ def test_uncut_it_is_new_and_cut_before_the_intent_it_is_old(verb: str) -> None:
     assert world.place == world.old
     assert world.journal.unfinished() is None
     assert world.servo.memory.wear.total() == 0
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_very_first_packet_of_the_change_is_cut_too(verb: str) -> None:
+    """What is read before the change begins is no part of it, and is not cut in its place."""
+    world = World(verb, {})
+    world.run(world.change, Cut(byte=0))
+    change = world.journal.unfinished()
+    assert change is not None
+    assert change.facts["reached"] == [INTENT]
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -32,6 +32,7 @@ T = TypeVar("T")
 
 _STATUS_RETURN_LEVEL: Final = 8
 _ATTEMPTS: Final = 2
+_LIMITS: Final = ("min_position_limit", "max_position_limit")
 _OPEN: Final = b"\0"
 _IDLE: Final = b"\0"
 
@@ -72,9 +73,10 @@ def _alone(node: Node, lock: int, pending: int, work: Callable[[], Operation[T]]
 
 
 def moves(table: Table, block: Block) -> bool:
-    """Whether one of the registers of this block would move a servo that has torque."""
+    """Whether one of the registers of this block would move a servo that has torque, which goes back inside limits."""
     end = block.address + len(block.data)
-    return any(row.effect is Effect.MOTION and block.address <= row.address < end for row in table.values())
+    rows = [row for row in table.values() if block.address <= row.address < end]
+    return any(row.effect is Effect.MOTION or row.name in _LIMITS for row in rows)
 
 
 def _opened(

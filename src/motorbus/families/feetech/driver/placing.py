@@ -22,7 +22,9 @@ from motorbus.families.feetech.driver.torque import disable_torque
 
 COMMIT: Final = 0.1
 """s until a cell is written and whatever was said of it has come: 21 ms were exceeded by a write to flash (a public
-recovery tool for STS3215), at least 50 ms are to be left after a change of id or rate (feetech-cli)."""
+recovery tool for STS3215), at least 50 ms are to be left after a change of id or rate (feetech-cli). A
+servo that acknowledges first, takes longer than this to store, and drops what is not stored when its lock closes, would
+lose the write unseen; none is known."""
 AWAKE: Final = 0.05
 """s between two looks at a servo that may still be starting."""
 LOOKS: Final = 3
