@@ -19,6 +19,7 @@ from motorbus.families.stepper.table.codes import (
     after_step,
     step_output_of,
 )
+from motorbus.families.stepper.table.edits import Edit, edited, edits
 from motorbus.families.stepper.table.image import (
     BLANK,
     Order,
@@ -86,6 +87,7 @@ __all__ = [
     "TABLES",
     "UNITS",
     "Direction",
+    "Edit",
     "Order",
     "OutputPort",
     "Project",
@@ -100,6 +102,8 @@ __all__ = [
     "decode_image",
     "differences",
     "dump_offset",
+    "edited",
+    "edits",
     "encode_image",
     "is_allowed",
     "refusal",
