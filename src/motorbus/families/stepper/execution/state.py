@@ -90,13 +90,19 @@ class State:
 
     def position(self, at: float) -> int:
         """Where the motor is at this moment, in pulses."""
-        if self.motion is None:
+        motion = self.motion
+        if motion is None:
             return self.base
-        return self.base + self.motion.sign * self.motion.done(at - self.since)
+        # late in a long run a difference of two moments is not exactly the duration any more
+        over = motion.pulses is not None and at >= self.until
+        done = motion.pulses if over else motion.done(at - self.since)
+        return self.base + motion.sign * (done or 0)
 
     def frequency(self, at: float) -> float:
         """Pulses per second at this moment, negative in reverse."""
-        return self.motion.sign * self.motion.frequency(at - self.since) if self.motion is not None else 0.0
+        if self.motion is None or at >= self.until:
+            return 0.0
+        return self.motion.sign * self.motion.frequency(at - self.since)
 
     @property
     def busy(self) -> bool:

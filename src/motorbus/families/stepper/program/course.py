@@ -11,14 +11,14 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import USUAL, Behaviour, Happening, Phase, State
 from motorbus.families.stepper.table import Project
 
-MOST: int = 100_000
+MOST: Final = 100_000
 """Phases that a course may have; an endless project is cut off by its passes long before."""
 
 
@@ -71,11 +71,17 @@ class Course:
 
 
 def course(
-    project: Project, how: Behaviour = USUAL, *, wait: float = 1.0, passes: int = 1, held: float = 0.1
+    project: Project,
+    how: Behaviour = USUAL,
+    *,
+    wait: float = 1.0,
+    passes: int = 1,
+    held: float = 0.1,
+    most: int = MOST,
 ) -> Course:
     """Run a project with an operator who takes `wait` s at each input and holds it for `held` s.
 
-    An endless project is cut off after so many `passes`. Raises RequestError when it has more than 100 000 phases.
+    An endless project is cut off after so many `passes`. Raises RequestError when it has more than `most` phases.
     """
     state = execution.power_on(0.0, how).state
     found = execution.start(state, project, 0.0)
@@ -86,9 +92,9 @@ def course(
             break
         if end > begin:
             stretches.append(Stretch(begin, end, now))
-        if len(stretches) > MOST:
+        if len(stretches) > most:
             raise RequestError(
-                f"this project has more than {MOST} phases",
+                f"this project has more than {most} phases",
                 advice="draw one pass: lower `repeat` or the loop count",
             )
     end = stretches[-1].end if stretches else 0.0

@@ -80,12 +80,12 @@ def write(source: Source) -> str:
     """
     project, expert = source.project, source.expert or _needs_expert(source.project)
     steps = _filled(project)
-    _refuse(replace(project, total_steps=max(steps, 1)), expert)
     _refuse(project, expert)
+    _refuse(replace(project, total_steps=steps), expert)
     _check_loop(project)
     lines = [f"format = {FORMAT}"]
     lines += [f"name = {_quoted(source.name)}"] if source.name else []
-    lines += [f"project = {project.number}"] if project.number else []
+    lines += [f"project = {project.number}"]
     lines += ['repeat = "endless"' if project.is_endless else f"repeat = {project.project_loop}"]
     lines += [f"total_steps = {project.total_steps}"] if steps > project.total_steps else []
     lines += ["expert = true"] if expert else []
@@ -267,6 +267,8 @@ def _step(
 
 
 def _refuse(project: Project, expert: bool, *, steps: bool = True) -> None:
+    if (none := refusal("project", project.number)) is not None:
+        raise refuse(none.summary, none.expected)
     for error in refusals(project if steps else replace(project, total_steps=1), expert=expert):
         raise refuse(error.summary, error.expected, error.cause)
 
@@ -309,11 +311,16 @@ def _motor_lines(source: Source) -> Iterator[str]:
 
 
 def _step_lines(step: Step, source: Source) -> Iterator[str]:
-    yield f'move = "{"-" if step.direction else ""}{step.distance} units"'
-    yield f'speed = "{step.speed} rpm"'
-    yield f'start = "{step.start_frequency} Hz"'
-    yield f'acceleration = "{step.acceleration} Hz"'
-    yield f'delay = "{step.delay} ms"'
+    if step.distance or step.direction:
+        yield f'move = "{"-" if step.direction else ""}{step.distance} units"'
+    if step.distance or step.speed:
+        yield f'speed = "{step.speed} rpm"'
+    if step.start_frequency:
+        yield f'start = "{step.start_frequency} Hz"'
+    if step.acceleration:
+        yield f'acceleration = "{step.acceleration} Hz"'
+    if step.delay:
+        yield f'delay = "{step.delay} ms"'
     if step.output:
         yield f"output = {_quoted(names.output_name(step.output, source.outputs))}"
     if step.start_input:
