@@ -106,6 +106,11 @@ def set_output(state: State, port: int, level: int, at: float) -> Next:
     return turn.result()
 
 
+def set_stop_mode(state: State, mode: int) -> Next:
+    """From now on a stop is slow (0) or immediate (1); one that is under way goes on as it began."""
+    return Next(replace(state, stop_mode=mode))
+
+
 def power_on(
     at: float,
     how: Behaviour = USUAL,
