@@ -16,6 +16,8 @@ from motorbus.families.stepper.simulator.memory import Memory, Rows
 from motorbus.families.stepper.simulator.switches import Switches
 from motorbus.families.stepper.table import EDITS, HOME_INPUT, PROJECTS, Project, is_allowed
 
+_WHICH: Final = frozenset({"project", "step", "port"})
+"""Numbers that say of what; of what there is not, nothing can be acknowledged."""
 LOG: Final = 1000
 """Remarks that are kept; the oldest go first."""
 
@@ -182,13 +184,11 @@ class Controller:
         if request.motor not in (0, self.switches.motor):
             return self.remark(f"motor {request.motor} is another one")
         name, values = request.command.name, request.values
-        for field, value in values.items():
-            if not is_allowed(field, value, expert=True):
-                self.remark(f"{name}: {field} {value} is out of range")
-                bad_step = field == "step"
-                return (
-                    SILENCE if self.switches.out_of_range == "silent" or bad_step else Said(self._reply(data))
-                )
+        wrong = [field for field, value in values.items() if not is_allowed(field, value, expert=True)]
+        if wrong:
+            self.remark(f"{name}: {wrong[0]} {values[wrong[0]]} is out of range")
+            ignored = self.switches.out_of_range == "ack" and not _WHICH & set(wrong)
+            return Said(self._reply(data)) if ignored else SILENCE
         if name in EDITS:
             return self._edit(data, name, values, at)
         return self._act(data, name, values, at)
