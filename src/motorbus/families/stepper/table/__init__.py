@@ -19,7 +19,7 @@ from motorbus.families.stepper.table.codes import (
     after_step,
     step_output_of,
 )
-from motorbus.families.stepper.table.edits import Edit, edited, edits
+from motorbus.families.stepper.table.edits import Edit, edited, edits, edits_between
 from motorbus.families.stepper.table.image import (
     BLANK,
     Order,
@@ -104,6 +104,7 @@ __all__ = [
     "dump_offset",
     "edited",
     "edits",
+    "edits_between",
     "encode_image",
     "is_allowed",
     "refusal",

@@ -47,6 +47,20 @@ def edits(project: Project, *, rows: int | None = None) -> list[Edit]:
     return found
 
 
+def edits_between(before: Project, after: Project) -> list[Edit]:
+    """The commands that make one project of another, none when nothing differs; the first one selects it.
+
+    Only for who knows what the controller holds. Rows that are carried out by either of them are compared.
+    """
+    rows = min(max(before.total_steps, after.total_steps), STEPS)
+    pairs = zip(edits(before, rows=rows), edits(after, rows=rows), strict=True)
+    found = [new for old, new in pairs if old != new]
+    if not found:
+        return []
+    first = edits(after)[0]
+    return found if found[0] == first else [first, *found]
+
+
 def edited(project: Project, command: str, values: Mapping[str, int]) -> Project:
     """The project after a command that sets parameters; a step that has no row changes nothing.
 
