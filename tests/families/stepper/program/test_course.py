@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import pairwise
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour
-from motorbus.families.stepper.program import course
+from motorbus.families.stepper.program import course, picture
 from motorbus.families.stepper.table import Project, Step, decode_image
 from tests.families.stepper.execution.course import project, step
 from tests.families.stepper.vectors import DUMP_B
@@ -88,3 +89,33 @@ def test_the_readings_are_those_of_the_machine() -> None:
     how = Behaviour(seg_loop="extra")
     orders = [one.step for one in course(B, how, wait=0.0).told if one.kind == "begins"]
     assert orders == [place.step for place in execution.one_pass(B, how)] * 3
+
+
+# --- what one draws of it ------------------------------------------------------------------------------------------
+
+
+def test_a_picture_has_units_people_read() -> None:
+    run = course(B, wait=1.0)
+    in_turns = picture(run, B)
+    assert list(in_turns.curves) == ["position (turns)", "speed (rpm)"]
+    assert in_turns.curves["position (turns)"][-1] == pytest.approx(-61734 / 6400)
+    assert max(in_turns.curves["speed (rpm)"]) == pytest.approx(300)
+    in_mm = picture(run, B, lead=Fraction(5))
+    assert in_mm.curves["position (mm)"][-1] == pytest.approx(-61734 / 6400 * 5)
+
+
+def test_lanes_have_the_names_of_the_file_and_those_that_never_change_are_left_out() -> None:
+    run = course(B, wait=1.0)
+    assert list(picture(run, B).lanes) == ["output 1", "input 1"]
+    named = picture(run, B, inputs={"tray": 1, "part": 2}, outputs={"gripper": 1, "lamp": 3})
+    assert list(named.lanes) == ["gripper", "lamp", "tray", "part"]
+    assert any(named.lanes["gripper"])
+    assert not any(named.lanes["part"])
+    assert {len(lane) for lane in named.lanes.values()} == {len(named.times)}
+
+
+def test_spans_are_the_steps_and_their_waits() -> None:
+    spans = picture(course(B, wait=1.0), B).spans
+    assert [name for _, _, name, _ in spans] == ["1", "wait", "2", "3", "wait", "2", "3"] * 3
+    assert [waiting for _, _, _, waiting in spans[:3]] == [False, True, False]
+    assert all(one[1] == other[0] for one, other in pairwise(spans))

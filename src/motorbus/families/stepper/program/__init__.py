@@ -20,7 +20,7 @@ from motorbus.errors import LinkError, RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
-from motorbus.families.stepper.program.course import Course, Stretch, course
+from motorbus.families.stepper.program.course import Course, Picture, Stretch, course, picture
 from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, Finding, Rule, lint, net_units
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
 from motorbus.families.stepper.program.schema import schema
@@ -127,6 +127,11 @@ class Program:
         """What it does over time, with an operator who takes `wait` s at each input."""
         return course(self.project, how, wait=wait, passes=passes)
 
+    def picture(self, how: Behaviour = USUAL, *, wait: float = 1.0, passes: int = 1) -> Picture:
+        """What one draws of it, by the names of the file: `motorbus.plot.sequence` takes it."""
+        run = self.course(how, wait=wait, passes=passes)
+        return picture(run, self.project, inputs=self.inputs, outputs=self.outputs, lead=self.lead)
+
 
 __all__ = [
     "RULES",
@@ -134,6 +139,7 @@ __all__ = [
     "Course",
     "Estimate",
     "Finding",
+    "Picture",
     "Plan",
     "Program",
     "Rule",
@@ -144,6 +150,7 @@ __all__ = [
     "estimate",
     "lint",
     "net_units",
+    "picture",
     "plan",
     "schema",
 ]

@@ -8,15 +8,16 @@ as well as four seconds.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import inf
 from typing import Any, Final, NamedTuple
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import USUAL, Behaviour, Happening, Phase, State
-from motorbus.families.stepper.table import Project
+from motorbus.families.stepper.table import INPUTS, OUTPUTS, Project
 
 MOST: Final = 100_000
 """Phases that a course may have; an endless project is cut off by its passes long before."""
@@ -68,6 +69,76 @@ class Course:
                 columns["outputs"].append(state.outputs)
                 columns["inputs"].append(sorted(state.inputs))
         return columns
+
+
+class Picture(NamedTuple):
+    """A course as one draws it: times (s), curves by the label of their axis, lanes, and spans.
+
+    A span is when it begins, when it ends, what stands above it, and whether it is a wait.
+    """
+
+    times: list[float]
+    curves: dict[str, list[float]]
+    lanes: dict[str, list[bool]]
+    spans: list[tuple[float, float, str, bool]]
+
+
+def picture(
+    course: Course,
+    project: Project,
+    *,
+    inputs: Mapping[str, int] | None = None,
+    outputs: Mapping[str, int] | None = None,
+    lead: Fraction | None = None,
+    count: int = 1000,
+) -> Picture:
+    """What one draws of a course: position in turns (mm where a `lead` is given), speed in RPM, outputs and inputs.
+
+    Outputs and inputs are called by their names; those that never change and have none are left out.
+    """
+    columns = course.samples(count)
+    turn = float(project.pulses_per_turn or 1)
+    scale, label = (float(lead) / turn, "position (mm)") if lead else (1 / turn, "position (turns)")
+    curves = {
+        label: [pulses * scale for pulses in columns["pulses"]],
+        "speed (rpm)": [hertz * 60 / turn for hertz in columns["hertz"]],
+    }
+    lanes: dict[str, list[bool]] = {}
+    for port in range(1, OUTPUTS + 1):
+        levels = [bool(bits >> port - 1 & 1) for bits in columns["outputs"]]
+        _lane(
+            lanes, _called(port, "output", outputs), levels, named=bool(outputs and port in outputs.values())
+        )
+    for port in range(1, INPUTS + 1):
+        levels = [port in active for active in columns["inputs"]]
+        _lane(lanes, _called(port, "input", inputs), levels, named=bool(inputs and port in inputs.values()))
+    return Picture(columns["time"], curves, lanes, _spans(course))
+
+
+def _called(port: int, kind: str, names: Mapping[str, int] | None) -> str:
+    return next((name for name, other in (names or {}).items() if other == port), f"{kind} {port}")
+
+
+def _lane(lanes: dict[str, list[bool]], name: str, levels: list[bool], *, named: bool) -> None:
+    if named or any(levels):
+        lanes[name] = levels
+
+
+def _spans(course: Course) -> list[tuple[float, float, str, bool]]:
+    """One for each execution of a step, its wait apart."""
+    spans: list[tuple[float, float, str, bool]] = []
+    before: object = None
+    for begin, end, state in course.stretches:
+        run = state.run
+        waiting = state.phase is Phase.WAIT
+        mark = (run.place, run.round, waiting) if run else None
+        name = "wait" if waiting else str(run.place.step if run else "")
+        if mark == before and spans:
+            spans[-1] = (spans[-1][0], end, name, waiting)
+        else:
+            spans.append((begin, end, name, waiting))
+        before = mark
+    return spans
 
 
 def course(
