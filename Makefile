@@ -36,6 +36,7 @@ bench: $(READY) $(PEERS)
 docs: $(READY)
 	$(BIN)/python -m scripts.coverage
 	$(BIN)/python -m scripts.feetech_registers
+	$(BIN)/python -m scripts.feetech_peers
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters

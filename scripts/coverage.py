@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -49,19 +49,45 @@ class Command(NamedTuple):
     map: str = ""
 
 
+class Unsent(NamedTuple):
+    """An instruction that is known and never sent, and why.
+
+    `vectors`   frames of it, by their names in tests/vectors
+    `encoder`   the function of the family's wire that refuses it, called with `arguments`
+    `simulator` what a simulated device does instead of answering; `switch` names the switch of the simulator, if there
+                is one, by which it answers when that is set to `answers`
+    """
+
+    name: str
+    source: str
+    because: str
+    vectors: tuple[str, ...]
+    encoder: str
+    arguments: tuple[int, ...]
+    simulator: str
+    test: str
+    switch: str = ""
+    answers: str = ""
+
+
 class Object(NamedTuple):
-    """A row of a table, and where it is; `command` names the command that does what reading and writing cannot."""
+    """A row of a table, and where it is; `command` names the command that does what reading and writing cannot.
+
+    `tests` are several where writing it does more in one map than in another; `never` says why nothing writes it, where
+    that is meant to stay so.
+    """
 
     row: Entry
     maps: tuple[str, ...]
     api: tuple[str, ...]
     cli: tuple[str, ...]
-    test: str
+    tests: tuple[str, ...]
     command: str = ""
+    never: str = ""
 
 
 class Coverage(NamedTuple):
-    """One family: what there is of its manual. `options` are those of the simulator for each register map."""
+    """One family: what there is of its manual. `maps` holds the options of the simulator for each register map."""
 
     family: Family
     title: str
@@ -70,6 +96,7 @@ class Coverage(NamedTuple):
     commands: tuple[Command, ...]
     objects: tuple[Object, ...]
     maps: Mapping[str, Mapping[str, str]]
+    unsent: tuple[Unsent, ...] = ()
 
     def settings(self, map_: str) -> dict[str, object]:
         """What a bus of these devices must be told."""
@@ -88,11 +115,17 @@ def load(name: str) -> Coverage:
     family = families.load(name)
     commands = tuple(_command(one) for one in told["command"])
     objects = tuple(_objects(family, told))
+    unsent = tuple(_unsent(one) for one in told.get("unsent", ()))
     cells: list[Command | Object] = [*commands, *objects]
     for one in cells:
-        if not (one.api and one.cli and one.test):
+        if not (one.api and one.cli and all(tests_of(one))):
             raise ValueError(f"{name}: a cell of {_name(one)} is empty")
-    return Coverage(family, told["title"], told["device"], told["ids"], commands, objects, told["maps"])
+    for no in unsent:
+        if not all(no[: len(no) - len(Unsent._field_defaults)]):
+            raise ValueError(f"{name}: a cell of {no.name} is empty")
+    return Coverage(
+        family, told["title"], told["device"], told["ids"], commands, objects, told["maps"], unsent
+    )
 
 
 def _command(told: Mapping[str, Any]) -> Command:
@@ -100,6 +133,11 @@ def _command(told: Mapping[str, Any]) -> Command:
     if not lists["vectors"]:
         raise ValueError(f"{told['name']}: no frame")
     return Command(**{**told, **lists})
+
+
+def _unsent(told: Mapping[str, Any]) -> Unsent:
+    lists = {key: tuple(told.get(key, ())) for key in ("vectors", "arguments")}
+    return Unsent(**{**told, **lists})
 
 
 def _objects(family: Family, told: Mapping[str, Any]) -> Iterator[Object]:
@@ -111,10 +149,11 @@ def _objects(family: Family, told: Mapping[str, Any]) -> Iterator[Object]:
     if strangers:
         raise ValueError(f"no table has {', '.join(sorted(strangers))}")
     for name, maps in rows.items():
-        yield _object(family.tables[maps[0]][name], tuple(maps), told)
+        yield _object([family.tables[map_][name] for map_ in maps], tuple(maps), told)
 
 
-def _object(row: Entry, maps: tuple[str, ...], told: Mapping[str, Any]) -> Object:
+def _object(rows: Sequence[Entry], maps: tuple[str, ...], told: Mapping[str, Any]) -> Object:
+    row = rows[0]
     own = told.get("object", {}).get(row.name, {})
     plain = row.writable and not row.protected
     verbs = [verb for verb, can in (("read", row.readable), ("write", plain)) if can]
@@ -122,17 +161,26 @@ def _object(row: Entry, maps: tuple[str, ...], told: Mapping[str, Any]) -> Objec
     cli = [
         {"read": f"read BUS#ID {row.name}", "write": f"write BUS#ID {row.name}=VALUE"}[verb] for verb in verbs
     ]
-    test = own.get("test") or told["tests"][_kind(row, plain)]
+    kinds = dict.fromkeys(_kind(one, plain, told["tests"]) for one in rows)
+    tests = (own["test"],) if "test" in own else tuple(told["tests"][kind] for kind in kinds)
     if not row.readable and not plain and not own.get("command"):
         raise ValueError(f"{row.name} can be neither read nor written: which command does it?")
-    return Object(row, maps, tuple(api), (*cli, *own.get("cli", [])), test, own.get("command", ""))
+    more = own.get("command", ""), own.get("never", "")
+    return Object(row, maps, tuple(api), (*cli, *own.get("cli", [])), tests, *more)
 
 
-def _kind(row: Entry, plain: bool) -> str:
-    """Which of a family's tests of all rows judges this one."""
+def _kind(row: Entry, plain: bool, tests: Mapping[str, str]) -> str:
+    """Which of a family's tests of all rows judges this one; those of what moves are said where a family has them."""
     if plain and row.storage is Storage.EEPROM:
-        return "kept"
-    return "write" if plain and row.effect is Effect.NONE else "read"
+        return "kept_moves" if "kept_moves" in tests and row.effect is not Effect.PERSISTENT else "kept"
+    if plain and row.effect is Effect.NONE:
+        return "write"
+    return "moves" if plain and "moves" in tests else "read"
+
+
+def tests_of(one: Command | Object) -> tuple[str, ...]:
+    """The tests that are named for this one."""
+    return (one.test,) if isinstance(one, Command) else one.tests
 
 
 def _name(one: Command | Object) -> str:
@@ -178,6 +226,7 @@ def _section(name: str) -> str:
             "| command | manual | frame | API | shell | simulator | decoder | test |",
             "|---|---|---|---|---|---|---|---|",
             *commands,
+            *_never_sent(told, frames),
             "\n### Objects\n",
             *_left_out(told),
             "| object | address | maps | access | API | shell | simulator | decoder | test |",
@@ -186,6 +235,26 @@ def _section(name: str) -> str:
             "",
         ]
     )
+
+
+def _never_sent(told: Coverage, frames: Mapping[str, str]) -> list[str]:
+    """The instructions that are known and not used, each with its reason."""
+    if not told.unsent:
+        return []
+    return [
+        "\n### Known, and never sent\n",
+        "The encoder refuses these, so that no command can send them; the decoder explains them when others do.\n",
+        "| instruction | source | frame | why it is never sent | encoder | simulator | decoder | test |",
+        "|---|---|---|---|---|---|---|---|",
+        *(_unsent_row(one, frames) for one in told.unsent),
+    ]
+
+
+def _unsent_row(one: Unsent, frames: Mapping[str, str]) -> str:
+    sent = "<br>".join(f"`{_short(frames[vector])}`" for vector in one.vectors)
+    simulator = f"{one.simulator}; `{one.switch}={one.answers}`: answers" if one.switch else one.simulator
+    cells = [one.name, one.source, sent, one.because, "refuses", simulator, "explains", _test(one.test)]
+    return f"| {' | '.join(cells)} |"
 
 
 def _left_out(told: Coverage) -> list[str]:
@@ -218,12 +287,24 @@ def _command_row(one: Command, frames: Mapping[str, str]) -> str:
 
 def _object_row(told: Coverage, one: Object) -> str:
     row = one.row
-    address = str(row.address) if row.subindex is None else f"0x{row.address:04X}:{row.subindex:02X}"
     where = "all" if len(one.maps) == len(told.family.tables) else ", ".join(one.maps)
-    unwritten = row.writable and len(one.api) == 1 and one.api[0].endswith(".read")
-    access = f"{row.access.value}; no verb writes it yet" if unwritten else row.access.value
-    cells = [f"`{row.name}`", address, where, access, _code(one.api), _shell(one.cli)]
-    return f"| {' | '.join([*cells, *proven(told, one), _test(one.test)])} |"
+    access = row.access.value
+    if row.writable and len(one.api) == 1 and one.api[0].endswith(".read"):
+        access += f"; no verb writes it: {one.never}" if one.never else "; no verb writes it yet"
+    cells = [f"`{row.name}`", _address(told, one), where, access, _code(one.api), _shell(one.cli)]
+    return f"| {' | '.join([*cells, *proven(told, one), '<br>'.join(map(_test, one.tests))])} |"
+
+
+def _address(told: Coverage, one: Object) -> str:
+    """Where the row is; where maps have it at several places, which map has which."""
+    places: dict[str, list[str]] = {}
+    for map_ in one.maps:
+        row = told.family.tables[map_][one.row.name]
+        place = str(row.address) if row.subindex is None else f"0x{row.address:04X}:{row.subindex:02X}"
+        places.setdefault(place, []).append(map_)
+    if len(places) == 1:
+        return next(iter(places))
+    return "<br>".join(f"{place} ({', '.join(maps)})" for place, maps in places.items())
 
 
 def proven(told: Coverage, one: Object) -> Proof:

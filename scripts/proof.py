@@ -58,6 +58,7 @@ def by_name(device: Device, row: Entry) -> Proof:
     with device.made() as simulation, motorbus.open(simulation.url) as bus:
         one = bus.family.devices.blocking(bus, min(simulation.simulator.nodes))
         try:
+            met = bus.trace.subscribe()
             one.identify()
             seen = bus.trace.subscribe()
             _read_and_written(one, row)
@@ -67,7 +68,8 @@ def by_name(device: Device, row: Entry) -> Proof:
         asked = [record.data for record in records if record.direction == "tx"]
         told = [record.data for record in records if record.direction == "rx"]
         good = bool(asked) and bool(told) and not faults(bus.family, told)
-        return Proof("answers" if good else "", named(bus.family, asked, row.name))
+        before = [record.data for record in met][: -len(records)]
+        return Proof("answers" if good else "", named(bus.family, asked, row.name, before))
 
 
 def _read_and_written(one: Any, row: Entry) -> None:
@@ -122,12 +124,16 @@ def faults(family: Family, frames: Iterable[Data]) -> list[str]:
     return [one.fault for data in frames for one in family.explain(_flat(data)) if one.fault]
 
 
-def named(family: Family, frames: Iterable[Data], name: str) -> str:
+def named(family: Family, frames: Iterable[Data], name: str, before: Iterable[Data] = ()) -> str:
     """What the decoder makes of a name: "names it", or "" where it is a word in the meaning of no part.
 
-    Meanings only, for "id" is also what a field of many frames is called.
+    Meanings only, for "id" is also what a field of many frames is called. `before` is what was said before each frame,
+    such as who the device is, where what follows is to be understood by that.
     """
-    good = [one for data in frames for one in family.explain(_flat(data)) if not one.fault]
+    context = b"".join(map(_flat, before))
+    known = len(family.explain(context)) if context else 0
+    explained = [one for data in frames for one in family.explain(context + _flat(data))[known:]]
+    good = [one for one in explained if not one.fault]
     found = any(re.search(rf"\b{name}\b", part.meaning) for one in good for part in one.parts)
     return "names it" if found else ""
 

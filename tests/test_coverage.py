@@ -17,9 +17,11 @@ from motorbus import families
 from motorbus.cli import build, parse
 from motorbus.core.family import Explanation, Family
 from motorbus.core.operation import CanFrame, Data
+from motorbus.errors import RequestError
+from motorbus.families.feetech import wire
 from motorbus.simulation.named import Simulation
 from scripts import coverage
-from scripts.coverage import Command, Coverage, Object
+from scripts.coverage import Command, Coverage, Object, Unsent
 from scripts.proof import Device, Order, by_order, named
 from tests.conformance.subjects import vectors
 
@@ -28,6 +30,9 @@ TOLD = {name: coverage.load(name) for name in coverage.known()}
 COMMANDS = [
     pytest.param(told, one, id=f"{name}-{one.name}") for name, told in TOLD.items() for one in told.commands
 ]
+NEVER = [(told, one) for told in TOLD.values() for one in told.unsent]
+UNSENT = [pytest.param(told, one, id=one.name) for told, one in NEVER]
+SWITCHED = [pytest.param(told, one, id=one.name) for told, one in NEVER if one.switch]
 OBJECTS = [
     pytest.param(told, one, map_, id=f"{name}-{map_}-{one.row.name}")
     for name, told in TOLD.items()
@@ -35,10 +40,12 @@ OBJECTS = [
     for map_ in one.maps
 ]
 CLAIMS: list[tuple[str, Command | Object]] = []
+JUDGES: set[str] = set()
 for _name, _told in TOLD.items():
     CLAIMS += [(_name, command) for command in _told.commands]
     CLAIMS += [(_name, row) for row in _told.objects]
-TESTS = sorted({one.test for _, one in CLAIMS})
+    JUDGES |= {no.test for no in _told.unsent}
+TESTS = sorted({test for _, one in CLAIMS for test in coverage.tests_of(one)} | JUDGES)
 NAMES = sorted({(name, api) for name, one in CLAIMS for api in one.api})
 LINES = sorted({(name, line) for name, one in CLAIMS for line in one.cli})
 PATIENCE = 1.0
@@ -67,12 +74,19 @@ def test_an_empty_cell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         coverage.load("feetech")
 
 
+def test_an_empty_reason_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = TOLD["feetech"].unsent[0]._replace(because="")
+    monkeypatch.setattr(coverage, "_unsent", lambda _: one)
+    with pytest.raises(ValueError, match=re.escape(f"a cell of {one.name} is empty")):
+        coverage.load("feetech")
+
+
 def test_a_row_that_nothing_reaches_is_refused() -> None:
     row = families.load("feetech").tables["sts"]["id"]
     told = {"device": "Servo", "tests": {"read": "t"}}
     unreachable = motorbus.core.entry.changed(row, access=motorbus.core.entry.Access.WRITE)
     with pytest.raises(ValueError, match="can be neither read nor written"):
-        coverage._object(unreachable, ("sts",), told)
+        coverage._object([unreachable], ("sts",), told)
 
 
 @pytest.mark.parametrize(("family", "name"), NAMES)
@@ -90,7 +104,7 @@ def test_words_are_a_command(family: str, line: str) -> None:
     )
     words = shlex.split(spoken)
     command, _, _ = parse(build(), words)
-    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0]}.")
+    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0].replace('-', '_')}.")
 
 
 @cache
@@ -161,6 +175,47 @@ def test_the_frame_is_explained(told: Coverage, one: Command) -> None:
         (explained,) = told.family.explain(flat(frame(told.family.name, vector)))
         assert explained.fault == ""
         assert explained.parts
+
+
+@pytest.mark.parametrize(("told", "one"), UNSENT)
+def test_what_is_never_sent_is_refused_explained_and_not_answered(told: Coverage, one: Unsent) -> None:
+    name = told.family.name
+    encode = getattr(import_module(f"motorbus.families.{name}.wire"), one.encoder)
+    with pytest.raises(RequestError, match="never sent"):
+        encode(*one.arguments)
+    for vector in one.vectors:
+        data = frame(name, vector)
+        assert set(one.arguments) <= set(flat(data)), "the frame is of this instruction"
+        (explained,) = told.family.explain(flat(data))
+        assert (explained.fault, bool(explained.parts)) == ("", True)
+        for map_ in told.maps:
+            with fresh(told, map_) as simulation:
+                assert heard(simulation.simulator, [data], 1.0) == []
+
+
+@pytest.mark.parametrize(("told", "one"), SWITCHED)
+def test_what_is_never_sent_is_answered_where_a_switch_says_so(told: Coverage, one: Unsent) -> None:
+    for vector in one.vectors:
+        switch: dict[str, Any] = {one.switch: one.answers}
+        with motorbus.simulate(told.family.name, ids=told.ids, **switch) as simulation:
+            assert heard(simulation.simulator, [frame(told.family.name, vector)], 1.0)
+
+
+def test_every_feetech_instruction_is_on_the_page() -> None:
+    """The seven of the manual and every extension that anybody has published: sent, or said to be never sent."""
+    told = TOLD["feetech"]
+    sent = {flat(frame("feetech", vector))[4] for one in told.commands for vector in one.vectors}
+    unsent = {flat(frame("feetech", vector))[4] for one in told.unsent for vector in one.vectors}
+    assert sent == {code for code, rule in wire.RULES.items() if rule.sent}
+    assert unsent == {code for code, rule in wire.RULES.items() if not rule.sent}
+    assert sent | unsent == {1, 2, 3, 4, 5, 6, 8, 9, 0x0A, 0x0B, 0x0D, 0x82, 0x83}
+
+
+def test_every_register_of_every_feetech_map_is_on_the_page() -> None:
+    told = TOLD["feetech"]
+    assert set(told.maps) == set(told.family.tables)
+    for name, table in told.family.tables.items():
+        assert {one.row.name for one in told.objects if name in one.maps} == set(table)
 
 
 @pytest.mark.parametrize(("told", "one", "map_"), OBJECTS)

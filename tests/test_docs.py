@@ -56,7 +56,7 @@ def test_there_are_commands_to_judge() -> None:
 def test_a_command_parses(line: str) -> None:
     words = shlex.split(line)[1:]
     command, _, _ = parse(build(), words)
-    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0]}.")
+    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0].replace('-', '_')}.")
 
 
 @pytest.mark.parametrize("line", [line for line in commands() if WITHOUT_HARDWARE.search(line)])

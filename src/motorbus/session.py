@@ -14,6 +14,7 @@ import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Self
+from weakref import WeakKeyDictionary
 
 from motorbus import families
 from motorbus.bus.aio import AsyncBus
@@ -23,8 +24,9 @@ from motorbus.core import units
 from motorbus.core.family import Family
 from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.journal import BusJournal, Change
 from motorbus.link.base import Link
-from motorbus.link.lock import socket_path
+from motorbus.link.lock import journal_path, socket_path
 from motorbus.link.memory import MemoryLink
 from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
@@ -39,6 +41,9 @@ ADAPTER = "can://"
 """Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
 
 Notify = Callable[[object], None]
+
+_simulated: WeakKeyDictionary[Simulation, BusJournal] = WeakKeyDictionary()
+"""The journals of simulated buses of this process, which end with them."""
 
 
 class Address(NamedTuple):
@@ -159,13 +164,23 @@ def lock_name(address: str, options: Mapping[str, object]) -> str:
 def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
     """Open a bus, blocking; use it in a `with`.
 
-    `report` gets progress, early results and journal records. Options may also stand in the address. Raises
+    `report` gets progress, early results and journal records, the latter when they are on disk. Options may also stand
+    in the address. A guarded change that was cut off is told as a warning of the bus, see `unfinished`. Raises
     RequestError for a bad address, PortNotFound, PortBusy (naming the owner) or LinkError for the port.
     """
     opening = prepare(address, options)
     link = _link(opening)
     try:
-        bus = Bus(link, opening.family, admit=Gate(), report=report, stop_socket=_stop_socket(opening, link))
+        journal = _journal(parse_address(address), options, opening, link)
+        bus = Bus(
+            link,
+            opening.family,
+            admit=Gate(),
+            report=report,
+            journal=journal,
+            stop_socket=_stop_socket(opening, link),
+        )
+        _warn(bus, journal)
         test = _echo_test(bus)
         if test is not None:
             _settled(bus, lambda: bus.run(test))
@@ -193,9 +208,29 @@ def open_async(address: str, *, report: Notify | None = None, **options: object)
     """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
     opening = prepare(address, options)
     link = _link(opening)
-    return OpenAsyncBus(
-        link, opening.family, admit=Gate(), report=report, stop_socket=_stop_socket(opening, link)
-    )
+    try:
+        journal = _journal(parse_address(address), options, opening, link)
+        bus = OpenAsyncBus(
+            link,
+            opening.family,
+            admit=Gate(),
+            report=report,
+            journal=journal,
+            stop_socket=_stop_socket(opening, link),
+        )
+        _warn(bus, journal)
+    except BaseException:
+        link.close()
+        raise
+    return bus
+
+
+def unfinished(bus: BusFace) -> Change | None:
+    """The guarded change that was cut off on this bus, if there is one; `recover` of its device ends it.
+
+    Raises RequestError when the journal was written by a later version.
+    """
+    return bus.journal.unfinished() if isinstance(bus.journal, BusJournal) else None
 
 
 def simulate(
@@ -242,8 +277,29 @@ def _stop_socket(opening: Opening, link: Link) -> Path | None:
     return socket_path(name) if name else None
 
 
+def _journal(
+    spot: Address, options: Mapping[str, object], opening: Opening, link: Link
+) -> BusJournal | None:
+    """Who records the changes on this bus; None for a channel that belongs to nobody, where none can be guarded."""
+    merged = {**spot.options, **{name: str(value) for name, value in options.items()}}
+    address = spot._replace(options=merged).bus
+    if opening.port.startswith("sim:"):
+        simulation = find(opening.port.removeprefix("sim:"), opening.family.name)
+        return _simulated.setdefault(simulation, BusJournal(address))
+    if opening.port == "sim":
+        return BusJournal(address)
+    name: str = getattr(link, "lock_name", opening.port)
+    return BusJournal(address, journal_path(name)) if name else None
+
+
+def _warn(bus: BusFace, journal: BusJournal | None) -> None:
+    warning = journal.warning() if journal is not None else ""
+    if warning:
+        bus.warnings += (warning,)
+
+
 def _echo_test(bus: BusFace) -> Exchange[Any] | None:
-    for warning in bus.link.warnings:
+    for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)
     test = bus.family.echo_test()
     if test is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import motorbus
@@ -9,7 +11,7 @@ from motorbus.cli import dry
 from motorbus.cli.dry import DryBus
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
-from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together
+from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together, Tune
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import FAMILY, Servo
 from motorbus.families.feetech.driver import action_all
@@ -44,6 +46,29 @@ def test_the_gate_stands_in_a_dry_run_too(arm: Simulation) -> None:
 def test_what_cannot_be_foreseen_says_so(arm: Simulation) -> None:
     with motorbus.open(arm.url) as bus, pytest.raises(Unforeseeable):
         Servo(DryBus(bus), 1).move(3.0)  # waits for an arrival that will not be
+
+
+def test_an_answer_that_only_a_real_run_gets_is_no_number(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        servo = Servo(DryBus(bus), 1)
+        servo.prepare()
+        servo.disable_torque()
+        answer: Any = servo.position()
+        assert answer == 1.0
+        for use in (
+            lambda: answer + 1,
+            lambda: answer < 1,
+            lambda: answer[0],
+            lambda: int(answer),
+            lambda: list(answer),
+        ):
+            with pytest.raises(Unforeseeable):
+                use()
+
+
+def test_the_rate_of_the_bus_is_known(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        assert DryBus(bus).run(iter(Tune(0))) == 1_000_000
 
 
 def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:

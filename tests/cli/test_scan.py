@@ -122,3 +122,13 @@ def test_listening_asks_nobody(words: str, run: Run) -> None:
     ran = run("scan", *words.split(), "--listen")
     assert (ran.code, ran.out) == (2, "")
     assert "--listen" in ran.err
+
+
+def test_one_model_with_several_firmware_versions_is_a_note(run: Run, arm: Simulation) -> None:
+    """Servos of one robot with firmware 3.9 and 3.10 misbehave together (lerobot#1010): told, and never refused."""
+    arm[2].memory["firmware_minor"] = 9
+    ran = run("scan", arm.url, "--ids", "1-3", "--json")
+    said = "STS3215 with several firmware versions, which may behave differently: 3.10 (#1, #3), 3.9 (#2)"
+    assert ran.code == 0
+    assert ran.document["notes"] == [said]
+    assert f"note: {said}" in ran.err

@@ -101,6 +101,12 @@ def test_a_ready_line_for_people(tmp_path: Path) -> None:
     assert process.returncode == 0
 
 
+def test_devices_that_ship_with_another_rate_are_opened_by_the_address_of_the_ready_line(run: Run) -> None:
+    with Simulated("feetech", ids="3", model="sm85blhv", tcp="0") as simulated:
+        assert simulated.bus.endswith(",baud=115200")
+        assert run("ping", f"{simulated.bus}#3", "--json").document["devices"][0]["answers"]
+
+
 def test_the_switches_are_listed(run: Run) -> None:
     ran = run("simulate", "feetech", "--switches")
     assert ran.code == 0

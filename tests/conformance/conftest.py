@@ -1,9 +1,10 @@
-"""Runs each test once for every family it suits, and each test of vectors once for every vector.
+"""Runs each test once for every family or subject it suits, and each test of vectors once for every vector.
 
-A test asks by name: `family`; `lockable`, a family whose EEPROM has a lock; `mover`, a family whose devices move;
-`limp`, one whose devices can be let go; `reporter`, one whose devices say something unasked; `reporting_mover`, one
-whose devices report a move without having been told to; `plain_one`, one with rows that just keep a value; or a family
-together with one of its vectors, see `VECTORS`.
+A test asks by name: `family`, where no device matters; `subject`, a family with simulated devices of one kind, of which
+it may have several. And some subjects: `lockable`, whose EEPROM has a lock; `mover`, whose devices move; `limp`,
+whose devices can be let go; `reporter`, whose devices say something unasked; `reporting_mover`, whose devices report a
+move without having been told to; `plain_one`, with rows that just keep a value. Or a family together with one of its
+vectors, see `VECTORS`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Callable
 import pytest
 
 from motorbus.core.family import Family
-from tests.conformance.subjects import FAMILIES, Vector, vectors
+from tests.conformance.subjects import FAMILIES, SUBJECTS, Vector, tables_of, vectors
 from tests.conformance.world import has, has_torque_switch, locks, moves, plain, reports
 
 
@@ -38,10 +39,10 @@ SUITS: dict[str, Callable[[Family], object]] = {
     "reporter": reports,
     "limp": has_torque_switch,
     "reporting_mover": lambda family: moves(family) and reports(family) and not has(family, "start_reports"),
-    "plain_one": lambda family: any(plain(table) for table in family.tables.values()),
-    "family": bool,
+    "plain_one": lambda subject: any(plain(table) for table in tables_of(subject)),
+    "subject": bool,
 }
-"""Which families a test gets that asks by this name."""
+"""Which subjects a test gets that asks by this name."""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -49,9 +50,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         if name in metafunc.fixturenames:
             metafunc.parametrize(("family", name), _vectors(wanted))
             return
+    if "family" in metafunc.fixturenames:
+        metafunc.parametrize("family", FAMILIES.values(), ids=FAMILIES)
     for name, suits in SUITS.items():
         if name in metafunc.fixturenames:
-            suitable = {key: family for key, family in FAMILIES.items() if suits(family)}
+            suitable = {key: subject for key, subject in SUBJECTS.items() if suits(subject)}
             metafunc.parametrize(name, suitable.values(), ids=suitable)
 
 

@@ -1,7 +1,9 @@
-"""Which families are judged here, and where their vectors lie.
+"""Which families are judged here, with which simulated devices, and where their vectors lie.
 
 Every family that discovery finds, and the template, which is out of tree and is loaded from its folder as its own
-pyproject says, without being installed. So whoever installs a family beside motorbus has it judged as well.
+pyproject says, without being installed. So whoever installs a family beside motorbus has it judged as well. A family
+that has several register maps and a simulated device of each (tests/coverage/FAMILY.toml says which) is a subject once
+for each of them: what is true of one map only is not true of the family.
 """
 
 from __future__ import annotations
@@ -12,15 +14,17 @@ import tomllib
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from motorbus import families
-from motorbus.core.family import Family
+from motorbus.core.entry import Table
+from motorbus.core.family import Family, Simulator
 from motorbus.core.operation import CanFrame, Data
 
 ROOT = Path(__file__).resolve().parents[2]
 TEMPLATE = ROOT / "examples" / "family_template"
 VECTORS = ROOT / "tests" / "vectors"
+KINDS = ROOT / "tests" / "coverage"
 
 
 class Vector(NamedTuple):
@@ -56,6 +60,53 @@ FAMILIES: dict[str, Family] = {name: family for name, (family, _) in sorted(_FOU
 """Every family that is judged, by name."""
 PACKAGES: dict[str, str] = {name: package for name, (_, package) in _FOUND.items()}
 """The package that each comes from."""
+
+
+class Kind:
+    """A family in all things, whose simulated devices are of one kind: `options` of its simulator say which.
+
+    `simulated` is the table they have.
+    """
+
+    def __init__(self, family: Family, simulated: Table, options: dict[str, str]) -> None:
+        self.simulated = simulated
+        self._family = family
+        self._options = options
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._family, name)
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        """As the family makes it, with the options of this kind where nothing else is asked for."""
+        chosen: dict[str, Any] = {"model": model, **self._options, **options}
+        return self._family.simulator(ids, **(chosen | ({"model": model} if model else {})))
+
+
+def _kinds(name: str, family: Family) -> dict[str, Family]:
+    """One for each map that simulated devices have; the family itself where options make no difference."""
+    file = KINDS / f"{name}.toml"
+    maps = tomllib.loads(file.read_text(encoding="utf-8"))["maps"] if file.exists() else {}
+    if len(maps) < 2:
+        return {name: family}
+    told = {option.name for option in family.link.settings}
+    kinds: dict[str, Family] = {}
+    for key, options in maps.items():
+        settings: dict[str, object] = {one: value for one, value in options.items() if one in told}
+        kinds[f"{name}-{key}"] = cast(
+            "Family", Kind(family.configured(**settings), family.tables[key], options)
+        )
+    return kinds
+
+
+SUBJECTS: dict[str, Family] = {
+    key: subject for name, family in FAMILIES.items() for key, subject in _kinds(name, family).items()
+}
+"""Every family with every kind of simulated device it has, by a name for eyes."""
+
+
+def tables_of(subject: Family) -> list[Table]:
+    """The tables that its simulated devices can have."""
+    return [subject.simulated] if isinstance(subject, Kind) else list(subject.tables.values())
 
 
 def vectors(name: str) -> list[Vector]:

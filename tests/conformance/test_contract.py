@@ -116,18 +116,18 @@ def test_the_quiet_time_is_no_shorter_than_a_reply(family: Family) -> None:
         assert family.quiet_time(rate) > family.air_time(probe, rate) / 2
 
 
-def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(family: Family) -> None:
-    assert family.link.window >= 1
-    with world(family) as there:
+def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(subject: Family) -> None:
+    assert subject.link.window >= 1
+    with world(subject) as there:
         for node in IDS:
             assert there.device(node).ping() is True
         watched = there.bus.trace.subscribe()
-        there.bus.run(probes(family))
+        there.bus.run(probes(subject))
         flying = most = 0
         for record in watched:
             flying += 1 if record.direction == "tx" else -1
             most = max(most, flying)
-    assert most == min(family.link.window, len({family.lane(node) for node in IDS}))
+    assert most == min(subject.link.window, len({subject.lane(node) for node in IDS}))
 
 
 def probes(family: Family) -> Operation[list[bool]]:
@@ -160,16 +160,16 @@ def test_probes_differ_from_each_other_and_from_their_echo(family: Family) -> No
     assert len(seen) >= 16
 
 
-def test_probes_are_answered_truthfully(family: Family) -> None:
-    with world(family) as there:
+def test_probes_are_answered_truthfully(subject: Family) -> None:
+    with world(subject) as there:
         for node in IDS:
-            answers = {there.bus.run(family.probe(node, attempt)) for attempt in range(64)}
+            answers = {there.bus.run(subject.probe(node, attempt)) for attempt in range(64)}
             assert answers == {True}
 
 
-def test_a_probe_knows_a_wrong_answer(family: Family) -> None:
-    with world(family) as there:
-        probe = family.probe(IDS[0], 0)
+def test_a_probe_knows_a_wrong_answer(subject: Family) -> None:
+    with world(subject) as there:
+        probe = subject.probe(IDS[0], 0)
         assert probe.read is not None
         plain: Exchange[Answer] = Exchange(probe.request, probe.replies, lane=probe.lane)
         answer = there.bus.run(plain)
@@ -205,12 +205,12 @@ def test_a_stop_says_what_it_promises(family: Family, nodes: tuple[int, ...]) ->
             assert exchange.lane == family.lane(exchange.replies[0].node)
 
 
-def test_capabilities_belong_to_a_model(family: Family) -> None:
-    with world(family) as there:
-        model = there.bus.run(family.identify(IDS[0])).model
-    capabilities = family.axis(model)
+def test_capabilities_belong_to_a_model(subject: Family) -> None:
+    with world(subject) as there:
+        model = there.bus.run(subject.identify(IDS[0])).model
+    capabilities = subject.axis(model)
     assert {name for name, function in capabilities.items() if not callable(function)} == set()
-    assert family.axis("no such model") == {}
+    assert subject.axis("no such model") == {}
 
 
 def test_both_faces_have_the_same_verbs(family: Family) -> None:

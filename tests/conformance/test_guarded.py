@@ -24,8 +24,8 @@ MOST = 2000
 
 
 def change(there: World) -> tuple[Entry, int]:
-    """A row that is kept in EEPROM, and another value than it has."""
-    row = kept(there.table(NODE))[0]
+    """A row that is kept in EEPROM, and another value than it has; a number, for a choice may be how it answers."""
+    row = next(row for row in kept(there.table(NODE)) if not row.choices)
     held = there.memory(NODE)[row.name]
     return row, next(raw for raw in samples(row) if raw != held)
 

@@ -29,8 +29,8 @@ def looks(there: World) -> dict[str, Runnable[Any]]:
     return found | ({"echo test": test} if test is not None else {})
 
 
-def test_looking_has_no_effect(family: Family) -> None:
-    with world(family) as there:
+def test_looking_has_no_effect(subject: Family) -> None:
+    with world(subject) as there:
         before = there.settings()
         for name, operation in looks(there).items():
             steps = Steps(there.bus)
@@ -40,8 +40,8 @@ def test_looking_has_no_effect(family: Family) -> None:
         assert there.settings() == before
 
 
-def test_what_looks_is_marked_repeatable(family: Family) -> None:
-    with world(family) as there:
+def test_what_looks_is_marked_repeatable(subject: Family) -> None:
+    with world(subject) as there:
         for name, operation in looks(there).items():
             steps = Steps(there.bus)
             steps.run(operation)
@@ -52,22 +52,22 @@ def is_group(exchange: Exchange[Any]) -> bool:
     return not isinstance(exchange.replies, tuple) or len(exchange.replies) != 1
 
 
-def test_identify_says_what_is_there(family: Family) -> None:
-    with world(family) as there:
+def test_identify_says_what_is_there(subject: Family) -> None:
+    with world(subject) as there:
         for node in IDS:
-            identity = there.bus.run(family.identify(node))
+            identity = there.bus.run(subject.identify(node))
             assert identity.node == node
             assert identity.model
             assert identity.firmware
-            assert identity.table in family.tables
+            assert identity.table in subject.tables
             assert there.device(node).identify() == identity
         with pytest.raises(NoReply) as raised:
-            there.bus.run(family.identify(9))
+            there.bus.run(subject.identify(9))
         assert raised.value.node == 9
 
 
-def test_ping_says_who_is_there(family: Family) -> None:
-    with world(family) as there:
+def test_ping_says_who_is_there(subject: Family) -> None:
+    with world(subject) as there:
         there.simulator.nodes[IDS[1]].unplug()
         assert [there.device(node).ping() for node in (*IDS, 9)] == [True, False, True, False]
         there.simulator.nodes[IDS[1]].plug()
@@ -77,25 +77,25 @@ def test_ping_says_who_is_there(family: Family) -> None:
 @pytest.mark.parametrize("ids", [IDS, (2, 5, 9), (7,)], ids=str)
 @pytest.mark.parametrize("asked", [(), tuple(range(1, 12))], ids=["all", "some"])
 def test_a_scan_finds_exactly_who_is_there(
-    family: Family, ids: tuple[int, ...], asked: tuple[int, ...]
+    subject: Family, ids: tuple[int, ...], asked: tuple[int, ...]
 ) -> None:
-    with world(family, ids=ids) as there:
-        found = there.bus.run(family.scan(asked))
+    with world(subject, ids=ids) as there:
+        found = there.bus.run(subject.scan(asked))
         assert sorted(one.node for one in found) == list(ids)
-        assert {one.rate for one in found} == {family.link.rate}
+        assert {one.rate for one in found} == {subject.link.rate}
         for one in found:
-            assert one.identity == there.bus.run(family.identify(one.node))
+            assert one.identity == there.bus.run(subject.identify(one.node))
 
 
-def test_a_scan_finds_nobody_where_nobody_is(family: Family) -> None:
-    with world(family, ids=(20,)) as there:
-        assert there.bus.run(family.scan(IDS)) == []
-        assert there.bus.run(family.scan((20,)))
+def test_a_scan_finds_nobody_where_nobody_is(subject: Family) -> None:
+    with world(subject, ids=(20,)) as there:
+        assert there.bus.run(subject.scan(IDS)) == []
+        assert there.bus.run(subject.scan((20,)))
 
 
-def test_a_scan_tells_early(family: Family) -> None:
+def test_a_scan_tells_early(subject: Family) -> None:
     """The first that is found is reported while others have still to be asked; what is found last, before the end."""
-    with world(family, ids=(1, 2, 19)) as there, sent(there.bus) as frames:
+    with world(subject, ids=(1, 2, 19)) as there, sent(there.bus) as frames:
         when: list[tuple[Found, int]] = []
         watch = there.bus.trace.subscribe(limit=1_000_000)
         left = 0
@@ -107,7 +107,7 @@ def test_a_scan_tells_early(family: Family) -> None:
             if isinstance(event, Found):
                 when.append((event, left))
 
-        found = there.bus.run(family.scan(tuple(range(1, 20))), report)
+        found = there.bus.run(subject.scan(tuple(range(1, 20))), report)
     assert {(one.node, one.rate) for one, _ in when} == {(one.node, one.rate) for one in found}
     assert when[0][1] < when[-1][1] < len(frames)
     progress = [event for event in there.events if isinstance(event, Progress)]
@@ -115,57 +115,57 @@ def test_a_scan_tells_early(family: Family) -> None:
     assert all(0 <= event.done <= event.total for event in progress)
 
 
-def test_a_scan_finds_at_each_rate_who_is_there(family: Family) -> None:
-    with world(family) as there:
-        rates = family.link.rates
-        found = there.bus.run(family.scan(IDS, rates))
-        assert {(one.node, one.rate) for one in found} == {(node, family.link.rate) for node in IDS}
+def test_a_scan_finds_at_each_rate_who_is_there(subject: Family) -> None:
+    with world(subject) as there:
+        rates = subject.link.rates
+        found = there.bus.run(subject.scan(IDS, rates))
+        assert {(one.node, one.rate) for one in found} == {(node, subject.link.rate) for node in IDS}
         assert there.device(NODE).ping() is True
 
 
-def test_a_scan_leaves_the_rate_as_it_was(family: Family) -> None:
-    usual, other = family.link.rate, family.link.rates[-1]
-    with world(family, rate=other) as there:
-        found = there.bus.run(family.scan(IDS, (usual,)))
+def test_a_scan_leaves_the_rate_as_it_was(subject: Family) -> None:
+    usual, other = subject.link.rate, subject.link.rates[-1]
+    with world(subject, rate=other) as there:
+        found = there.bus.run(subject.scan(IDS, (usual,)))
         assert {(one.node, one.rate) for one in found} == {(node, usual) for node in IDS}
         assert (there.bus.rate, there.link.rate) == (other, other)
-        assert bool(there.bus.run(family.scan(IDS))) == (usual == other)
+        assert bool(there.bus.run(subject.scan(IDS))) == (usual == other)
 
 
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
-def test_a_scan_that_is_cut_leaves_the_rate_as_it_was(family: Family, before: bool) -> None:
+def test_a_scan_that_is_cut_leaves_the_rate_as_it_was(subject: Family, before: bool) -> None:
     number = cuts = 0
     while number == 0 or cuts:
-        with world(family) as there:
+        with world(subject) as there:
             steps = Steps(there.bus, cut_at=number, before=before)
             with suppress(Cut):
-                steps.run(family.scan(IDS, family.link.rates))
-            assert (there.bus.rate, there.link.rate) == (family.link.rate, family.link.rate)
+                steps.run(subject.scan(IDS, subject.link.rates))
+            assert (there.bus.rate, there.link.rate) == (subject.link.rate, subject.link.rate)
             number, cuts = number + 7, steps.cuts
 
 
-def test_looking_is_the_same_blocking_and_async(family: Family) -> None:
+def test_looking_is_the_same_blocking_and_async(subject: Family) -> None:
     async def looked(there: World) -> list[object]:
         bus = there.async_bus()
-        device = family.devices.awaiting(bus, NODE)
+        device = subject.devices.awaiting(bus, NODE)
         found = [
             await device.ping(),
             await device.identify(),
             await device.read(),
-            await bus.run(family.scan(IDS)),
+            await bus.run(subject.scan(IDS)),
         ]
         await bus.close()
         return found
 
-    with world(family) as there:
+    with world(subject) as there:
         device = there.device(NODE)
-        found = [device.ping(), device.identify(), device.read(), there.bus.run(family.scan(IDS))]
+        found = [device.ping(), device.identify(), device.read(), there.bus.run(subject.scan(IDS))]
         assert asyncio.run(looked(there)) == found
 
 
-def test_the_same_said_is_the_same_heard(family: Family) -> None:
+def test_the_same_said_is_the_same_heard(subject: Family) -> None:
     def heard() -> list[TraceRecord]:
-        with world(family) as there:
+        with world(subject) as there:
             watch = there.bus.trace.subscribe(limit=100_000)
             for operation in looks(there).values():
                 there.bus.run(operation)
@@ -176,18 +176,18 @@ def test_the_same_said_is_the_same_heard(family: Family) -> None:
     assert heard() == once
 
 
-def test_what_a_simulated_node_says_of_itself_is_plain_data(family: Family) -> None:
-    with world(family) as there:
+def test_what_a_simulated_node_says_of_itself_is_plain_data(subject: Family) -> None:
+    with world(subject) as there:
         for node in IDS:
             status = there.simulator.nodes[node].status()
             assert json.loads(json.dumps(status)) == status
 
 
-def test_nodes_that_go_and_come_are_noticed(family: Family) -> None:
+def test_nodes_that_go_and_come_are_noticed(subject: Family) -> None:
     def everyone() -> Operation[list[bool]]:
         return (yield from Together([said(there.device(node), "ping") for node in IDS]))
 
-    with world(family) as there:
+    with world(subject) as there:
         assert there.bus.run(everyone()) == [True] * len(IDS)
         for node in IDS:
             there.simulator.nodes[node].unplug()

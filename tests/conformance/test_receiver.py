@@ -200,11 +200,11 @@ def test_garbage_is_explained_to_the_last_byte(family: Family, data: bytes) -> N
 
 
 @given(data=st.data())
-def test_a_simulator_survives_garbage(family: Family, data: st.DataObject) -> None:
-    simulator = family.simulator((1, 2, 3))
-    simulator.tune(family.link.rate)
+def test_a_simulator_survives_garbage(subject: Family, data: st.DataObject) -> None:
+    simulator = subject.simulator((1, 2, 3))
+    simulator.tune(subject.link.rate)
     at = 0.0
-    for piece in data.draw(st.lists(deliveries[family.link.kind], max_size=10)):
+    for piece in data.draw(st.lists(deliveries[subject.link.kind], max_size=10)):
         simulator.receive(piece, at)
         at += 0.01
         moments = [when for when, _ in simulator.advance(at)]

@@ -59,11 +59,11 @@ def read(there: World, row: Entry) -> int:
     return row.to_raw(value)
 
 
-def test_a_reply_with_a_changed_byte_is_asked_for_again(family: Family) -> None:
-    if family.link.kind != "bytes":
+def test_a_reply_with_a_changed_byte_is_asked_for_again(subject: Family) -> None:
+    if subject.link.kind != "bytes":
         return
     line = Tampering()
-    with world(family, line=line) as there:
+    with world(subject, line=line) as there:
         for row in steady(there):
             length = length_of_reply(there, row)
             for line.place in range(length):
@@ -73,11 +73,11 @@ def test_a_reply_with_a_changed_byte_is_asked_for_again(family: Family) -> None:
                     assert line.fired == 1
 
 
-def test_a_reply_that_is_always_wrong_is_an_error_and_no_value(family: Family) -> None:
-    if family.link.kind != "bytes":
+def test_a_reply_that_is_always_wrong_is_an_error_and_no_value(subject: Family) -> None:
+    if subject.link.kind != "bytes":
         return
     line = Tampering()
-    with world(family, line=line) as there:
+    with world(subject, line=line) as there:
         row = steady(there)[-1]
         device = there.device(NODE)
         device.read()
@@ -137,22 +137,22 @@ class Babbling(PerfectLine):
         return [*senseless, *real, *senseless]
 
 
-def test_senseless_frames_disturb_nobody_where_frames_stand_by_themselves(family: Family) -> None:
-    if family.link.kind != "frames":
+def test_senseless_frames_disturb_nobody_where_frames_stand_by_themselves(subject: Family) -> None:
+    if subject.link.kind != "frames":
         return  # on a byte line they make a reply doubtful; the tests of the bus say how
     line = Babbling()
-    with world(family, line=line) as there:
+    with world(subject, line=line) as there:
         values = [there.device(node).read() for node in IDS]
-        line.babble = tuple(vector.data for vector in vectors(family.name) if not vector.valid)
+        line.babble = tuple(vector.data for vector in vectors(subject.name) if not vector.valid)
         with sent(there.bus) as frames:
             assert [there.device(node).read() for node in IDS] == values
         assert len(frames) == len(set(frames)), "nothing had to be asked twice"
         assert line.babble
 
 
-def test_the_answer_of_another_node_is_never_taken(family: Family) -> None:
+def test_the_answer_of_another_node_is_never_taken(subject: Family) -> None:
     line = Tampering()
-    with world(family, line=line) as there:
+    with world(subject, line=line) as there:
         device = there.device(NODE)
         device.read()
         for row in steady(there):
@@ -160,12 +160,12 @@ def test_the_answer_of_another_node_is_never_taken(family: Family) -> None:
             assert_never_taken(there, line, instead, device, row.name)
 
 
-def test_the_answer_to_another_question_is_never_taken(family: Family) -> None:
+def test_the_answer_to_another_question_is_never_taken(subject: Family) -> None:
     """Where frames say what they answer; on a byte line of FEETECH's kind they do not, and taint is what protects."""
-    if family.link.kind != "frames":
+    if subject.link.kind != "frames":
         return
     line = Tampering()
-    with world(family, line=line) as there:
+    with world(subject, line=line) as there:
         device = there.device(NODE)
         rows = steady(there)
         for row, other in zip(rows, [*rows[1:], rows[0]], strict=True):

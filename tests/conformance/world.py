@@ -19,7 +19,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.conformance.subjects import vectors
+from tests.conformance.subjects import tables_of, vectors
 
 IDS = (1, 2, 3)
 
@@ -67,7 +67,7 @@ class World:
 
     def settings(self) -> dict[int, dict[str, int]]:
         """Everything that a host could have changed, of all devices."""
-        tables = list(self.family.tables.values())
+        tables = tables_of(self.family)
         return {
             node: {
                 name: held for table in tables for name in _writable(table) for held in self._held(node, name)
@@ -80,7 +80,7 @@ class World:
         try:
             return [self.memory(node)[name]]
         except (KeyError, RequestError):
-            if len(self.family.tables) == 1:
+            if len(tables_of(self.family)) == 1:
                 raise
             return []
 

@@ -218,3 +218,10 @@ def test_line_and_rate_hold_on_a_channel_too(channel: QueueLink) -> None:
 def test_devices_on_a_serial_line_have_no_channel(channel: QueueLink) -> None:
     with simulation() as sim, pytest.raises(RequestError, match="CAN"):
         sim.serve("can://virtual/here")
+
+
+def test_the_address_tells_a_rate_that_is_not_the_usual_one() -> None:
+    with simulation(3, model="sm85blhv", name="arm") as sim:
+        assert sim.url == "feetech:sim:arm,baud=115200"
+        sim[3].memory["baud_rate"] = 0  # the address is that of the bus as it was made
+        assert sim.url == "feetech:sim:arm,baud=115200"

@@ -36,7 +36,7 @@ class AsyncBus(BusFace):
             with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
                 loop.call_soon_threadsafe(news.set)
 
-        run = Run(self.turns, operation, now=self.link.now, report=report or self.report, wake=wake)
+        run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=wake)
         caught: BaseException | None = None
         while True:
             try:

@@ -12,16 +12,19 @@ from motorbus.bus.stop import StopOutcome, Stopper
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
 from motorbus.core.family import Family
-from motorbus.core.operation import Exchange, Notice
+from motorbus.core.operation import Exchange, Journal, Notice
 from motorbus.link.base import Link
+
+Notify = Callable[[object], None]
 
 
 class BusFace:
     """An open bus: one link, one family, one set of turns.
 
     `admit` is asked before anything that moves a motor or switches torque is sent; without it such exchanges are
-    refused. `report` gets the events of operations (progress, early results, journal records). `stop_socket` is
-    where another process can ask for an emergency stop.
+    refused. `report` gets the events of operations (progress, early results, journal records). `journal` gets the
+    journal records before anybody else, whoever listens. `stop_socket` is where another process can ask for an
+    emergency stop. `warnings` are what the user ought to know about this bus.
     """
 
     def __init__(
@@ -30,12 +33,15 @@ class BusFace:
         family: Family,
         *,
         admit: Admit | None = None,
-        report: Callable[[object], None] | None = None,
+        report: Notify | None = None,
+        journal: Notify | None = None,
         stop_socket: Path | None = None,
     ) -> None:
         self.link = link
         self.family = family
         self.report = report
+        self.journal = journal
+        self.warnings: tuple[str, ...] = tuple(link.warnings)
         self.turns = Turns(
             family,
             rate=link.rate,
@@ -57,6 +63,20 @@ class BusFace:
                 self.stopper.start()
 
         return admitted
+
+    def listener(self, report: Notify | None) -> Notify | None:
+        """Who hears the events of an operation: `report`, or the bus's own listener; and the journal before them."""
+        told, journal = report or self.report, self.journal
+        if journal is None:
+            return told
+
+        def tell(event: object) -> None:
+            if isinstance(event, Journal):
+                journal(event)
+            if told is not None:
+                told(event)
+
+        return tell
 
     @property
     def statistics(self) -> Statistics:

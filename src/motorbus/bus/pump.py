@@ -33,7 +33,7 @@ class Bus(BusFace):
         if isinstance(operation, Exchange):
             return self._exchange(operation)
         relay = self.relay
-        run = Run(self.turns, operation, now=self.link.now, report=report or self.report, wake=relay.wake)
+        run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=relay.wake)
         caught: BaseException | None = None
         while True:
             try:

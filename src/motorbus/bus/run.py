@@ -277,7 +277,7 @@ def _waiting(branch: Branch) -> list[Branch]:
 
 def _no_journal(event: Journal) -> RequestError:
     return RequestError(
-        f"this bus keeps no journal, so it refuses to {event.change}",
+        f"this bus keeps no journal, so it refuses {event.change}()",
         cause="a guarded change must be on disk before it begins, or a crash in the middle could not be mended",
         advice="open the bus with motorbus.open(), or give it a `report`; nothing was sent",
     )

@@ -47,10 +47,16 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "write": "Write registers of a device.",
         "move": "Move devices to positions, several of them together.",
         "torque": "Switch the power stage on or off.",
+        "calibrate": "Make the present pose of a device read another position, for good.",
         "stop": "Decelerate and hold.",
         "estop": "Emergency stop: stop a bus at once, from any shell.",
     },
-    Group("Without hardware", sort_key=3): {
+    Group("Name", sort_key=3): {
+        "set-id": "Give a device another id, for good.",
+        "set-baud": "Let devices speak at another rate, for good.",
+        "recover": "Finish or take back a change of id or rate that was cut off.",
+    },
+    Group("Without hardware", sort_key=4): {
         "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
         "demo": "Find, identify and move six simulated devices, and draw what they did.",
     },
@@ -73,7 +79,8 @@ def build() -> App:
     )
     for group, commands in _COMMANDS.items():
         for name, line in commands.items():
-            app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=group)
+            file = name.replace("-", "_")
+            app.command(f"motorbus.cli.{file}:app", name=name, help=line, group=group)
     for name in faces.names():
         line = f"What only {name} devices can do."
         app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=_FAMILIES)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
-from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Rank, Together
+from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Rank, Together, Tune
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
@@ -37,7 +37,18 @@ class _AsWritten:
     __hash__ = None  # type: ignore[assignment]
 
     def __getattr__(self, name: str) -> Any:
-        raise Unforeseeable("what would be sent next depends on an answer that only a real run gets")
+        raise _unforeseeable()
+
+    def _used(self, *_: object) -> Any:
+        raise _unforeseeable()
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __mod__ = __rshift__ = __and__ = _used
+    __lt__ = __le__ = __gt__ = __ge__ = __int__ = __float__ = __index__ = _used
+    __abs__ = __len__ = __iter__ = __contains__ = __getitem__ = _used
+
+
+def _unforeseeable() -> Unforeseeable:
+    return Unforeseeable("what would be sent next depends on an answer that only a real run gets")
 
 
 class DryBus:
@@ -80,13 +91,19 @@ class DryBus:
             return self.run(step.operation)
         if isinstance(step, Together):
             return [self.run(operation) for operation in step.operations]
-        return None  # a pause, a report: nothing is sent
+        if isinstance(step, Tune) and (step.rate == 0 or self.family.link.kind == "bytes"):
+            return self._bus.run(
+                iter(step)
+            )  # on CAN whoever speaks at another rate disturbs the bus: only ask there
+        return None  # a pause, a report, another rate: nothing is sent
 
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
             return _AsWritten() if self._follows(exchange) else self._bus.run(exchange)
         self._gate(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
+        if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
+            self._written.add(_EVERYONE)
         request = exchange.request
         self.frames.append(request.flat() if isinstance(request, CanFrame) else request)
         return None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import alarms
 from motorbus.cli import registers as table_rows
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
@@ -56,7 +57,8 @@ def info(
         identity: Identity = one.identify()
         entries = _entries(table_of(one), everything=registers)
         values = one.read(*(entry.name for entry in entries))
-    _show(identity, family, table_rows.facts(one, entries, values), registers, output)
+        told = alarms.in_words(one)
+    _show(identity, family, table_rows.facts(one, entries, values), registers, output, told)
     return Exit.OK
 
 
@@ -71,15 +73,20 @@ def _bounds(entry: Entry) -> bool:
 
 
 def _show(
-    identity: Identity, family: Family, rows: Sequence[dict[str, Any]], registers: bool, output: Output
+    identity: Identity,
+    family: Family,
+    rows: Sequence[dict[str, Any]],
+    registers: bool,
+    output: Output,
+    told: Sequence[str] = (),
 ) -> None:
     known = {"id": identity.node, "model": identity.model, "firmware": identity.firmware}
     named = {**known, "table": identity.table, **identity.details}
     title = "registers" if registers else "limits"
-    output.document("motorbus.info/1", {**named, title: rows})
+    output.document("motorbus.info/1", {**named, title: rows, "alarms": list(told)})
     table = identity.table or "unknown firmware: read only"
     words = {**named, "id": id_shown(identity.node, family), "table": table}
-    output.table(identity.model, ["", ""], words.items())
+    output.table(identity.model, ["", ""], [*words.items(), *(("alarm", one) for one in told)])
     if rows:
         output.text("")
         table_rows.show(title.capitalize(), rows, output, full=registers)

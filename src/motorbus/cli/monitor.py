@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import traffic
+from motorbus.cli import alarms, traffic
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.read import state_facts
@@ -75,7 +75,15 @@ def monitor(
         return traffic.listen(devices, count, duration, options, output)
     with ExitStack() as stack, _shown(output) as show:
         watched = _watched(gathered(devices), stack, options, output)
-        return _watch(watched, 1 / rate, count, duration, show)
+        told = alarms.Told(output)
+
+        def tell(sample: Sample) -> None:
+            show(sample)
+            for (name, node), state in sample.items():
+                if not isinstance(state, MotorbusError):
+                    told.look(name, watched[name, node], state)
+
+        return _watch(watched, 1 / rate, count, duration, tell)
 
 
 def _watched(

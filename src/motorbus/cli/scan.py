@@ -17,7 +17,7 @@ from motorbus.core.operation import Progress
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from motorbus.cli.output import Bar
     from motorbus.cli.target import Target
@@ -88,8 +88,6 @@ def scan(
             with output.progress("scanning") as bar:
                 found = opening.run(operation, report=partial(_heard, wanted.family.name, early, bar, notes))
         finally:
-            for text in notes:
-                output.note(f"note: {text}")
             _show(wanted, early if found is None else found, notes, output)
         if not found:
             raise nobody(bus)
@@ -159,11 +157,29 @@ def listen(event: object, found: list[Found], bar: Bar) -> None:
         bar.advance(event.done, event.total, event.what)
 
 
+def mixed_firmware(found: Iterable[Found], family: Family) -> list[str]:
+    """A note for each model of which devices have several firmware versions: they may behave differently."""
+    versions: dict[str, dict[str, list[str]]] = {}
+    for one in found:
+        if one.identity is not None:
+            nodes = versions.setdefault(one.identity.model, {}).setdefault(one.identity.firmware, [])
+            nodes.append(f"#{id_shown(one.node, family)}")
+    return [
+        f"{model} with several firmware versions, which may behave differently: "
+        + ", ".join(f"{version} ({', '.join(nodes)})" for version, nodes in by_version.items())
+        for model, by_version in versions.items()
+        if len(by_version) > 1
+    ]
+
+
 def _model(one: Found) -> str:
     return one.identity.model if one.identity else "?"
 
 
 def _show(wanted: Target, found: list[Found], notes: list[str], output: Output) -> None:
+    notes = [*notes, *mixed_firmware(found, wanted.family)]
+    for text in notes:
+        output.note(f"note: {text}")
     word = rate_word(wanted.family)
     devices = [facts(one, word) for one in found]
     output.document("motorbus.scan/1", {"bus": wanted.bus, "devices": devices, "notes": notes})

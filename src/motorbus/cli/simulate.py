@@ -97,8 +97,11 @@ def simulate(
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
-    rate = asked or found.link.rate
+    usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
+    rate = asked or usual
     simulator.tune(rate)
+    if usual != found.link.rate and found.link.kind == "bytes":
+        settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
         stop = stack.enter_context(_until_signalled())
         served = _served(stack, found, Ways(link, tcp, socketcand, can), asked)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
+from motorbus.cli import faces
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
@@ -72,15 +73,20 @@ def gathered(texts: Iterable[str]) -> dict[str, tuple[int, ...]]:
 
 @contextmanager
 def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus]:
-    """An open bus, closed at the end; says what the user ought to know about the port."""
+    """An open bus, closed at the end; says what the user ought to know about the port, and what its operations tell."""
     from motorbus import session
 
-    with session.open(bus, report=None, **said(options)) as found:
+    def tell(event: object) -> None:
+        say = faces.offer(found.family.name, "say")
+        if say is not None and (text := say(event)):
+            output.note(f"note: {text}")
+
+    with session.open(bus, report=tell, **said(options)) as found:
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         if LOG.isEnabledFor(logging.DEBUG):
             found.trace.add(_Told(0))
-        for warning in found.link.warnings:
+        for warning in found.warnings:
             output.note(f"note: {warning}")
         try:
             yield found

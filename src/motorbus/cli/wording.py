@@ -21,6 +21,10 @@ COMMANDS: Final[Mapping[str, str]] = {
     "write(": "`motorbus write BUS#ID {}`",
     "enable_torque()": "`motorbus torque on`",
     "disable_torque()": "`motorbus torque off`",
+    "set_id()": "`motorbus set-id`",
+    "set_baud()": "`motorbus set-baud`",
+    "recover()": "`motorbus recover BUS`",
+    "recover(alone=True)": "`motorbus recover BUS --alone`",
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b")
@@ -29,10 +33,15 @@ _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 def in_words_of_the_shell(error: MotorbusError, family: Family) -> None:
     """Name commands where this error names methods; what has no command stays as it is."""
+    for part in _PARTS:
+        setattr(error, part, shell_words(getattr(error, part), family))
+
+
+def shell_words(text: str, family: Family) -> str:
+    """A text that names methods, with commands in their place."""
     words: dict[str, str] = {**COMMANDS, **(faces.offer(family.name, "COMMANDS") or {})}
 
     def said(call: re.Match[str]) -> str:
         return words.get(call[0]) or words.get(call[1] or "", call[0]).format(call[2])
 
-    for part in _PARTS:
-        setattr(error, part, _CALL.sub(said, getattr(error, part)))
+    return _CALL.sub(said, text)

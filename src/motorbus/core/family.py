@@ -147,7 +147,10 @@ class SimulatedNode(Protocol):
 
 
 class Simulator(Protocol):
-    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own."""
+    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own.
+
+    One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s).
+    """
 
     @property
     def nodes(self) -> Mapping[int, SimulatedNode]: ...
@@ -170,10 +173,13 @@ class Device(Protocol):
 
     `read(*names)` gives values by name, `write(**values)` takes them. What moves also has `position`, `telemetry`
     (a `State`), `enable_torque`, `disable_torque`, `stop` and `move(to, *, wait=True)`; `move` may take `velocity` and
-    `acceleration`. Persistent rows are written through a guarded sequence; where that opens a lock, the lock is a row
-    named `lock` with a choice called "closed", and it is closed again whatever happens. `table` is its register map
-    once that is known (None before), `value(row, raw)` and `raw(row, value)` convert with the factors of this very
-    device. Reading has rank POLL and effect NONE, so a dry run can tell it from what changes something.
+    `acceleration`. What has modes also has `mode()` and `set_mode(mode)`, and of `set_velocity`, `set_duty`,
+    `set_current` and `step` those that some model of the family heeds. What can be given a zero has `calibrate(to=None)`
+    (rad; None: the middle) and `zero()`, and both give a named tuple whose floats are angles and whose whole numbers are
+    raw; `alarms()`, where it is there, gives each alarm that is set in words. Persistent rows are written through a
+    guarded sequence; where that opens a lock, the lock is a row named `lock` with a choice called "closed", and it is
+    closed again whatever happens. `table` is its register map once that is known (None before), `value(row, raw)` and
+    `raw(row, value)` convert with the factors of this very device. Reading has rank POLL and effect NONE, so a dry run can tell it from what changes something.
     """
 
     @property

@@ -102,7 +102,7 @@ Its replies are `ANY`; it takes each reply that nobody else awaits, whatever lan
 class Goal(NamedTuple):
     """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
 
-    `quantity` is position (rad), velocity (rad/s), load (fraction) or relative (rad). A limit that is not known
+    `quantity` is position (rad), velocity (rad/s), load (fraction), current (A) or relative (rad). A limit that is not known
     is None, and the gate refuses what it cannot judge.
     """
 
@@ -304,11 +304,23 @@ class Progress(NamedTuple):
 
 
 class Journal(NamedTuple):
-    """An event for `Report` that must be on disk before the next step: intent or outcome of a guarded change."""
+    """An event for `Report` that must be on disk before the next step: how far a guarded change has come.
+
+    `change`  the verb that makes it, as "set_id"
+    `state`   ASKED: it is wanted, and its conditions are about to be checked; nothing is kept, but a bus on which
+              another change is unfinished refuses. INTENT: from the next step on something may be changed; `facts` are
+              all that is needed to finish it or to take it back, as plain data, the id of the device as "node".
+              Any other word: a step that has been reached. OUTCOME: it is over, `facts["outcome"]` says how
+    """
 
     change: str
     state: str
     facts: dict[str, object]
+
+
+ASKED: Final = "asked"
+INTENT: Final = "intent"
+OUTCOME: Final = "outcome"
 
 
 class Report:

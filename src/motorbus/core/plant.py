@@ -11,6 +11,7 @@ clock the caller uses; only differences count.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import copysign, inf, isfinite, sqrt
 from typing import NamedTuple
@@ -31,6 +32,22 @@ class Phase(NamedTuple):
     def velocity_after(self, elapsed: float) -> float:
         """Velocity `elapsed` seconds into this phase."""
         return self.velocity + self.acceleration * elapsed
+
+
+class Stretch(NamedTuple):
+    """A part of a movement in one direction: from when to when, how fast at its beginning, and how that changes."""
+
+    begin: float
+    end: float
+    position: float
+    velocity: float
+    acceleration: float
+
+    @property
+    def way(self) -> float:
+        """1.0 or -1.0 where it goes, 0.0 where it stands."""
+        direction = self.velocity or self.acceleration
+        return copysign(1.0, direction) if direction else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +87,16 @@ class Motion:
     def done_at(self) -> float:
         """When it comes to rest at its goal; infinity when it never does."""
         return inf if self.cruise else self.start + sum(phase.duration for phase in self.phases)
+
+    def stretches(self, since: float = -inf) -> Iterator[Stretch]:
+        """Every part that ends after `since`, in order; the last one, at rest or cruising, ends at infinity."""
+        begin = self.start
+        for phase in self.phases:
+            for stretch in _one_way(begin, phase):
+                if stretch.end > since:
+                    yield stretch
+            begin += phase.duration
+        yield Stretch(begin, inf, self.goal, self.cruise, 0.0)
 
     def _phase(self, at: float) -> tuple[Phase | None, float]:
         elapsed = max(0.0, at - self.start)
@@ -124,6 +151,47 @@ def run(
         return Motion(at, (), position, velocity_goal)
     ramp = Phase(abs(change) / acceleration, position, velocity, copysign(acceleration, change))
     return Motion(at, (ramp,), ramp.position_after(ramp.duration), velocity_goal)
+
+
+def obstructed(motion: Motion, low: float, high: float) -> Motion:
+    """The same movement with obstacles at `low` and `high`: it ends at the one it runs into, at once and at rest.
+
+    Beyond an obstacle only the way back is free. A movement that meets none is given back as it is.
+    """
+    phases: list[Phase] = []
+    for stretch in motion.stretches():
+        bound = high if stretch.way > 0 else low
+        ahead = (bound - stretch.position) * stretch.way if stretch.way else inf
+        time = _time_over(max(0.0, ahead), stretch)
+        if time is not None and stretch.begin + time < stretch.end:
+            if time:
+                phases.append(Phase(time, stretch.position, stretch.velocity, stretch.acceleration))
+            return Motion(motion.start, tuple(phases), bound if ahead > 0 else stretch.position)
+        if stretch.end < inf:
+            phases.append(Phase(stretch.end - stretch.begin, *stretch[2:]))
+    return motion
+
+
+def _one_way(begin: float, phase: Phase) -> Iterator[Stretch]:
+    """A phase, cut in two where the direction changes."""
+    end = begin + phase.duration
+    turn = -phase.velocity / phase.acceleration if phase.acceleration else inf
+    if not 0 < turn < phase.duration:
+        yield Stretch(begin, end, *phase[1:])
+        return
+    yield Stretch(begin, begin + turn, *phase[1:])
+    yield Stretch(begin + turn, end, phase.position_after(turn), 0.0, phase.acceleration)
+
+
+def _time_over(distance: float, stretch: Stretch) -> float | None:
+    """Seconds until a stretch has covered this distance; None if it never does, whenever it ends."""
+    if distance == inf:
+        return None
+    speed, gain = abs(stretch.velocity), stretch.acceleration * stretch.way
+    square = speed**2 + 2 * gain * distance
+    if square < 0 or not (speed or gain):
+        return None
+    return 2 * distance / (speed + sqrt(square)) if distance else 0.0
 
 
 def _check(speed: float, acceleration: float, *finite: float) -> None:

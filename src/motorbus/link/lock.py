@@ -24,6 +24,7 @@ from motorbus.errors import LinkError
 from motorbus.link.refusal import Owner, busy
 
 SOCKET_LIMIT = 107  # bytes of a path in struct sockaddr_un on Linux, the terminating zero not counted
+JOURNAL = ".journal"
 TRIES = 50  # each a millisecond: how long somebody who only looks may be in the way
 
 
@@ -75,6 +76,16 @@ def socket_path(port: str) -> Path:
         return path
     digest = hashlib.sha256(os.fsencode(path)).hexdigest()[:16]
     return _short_folder() / f"{digest}.sock"
+
+
+def journal_path(port: str) -> Path:
+    """Where the changes of devices on this port are recorded that must not be forgotten by a crash."""
+    return state_folder() / f"{_stem(port)}{JOURNAL}"
+
+
+def journals() -> list[Path]:
+    """Every such file of this user."""
+    return sorted(state_folder().glob(f"*{JOURNAL}"))
 
 
 def _short_folder() -> Path:

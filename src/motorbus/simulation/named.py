@@ -64,9 +64,15 @@ class Simulation:
 
     @property
     def url(self) -> str:
-        """The address that `motorbus.open` takes, with the settings of the bus."""
-        settings = "".join(f",{name}={value}" for name, value in self.settings.items())
+        """The address that `motorbus.open` takes, with the settings of the bus, and its rate if it is not the usual."""
+        settings = "".join(f",{name}={value}" for name, value in {**self.settings, **self._rate()}.items())
         return f"{self.family.name}:sim:{self.name}{settings}"
+
+    def _rate(self) -> dict[str, int]:
+        """As an option of the address: devices that ship with another rate than most say so by `usual_rate`."""
+        rate = getattr(self.simulator, "usual_rate", None)
+        word = "baud" if self.family.link.kind == "bytes" else "bitrate"
+        return {word: rate} if rate and rate != self.family.link.rate else {}
 
     @property
     def line(self) -> Line:

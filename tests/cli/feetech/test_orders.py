@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-import motorbus
-from motorbus.cli import feetech
-from motorbus.errors import NoReply
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -93,33 +88,6 @@ def test_what_cannot_be_done(words: list[str], code: int, run: Run, arm: Simulat
     ran = run("feetech", *(word.replace("BUS", arm.url) for word in words))
     assert ran.code == code
     assert ran.err.startswith("error: ")
-
-
-def test_a_train_sends_all_goals_and_reads_all_positions(arm: Simulation) -> None:
-    with motorbus.open(arm.url) as bus:
-        train = feetech.Train(bus, [1, 3])
-        before = bus.run(train.positions)
-        bus.run(train.goals([math.pi, math.pi]))
-        assert before.values == {1: pytest.approx(math.pi), 3: pytest.approx(math.pi)}
-        assert train.air_time([0.0, 0.0]) == pytest.approx((14 + 10 + 2 * 8) * 10e-6)
-        with pytest.raises(NoReply):
-            feetech.Train(bus, [1, 9])
-
-
-def test_moving_together_is_one_packet(arm: Simulation) -> None:
-    with motorbus.open(arm.url) as bus:
-        trace = bus.trace.subscribe()
-        feetech.move_together(bus, {1: 2.5, 2: 2.0, 3: 3.0}, velocity=3.0)
-        sent = [
-            record.data for record in trace if record.direction == "tx" and isinstance(record.data, bytes)
-        ]
-        sync_writes = [data for data in sent if data[4] == 0x83]
-        assert len(sync_writes) == 1
-        assert [motorbus.feetech.Servo(bus, node).position() for node in (1, 2, 3)] == [
-            pytest.approx(2.5, abs=0.05),
-            pytest.approx(2.0, abs=0.05),
-            pytest.approx(3.0, abs=0.05),
-        ]
 
 
 def test_back_as_shipped_needs_consent_and_says_where_it_is(run: Run, arm: Simulation) -> None:

@@ -1,82 +1,126 @@
-"""Common commands with a servo whose map is not commanded: it is told and read, and refuses to be written or moved.
-
-The simulator knows the STS map only, so the first registers of a simulated servo are made to say that it is another;
-what it does with bytes is all the same to these commands, which must not send any.
-"""
+"""Common commands with a servo of every map: told, read, written, moved and let go; a stranger is read and let go."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import pytest
 
+import motorbus
+from motorbus.families.feetech.table import TABLES
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Ran, Run
+from tests.families.feetech.maps import MODELS
 
-HEADS = {
-    "hls": {"firmware_minor": 43, "model_major": 10, "model_minor": 18},
-    "scs": {"firmware_major": 0, "firmware_minor": 10, "byte_order": 1, "model_major": 5, "model_minor": 4},
-    "smbl": {"firmware_major": 2, "firmware_minor": 45, "model_major": 8, "model_minor": 44},
-}
+Say = Callable[..., Ran]
+RATES = {"smbl": 115_200, "smcl": 115_200}
+"""bit/s at which servos of a map ship, where that is not 1000000."""
+
+
+@pytest.fixture(params=TABLES)
+def other(request: pytest.FixtureRequest) -> Iterator[tuple[str, Simulation]]:
+    """Two simulated servos of this map, and its name."""
+    name = str(request.param)
+    with motorbus.simulate("feetech", ids="1-2", model=MODELS[name]) as simulation:
+        yield name, simulation
+
+
+@pytest.fixture
+def say(other: tuple[str, Simulation], run: Run) -> Say:
+    """A command in words, BUS standing for the bus, at the rate of these servos."""
+    name, simulation = other
+    address = f"{simulation.url},baud={RATES.get(name, 1_000_000)}"
+
+    def said(command: str) -> Ran:
+        return run(*command.replace("BUS", address).split())
+
+    return said
+
+
+def test_info_says_which_map_it_has_and_that_it_is_writable(other: tuple[str, Simulation], say: Say) -> None:
+    told = say("info BUS#1 --json").document
+    assert (told["table"], told["register_map"], told["writable"]) == (other[0], other[0], True)
+    assert say("info BUS#1").code == 0
+    assert say("info BUS#1 --registers").code == 0
+
+
+def test_it_is_scanned_read_and_watched(say: Say) -> None:
+    assert len(say("scan BUS --json").document["devices"]) == 2
+    assert say("read BUS#1 present_voltage id").code == 0
+    assert say("read BUS#1").code == 0
+    assert say("monitor BUS#1 --count 1").code == 0
+
+
+def test_it_is_written_and_moved(other: tuple[str, Simulation], say: Say) -> None:
+    _, simulation = other
+    assert say("write BUS#1 led_mask=1 --yes").code == 0
+    assert simulation[1].memory["led_mask"] == 1
+    assert say("torque on BUS#1").code == 0
+    assert simulation[1].memory["torque_enable"] == 1
+    assert say("move BUS#1=2.0 --yes").code == 0
+    assert say("move BUS#1=2.5 BUS#2=3.0 --yes").code == 0
+    assert say("stop BUS#1").code == 0
+    assert say("feetech reg-write BUS#1 goal_position=2.2 --yes").code == 0
+    assert say("feetech action BUS#1").code == 0
+    assert say("feetech sync-write BUS goal_position 1=2.0 2=2.0 --yes").code == 0
+    assert say("feetech sync-read BUS#1-2 present_position").code == 0
+
+
+def test_it_is_let_go_and_stopped(other: tuple[str, Simulation], say: Say) -> None:
+    _, simulation = other
+    for command in ("torque off BUS#1", "estop BUS#1"):
+        simulation[1].memory["torque_enable"] = 1
+        assert say(command).code == 0
+        assert simulation[1].memory["torque_enable"] == 0
+
+
+def test_hls_is_read_in_its_own_units(run: Run) -> None:
+    with motorbus.simulate("feetech", ids="1", model="hls3925") as simulation:
+        simulation[1].memory["goal_velocity"] = 100
+        (told,) = run("read", f"{simulation.url}#1", "goal_velocity", "--json").document["registers"]
+        assert (told["raw"], told["value"]) == (100, pytest.approx(7.66990))
+        ran = run("read", f"{simulation.url}#1", "goal_time")
+        assert ran.code == 2
+        assert "table hls has no register" in ran.err
+
+
+# --- a servo whose map nobody knows -------------------------------------------------------------------------
+
 REFUSED = (
     "write BUS#1 led_mask=1 --yes",
     "write BUS#1 led_mask=1 --dry-run",
-    "write BUS#1 goal_position=0.5 --yes",
+    "write BUS#1 goal_position=500 --expert --yes",
     "move BUS#1=0.5 --yes",
     "move BUS#1=0.5 BUS#2=3.0 --yes",
     "torque on BUS#1",
     "stop BUS#1",
-    "feetech reg-write BUS#1 goal_position=0.5 --yes",
-    "feetech sync-write BUS goal_position 1=0.5 --yes",
+    "feetech reg-write BUS#1 goal_position=500 --yes",
+    "feetech action BUS#1",
+    "feetech sync-write BUS goal_position 1=500 --yes",
     "feetech factory-restore BUS#1 --yes",
 )
 
 
-@pytest.fixture(params=HEADS)
-def other(request: pytest.FixtureRequest, arm: Simulation) -> str:
-    """Servo 1 of `arm` says that it has this map."""
-    name = str(request.param)
-    for row, raw in HEADS[name].items():
-        arm[1].memory[row] = raw
-    return name
-
-
-def test_info_says_which_map_it_has_and_that_it_is_not_written(other: str, run: Run, arm: Simulation) -> None:
-    told = run("info", f"{arm.url}#1", "--json").document
-    assert (told["table"], told["register_map"], told["writable"]) == (other, other, False)
-    assert run("info", f"{arm.url}#1").code == 0
-    assert run("info", f"{arm.url}#1", "--registers").code == 0
-
-
-def test_it_is_scanned_read_and_watched(other: str, run: Run, arm: Simulation) -> None:
-    assert len(run("scan", arm.url, "--json").document["devices"]) == 3
-    assert run("read", f"{arm.url}#1", "present_voltage", "id").code == 0
-    assert run("read", f"{arm.url}#1").code == 0
-    assert run("monitor", f"{arm.url}#1", "--count", "1").code == 0
-
-
-def test_hls_is_read_in_its_own_units(run: Run, arm: Simulation) -> None:
-    arm[1].memory["goal_velocity"] = 100
-    for row, raw in HEADS["hls"].items():
-        arm[1].memory[row] = raw
-    (told,) = run("read", f"{arm.url}#1", "goal_velocity", "--json").document["registers"]
-    assert (told["raw"], told["value"]) == (100, pytest.approx(7.66990))
-    ran = run("read", f"{arm.url}#1", "goal_time")
-    assert ran.code == 2
-    assert "table hls has no register" in ran.err
+@pytest.fixture
+def stranger() -> Iterator[Simulation]:
+    """Servo 1 has a firmware that is not described, servo 2 a usual one."""
+    with motorbus.simulate("feetech", ids="1-2", firmware="9.9+3.10") as simulation:
+        yield simulation
 
 
 @pytest.mark.parametrize("command", REFUSED)
-def test_it_refuses_and_nothing_changes(other: str, command: str, run: Run, arm: Simulation) -> None:
-    before = bytes(arm[1].memory.live), bytes(arm[2].memory.live[40:56])
-    ran = run(*command.replace("BUS", arm.url).split())
+def test_a_stranger_is_not_written_and_nothing_changes(command: str, run: Run, stranger: Simulation) -> None:
+    before = bytes(stranger[1].memory.live), bytes(stranger[2].memory.live[40:56])
+    ran = run(*command.replace("BUS", stranger.url).split())
     assert ran.code == 7, ran.err
-    assert f"map {other} is read and not commanded yet" in ran.err
-    assert (bytes(arm[1].memory.live), bytes(arm[2].memory.live[40:56])) == before
+    assert "register map is not described" in ran.err
+    assert (bytes(stranger[1].memory.live), bytes(stranger[2].memory.live[40:56])) == before
 
 
-def test_it_is_let_go_and_stopped(other: str, run: Run, arm: Simulation) -> None:
-    arm[1].memory["torque_enable"] = 1
-    assert run("torque", "off", f"{arm.url}#1").code == 0
-    assert arm[1].memory["torque_enable"] == 0
-    arm[1].memory["torque_enable"] = 1
-    assert run("estop", f"{arm.url}#1").code == 0
-    assert arm[1].memory["torque_enable"] == 0
+def test_a_stranger_is_told_read_and_let_go(run: Run, stranger: Simulation) -> None:
+    told = run("info", f"{stranger.url}#1", "--json").document
+    assert (told["table"], told["register_map"], told["writable"]) == ("", "unknown", False)
+    assert run("read", f"{stranger.url}#1", "present_voltage", "id").code == 0
+    stranger[1].memory["torque_enable"] = 1
+    assert run("torque", "off", f"{stranger.url}#1").code == 0
+    assert stranger[1].memory["torque_enable"] == 0

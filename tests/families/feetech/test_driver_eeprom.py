@@ -7,6 +7,7 @@ import pytest
 from motorbus.core.operation import Effect, Rank, Timeout
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
+from motorbus.families.feetech.table import TABLES, Mode
 from tests.families.feetech.driver_script import (
     Line,
     Played,
@@ -18,20 +19,23 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
+from tests.families.feetech.maps import simulated
 
 OFF, UNLOCK, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
+STILL_OPEN = reads(3, 55, 0)
 WRITES = (writes(3, 20, 5, 33), reads(3, 20, 5, 33))
-WHOLE = (OFF, UNLOCK, *WRITES, LOCK, LOCKED)
+WHOLE = (OFF, UNLOCK, *WRITES, STILL_OPEN, LOCK, LOCKED)
 
 
 def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
     played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
     assert played.alone == 1
-    assert [exchange.timeout for exchange in played.exchanges[1:]] == [Timeout.STORE] * 5
+    assert [exchange.timeout for exchange in played.exchanges[1:]] == [Timeout.STORE] * 6
     assert [exchange.effect for exchange in played.exchanges] == [
         Effect.TORQUE,
         Effect.PERSISTENT,
         Effect.PERSISTENT,
+        Effect.NONE,
         Effect.NONE,
         Effect.PERSISTENT,
         Effect.NONE,
@@ -43,24 +47,33 @@ def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() ->
     play(
         write(prepared(), position_p=33, max_temperature=65, torque_limit=0.5),
         *(OFF, UNLOCK, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
-        *(LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
+        *(STILL_OPEN, LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
     )
 
 
 def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
     played = watch(
         write(prepared(), operating_mode=1),
-        *(OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), LOCK, LOCKED),
+        *(OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), STILL_OPEN, LOCK, LOCKED),
     )
     assert max(exchange.effect for exchange in played.exchanges) is Effect.TORQUE
 
 
 def test_settings_are_read_again_afterwards() -> None:
     node = prepared()
-    play(write(node, operating_mode=1), OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), LOCK, LOCKED)
+    play(
+        write(node, operating_mode=1),
+        OFF,
+        UNLOCK,
+        writes(3, 33, 1),
+        reads(3, 33, 1),
+        STILL_OPEN,
+        LOCK,
+        LOCKED,
+    )
     assert node.settings is None
     play(write(node, torque_enable=0), prepares(at_33=1), OFF)
-    assert node.mode == 1
+    assert node.known_mode is Mode.VELOCITY
 
 
 def test_reading_back_different_is_an_error_and_the_lock_is_closed() -> None:
@@ -95,7 +108,7 @@ def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
 @pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
 def test_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
     played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in failing(step)), LOCK, LOCKED])
-    if step < 4:
+    if step < 5:
         with pytest.raises(type(failure)):
             played.run(write(prepared(), position_p=33, led_mask=5))
     else:  # everything is written, and the second attempt closes the lock
@@ -136,7 +149,7 @@ def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
         write(prepared(at_8=0), led_mask=5),
         *(unheard(OFF), reads(3, 40, 0), unheard(UNLOCK), reads(3, 55, 0)),
         *(unheard(writes(3, 20, 5)), reads(3, 20, 5), reads(3, 20, 5)),
-        *(unheard(LOCK), LOCKED, LOCKED),
+        *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
 
 
@@ -144,5 +157,20 @@ def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
     play(
         write(prepared(), status_return_level=0),
         *(OFF, UNLOCK, unheard(writes(3, 8, 0)), reads(3, 8, 0), reads(3, 8, 0)),
-        *(unheard(LOCK), LOCKED, LOCKED),
+        *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
+
+
+@pytest.mark.parametrize("commits", [0, 0.5, 1])
+@pytest.mark.parametrize("name", TABLES)
+def test_a_servo_that_lost_its_supply_in_the_middle_is_not_taken_for_done(name: str, commits: float) -> None:
+    """It comes back with its lock closed, takes the write that is repeated, reads back right and keeps nothing."""
+    with simulated(name) as (real, servo):
+        servo.prepare()
+        real.cut(commits)
+        with pytest.raises(OutcomeUnknown, match="closed its EEPROM lock by itself"):
+            servo.write(led_mask=5)
+        assert real.memory["lock"] == 1
+        servo.write(led_mask=5)
+        real.power_cycle()
+        assert real.memory["led_mask"] == 5

@@ -10,6 +10,7 @@ from motorbus.core.operation import Effect, Goal
 from motorbus.errors import ChecksumError, DeviceError, LimitExceeded, NoReply, RequestError
 from motorbus.families.feetech.driver import Node, prepare_all, sync_read, sync_write
 from motorbus.families.feetech.driver.group import block_of_each, trains
+from motorbus.families.feetech.table import Mode
 from tests.families.feetech.driver_script import (
     ALL,
     SYNC_WRITE,
@@ -185,7 +186,7 @@ def test_a_group_read_is_split_into_trains() -> None:
 def test_prepare_all_leaves_those_alone_who_are_known() -> None:
     known, new = prepared(1), Node(2)
     assert play(prepare_all([known, new]), asks(2, at_33=1)) == {}
-    assert new.mode == 1
+    assert new.known_mode is Mode.VELOCITY
     assert play(prepare_all([known, new])) == {}
 
 

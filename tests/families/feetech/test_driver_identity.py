@@ -14,7 +14,7 @@ from motorbus.families.feetech.driver.identity import (
     ping_exchange,
     writable,
 )
-from motorbus.families.feetech.table import STS
+from motorbus.families.feetech.table import STS, TABLES, Mode
 from tests.families.feetech.driver_script import (
     PING,
     Line,
@@ -96,7 +96,7 @@ def test_the_model_outweighs_the_byte_order_register() -> None:
 def test_prepare_reads_identity_and_settings_in_one_read() -> None:
     node = Node(3)
     assert play(prepare(node), prepares()).model == "STS3215"
-    assert node.mode == 0
+    assert node.known_mode is Mode.POSITION
     assert node.limits == pytest.approx((0, 6.28165), abs=1e-5)
 
 
@@ -110,7 +110,7 @@ def test_known_asks_again_when_the_settings_were_forgotten() -> None:
     node = prepared()
     node.forget_settings()
     play(known(node), prepares(at_33=1))
-    assert node.mode == 1
+    assert node.known_mode is Mode.VELOCITY
 
 
 def test_a_silent_servo_is_no_reply() -> None:
@@ -136,9 +136,8 @@ def test_an_unknown_firmware_is_not_written() -> None:
     assert caught.value.node == 3
 
 
-def test_a_map_that_is_not_commanded_is_not_written() -> None:
-    with pytest.raises(DeviceError, match="map hls is read and not commanded yet"):
-        play(writable(Node(3)), reads(3, 0, *image(at_1=43, at_3=10, at_4=18)))
+def test_every_map_that_is_known_is_written() -> None:
+    assert play(writable(Node(3)), reads(3, 0, *image(at_1=43, at_3=10, at_4=18))) is TABLES["hls"]
 
 
 @pytest.mark.parametrize("order", ["little", "big"])

@@ -6,9 +6,15 @@ from math import inf, nan, tau
 
 import pytest
 
-from motorbus.core.operation import Effect, Goal, Rank
+from motorbus.core.operation import ANY, Effect, Goal, Rank
 from motorbus.errors import LimitExceeded, RequestError
-from motorbus.families.feetech.driver import Node, sync_read_positions, sync_write_positions
+from motorbus.families.feetech.driver import (
+    Node,
+    position_reads,
+    read_positions,
+    sync_read_positions,
+    sync_write_positions,
+)
 from tests.families.feetech.driver_script import (
     ALL,
     SYNC_WRITE,
@@ -18,6 +24,7 @@ from tests.families.feetech.driver_script import (
     play,
     prepared,
     sync_reads,
+    unheard,
     watch,
 )
 
@@ -77,7 +84,7 @@ def test_servos_that_are_not_prepared_are_refused_with_advice() -> None:
 
 
 def test_servos_in_other_modes_are_refused() -> None:
-    with pytest.raises(RequestError, match="operating mode 1"):
+    with pytest.raises(RequestError, match="operating mode velocity"):
         sync_write_positions([prepared(1, at_33=1)], [0.0])
 
 
@@ -98,3 +105,22 @@ def test_a_servo_named_twice_is_refused() -> None:
     one = prepared(1)
     with pytest.raises(RequestError, match="named twice"):
         sync_read_positions([one, one])
+
+
+def test_the_exchanges_behind_a_reading_keep_each_train_short_and_may_be_kept() -> None:
+    nodes = [prepared(id) for id in range(1, 41)]
+    slow = position_reads(nodes, rate=115_200)
+    assert len(slow) > 1
+    assert sum(len(one.replies) for one in slow if one.replies is not ANY) == 40
+    assert len(position_reads(nodes)) == 1
+
+
+def test_a_reading_of_all_is_made_anew_and_tells_who_is_missing() -> None:
+    nodes = [prepared(1), prepared(2)]
+    line = sync_reads(56, {1: (0, 8), 2: None}, 2)
+    found = play(read_positions(nodes), line)
+    assert (found.values, found.missing) == ({1: 2048 * COUNT}, (2,))
+    nobody = play(read_positions([prepared(1)]), unheard(sync_reads(56, {1: (0, 0)}, 2)))
+    assert (nobody.values, nobody.missing, nobody.at) == ({}, (1,), -inf)
+    with pytest.raises(RequestError, match="not prepared"):
+        play(read_positions([Node(1)]))

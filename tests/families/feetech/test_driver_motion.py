@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from math import inf, nan, tau
+from math import inf, nan, radians, tau
 
 import pytest
 
 from motorbus.core.operation import Effect, Goal, Rank
 from motorbus.errors import DeviceError, LimitExceeded, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, Promise, enable_torque, move, stop
-from motorbus.families.feetech.driver.motion import move_block
-from motorbus.families.feetech.table import STS
+from motorbus.families.feetech.driver.motion import move_block, way
+from motorbus.families.feetech.table import CONTROL, STS, TABLES
 from tests.families.feetech.driver_script import (
     Line,
     low_high,
+    met,
     play,
     prepared,
     prepares,
@@ -195,9 +196,9 @@ def test_bounds_that_are_no_numbers_cost_no_packet(name: str, value: float) -> N
 
 
 def test_a_move_needs_position_mode() -> None:
-    with pytest.raises(RequestError, match="operating mode 1") as caught:
+    with pytest.raises(RequestError, match="operating mode velocity") as caught:
         play(move(prepared(at_33=1), 1.0))
-    assert "write(operating_mode=0)" in caught.value.advice
+    assert "set_mode('position')" in caught.value.advice
 
 
 def test_a_stranger_is_not_moved() -> None:
@@ -220,3 +221,119 @@ def test_waiting_ends_when_it_is_there() -> None:
 
 def test_goals_are_rounded_to_what_the_servo_can_be_told() -> None:
     assert move_block(prepared(), STS, -1e-9).goals[0].value == 0
+
+
+# -- of every map --------------------------------------------------------------------------------------------
+
+SCS_COUNT = radians(300) / 1024
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("smbl", writes(3, 41, 2, 0, 4, 0, 0, 0xF4, 1)),
+        ("smcl", writes(3, 41, 2, 0, 4, 0, 0, 0xF4, 1)),
+        ("hls", writes(3, 41, 2, 0, 4, 0xC8, 0, 10, 0)),
+    ],
+)
+def test_a_move_of_a_little_endian_servo_is_one_packet(name: str, line: Line) -> None:
+    node = met(name)
+    node.bound = 200
+    wish = move(node, 1024 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False)
+    exchange, switch = watch(wish, line, ON).exchanges
+    assert switch.effect is Effect.TORQUE
+    assert exchange.goals == (Goal(3, "position", 1024 * COUNT, 0.0, 4095 * COUNT),)
+
+
+@pytest.mark.parametrize("name", ["scs", "scs2"])
+def test_a_move_of_a_big_endian_servo_has_no_acceleration_and_no_time(name: str) -> None:
+    wish = move(met(name), 512 * SCS_COUNT, velocity=500 * SCS_COUNT, wait=False)
+    play(wish, writes(3, 42, 2, 0, 0, 0, 1, 0xF4), ON)
+    with pytest.raises(RequestError, match="no acceleration register") as caught:
+        play(move(met(name), 1.0, acceleration=1.0))
+    assert "register 41 is none of SCS" in caught.value.expected
+
+
+@pytest.mark.parametrize(
+    ("name", "phase", "data"),
+    [
+        ("sts", 8, (0, 0)),
+        ("smbl", 4, (0x48, 0x0D)),
+        ("smcl", 12, (0x48, 0x0D)),
+        ("hls", 12, (68, 0)),
+        ("scs", 8, (0, 0)),
+        ("scs", 0, (0x0D, 0x48)),
+        ("scs2", 0, (0x0D, 0x48)),
+    ],
+)
+def test_no_velocity_is_the_maximum_in_every_map(name: str, phase: int, data: tuple[int, int]) -> None:
+    node = met(name, at_18=phase)
+    node.bound = 200
+    assert node.table is not None
+    assert move_block(node, node.table, 0.0).data[-2:] == bytes(data)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_what_a_move_says_lies_in_adjoining_registers(name: str) -> None:
+    table, control = TABLES[name], CONTROL[name]
+    rows = [control.acceleration, "goal_position", control.current or control.time, "goal_velocity"]
+    places = [table[row] for row in rows if row]
+    assert [row.address + row.size for row in places[:-1]] == [row.address for row in places[1:]]
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "tolerance"),
+    [
+        ("sts", {}, 0.05),
+        ("hls", {}, 0.05),
+        ("scs", {}, 10 * SCS_COUNT),
+        ("smbl", {"at_30": 100}, 1000 * COUNT),
+    ],
+)
+def test_in_position_is_ten_counts_where_these_are_more(
+    name: str, changes: dict[str, int], tolerance: float
+) -> None:
+    node = met(name, **changes)
+    assert node.table is not None
+    assert way(node, node.table, 1.0).tolerance == pytest.approx(tolerance)
+    assert way(node, node.table, 1.0, tolerance=0.01).tolerance == 0.01
+
+
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_goals_over_many_turns_go_as_far_as_is_published(name: str) -> None:
+    node = met(name, at_11=0, at_12=0)
+    node.bound = 200
+    assert node.table is not None
+    (goal,) = move_block(node, node.table, -30719 * COUNT).goals
+    assert (goal.low, goal.high) == (-30719 * COUNT, 30719 * COUNT)
+
+
+def test_a_servo_of_many_turns_that_tells_one_has_arrived_when_it_rests_there_within_its_turn() -> None:
+    there = reads(3, 56, *low_high(104), *[0] * 13)
+    play(move(met("sts", at_11=0, at_12=0), 8296 * COUNT), goes(8296), there)
+    there = reads(3, 56, *low_high(8290), *[0] * 13)
+    play(move(met("sts", at_11=0, at_12=0, at_18=28), 8296 * COUNT), goes(8296), there)
+
+
+def test_smcl_with_both_limits_0_is_not_moved() -> None:
+    with pytest.raises(RequestError, match="nobody has published what that means on smcl") as caught:
+        play(move(met("smcl", at_11=0, at_12=0), 1.0))
+    assert "max_position_limit" in caught.value.advice
+
+
+@pytest.mark.parametrize("name", ["scs", "scs2"])
+def test_an_scs_motor_is_no_servo(name: str) -> None:
+    with pytest.raises(RequestError, match="operating mode pwm") as caught:
+        play(move(met(name, at_11=0, at_12=0), 1.0))
+    assert "set_mode('position')" in caught.value.advice
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_servo_of_any_map_that_acknowledges_nothing_is_read_back(name: str) -> None:
+    node = met(name, at_8=0)
+    node.bound = 200
+    assert node.table is not None
+    block = move_block(node, node.table, 0.5)
+    sent = writes(3, block.address, *block.data)
+    on = [] if node.control.goal_switches_on else [unheard(ON), reads(3, 40, 1)]
+    play(move(node, 0.5, wait=False), unheard(sent), reads(3, block.address, *block.data), *on)

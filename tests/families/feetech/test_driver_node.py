@@ -10,8 +10,8 @@ from motorbus.core.entry import Value
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.node import as_nodes
-from motorbus.families.feetech.table import STS
-from tests.families.feetech.driver_script import prepared
+from motorbus.families.feetech.table import CONTROL, STS, TABLES, Control, Mode
+from tests.families.feetech.driver_script import met, prepared
 
 COUNT = tau / 4096
 
@@ -34,7 +34,7 @@ def test_254_is_named_as_everyone() -> None:
 
 def test_a_new_node_knows_nothing() -> None:
     node = Node(3)
-    assert (node.identity, node.table, node.settings, node.limits, node.mode) == (None,) * 5
+    assert (node.identity, node.table, node.settings, node.limits, node.known_mode) == (None,) * 5
     assert (node.alarm, node.at, node.writable) == ((), -inf, False)
 
 
@@ -80,13 +80,13 @@ def test_status_return_level_and_mode_are_known() -> None:
     node = prepared(at_8=0, at_33=1)
     assert node.settings is not None
     assert node.settings.answers_writes is False
-    assert node.mode == 1
+    assert (node.known_mode, node.settings.mode_code) == (Mode.VELOCITY, 1)
 
 
 def test_settings_are_forgotten_and_identity_is_not() -> None:
     node = prepared()
     node.forget_settings()
-    assert (node.limits, node.mode) == (None, None)
+    assert (node.limits, node.known_mode) == (None, None)
     assert node.writable
 
 
@@ -109,3 +109,95 @@ def test_every_alarm_bit_is_told_and_none_stays() -> None:
 def test_ids_and_servos_mix_and_each_is_visited_once() -> None:
     known = prepared(4)
     assert [(n.node, n is known) for n in as_nodes([2, known, 4, 2])] == [(2, False), (4, True)]
+
+
+# -- of every map ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_map_that_is_known_is_writable_and_knows_its_parts(name: str) -> None:
+    node = met(name)
+    assert node.writable
+    assert node.control is CONTROL[name]
+    assert node.known_mode is Mode.POSITION
+
+
+def test_an_unknown_map_is_read_only_and_plays_no_part() -> None:
+    node = prepared(at_0=9)
+    assert not node.writable
+    assert node.control == Control()
+    assert (node.known_mode, node.limits) == (None, None)
+    assert Node(3).control == Control()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "mode", "code"),
+    [
+        ("hls", {"at_33": 2}, Mode.CURRENT, 2),
+        ("hls", {"at_33": 3}, Mode.PWM, 3),
+        ("hls", {"at_33": 4}, None, 4),
+        ("smcl", {"at_35": 1}, Mode.VELOCITY, 1),
+        ("smcl", {"at_33": 1}, Mode.POSITION, 0),
+        ("smbl", {"at_33": 3}, Mode.STEP, 3),
+        ("scs", {"at_11": 0, "at_12": 0}, Mode.PWM, None),
+        ("scs2", {"at_33": 1}, Mode.POSITION, None),
+    ],
+)
+def test_the_mode_is_what_its_map_says(
+    name: str, changes: dict[str, int], mode: Mode | None, code: int | None
+) -> None:
+    settings = met(name, **changes).settings
+    assert settings is not None
+    assert (settings.mode, settings.mode_code) == (mode, code)
+
+
+@pytest.mark.parametrize(("name", "turns"), [("sts", True), ("smbl", True), ("hls", True), ("smcl", False)])
+def test_both_limits_0_are_many_turns_where_that_is_published(name: str, turns: bool) -> None:
+    node = met(name, at_11=0, at_12=0)
+    assert node.settings is not None
+    assert node.settings.many_turns is turns
+    assert (node.limits is not None) is turns
+
+
+OFFSETS = {
+    "sts": {"at_31": 100},
+    "smbl": {"at_31": 100},
+    "smcl": {"at_33": 100},
+    "hls": {"at_31": 100},
+    "scs2": {"at_34": 100},
+}
+OTHER_MODE = {
+    "sts": {"at_33": 1},
+    "smbl": {"at_33": 2},
+    "smcl": {"at_35": 1},
+    "hls": {"at_33": 2},
+    "scs2": {"at_11": 0, "at_12": 0},
+}
+
+
+@pytest.mark.parametrize("name", OFFSETS)
+def test_the_homing_offset_is_taken_out_in_every_mode_but_position(name: str) -> None:
+    row = TABLES[name]["present_position"]
+    turn = CONTROL[name].turn
+    node = met(name, **OFFSETS[name])
+    assert node.settings is not None
+    assert (node.settings.offset, node.settings.turn) == (100, turn)
+    assert node.value(row, 500) == pytest.approx(500 * row.scale)
+    node = met(name, **OFFSETS[name], **OTHER_MODE[name])
+    assert node.value(row, 500) == pytest.approx(400 * row.scale)
+    assert node.value(row, 30) == pytest.approx((turn - 70) * row.scale)
+    assert node.value(row, turn + 30) == pytest.approx(
+        (turn - 70) * row.scale
+    )  # told beyond the turn: no wrap
+    assert node.value(TABLES[name]["goal_position"], 500) == pytest.approx(500 * row.scale)
+
+
+def test_a_position_over_many_turns_is_shifted_and_not_wrapped() -> None:
+    node = prepared(at_18=28, at_31=100, at_33=1)
+    assert node.settings is not None
+    assert node.settings.accumulates
+    assert node.value(STS["present_position"], 30) == pytest.approx(-70 * COUNT)
+
+
+def test_the_offset_of_a_mode_that_nobody_explains_is_left_to_the_servo() -> None:
+    assert met("hls", at_31=100, at_33=4).value(TABLES["hls"]["present_position"], 500) == 500 * COUNT

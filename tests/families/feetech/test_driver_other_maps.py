@@ -1,64 +1,47 @@
-"""Servos whose map the driver does not command: read by name with right values, and nothing else but let go.
+"""Servos of other maps than STS: read and written by name, moved and held, each by the bytes of its own map.
 
-Packets are typed by hand, with the bytes of each map's own order and units.
+Packets are typed by hand, with the byte order and units of each map.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import radians, tau
-from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Runnable
-from motorbus.errors import DeviceError, RequestError
+from motorbus.core.operation import Effect
+from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.feetech import driver
-from motorbus.families.feetech.driver import Node
-from motorbus.families.feetech.driver.identity import learn
-from motorbus.families.feetech.driver.motion import move_block
-from motorbus.families.feetech.driver.node import COMMANDED
+from motorbus.families.feetech.driver import Node, Promise
 from motorbus.families.feetech.table import TABLES
-from tests.families.feetech.driver_script import image, play, reads, sync_reads, writes
+from tests.families.feetech.driver_script import (
+    Line,
+    eeprom,
+    met,
+    play,
+    reads,
+    watch,
+    writes,
+)
 
-HEADS = {
-    "smbl": {"at_0": 2, "at_1": 45, "at_3": 8, "at_4": 44},
-    "smcl": {"at_0": 1, "at_1": 10, "at_3": 6, "at_4": 12},
-    "scs": {"at_0": 0, "at_1": 10, "at_2": 1, "at_3": 5, "at_4": 4},
-    "scs2": {"at_0": 3, "at_1": 25, "at_2": 1, "at_3": 9, "at_4": 15},
-    "hls": {"at_0": 3, "at_1": 43, "at_3": 10, "at_4": 18},
-}
+OTHERS = [name for name in TABLES if name != "sts"]
 COUNT = tau / 4096
-
-
-def eeprom(name: str, **changes: int) -> bytes:
-    return image(**{**HEADS[name], **changes})
-
-
-def met(name: str, **changes: int) -> Node:
-    """A servo of this map that has been asked already."""
-    node = Node(3)
-    learn(node, eeprom(name, **changes))
-    return node
-
-
-def test_these_are_all_the_maps_that_are_not_commanded() -> None:
-    assert set(HEADS) == set(TABLES) - COMMANDED
+SCS_COUNT = radians(300) / 1024
 
 
 # --- reading ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", HEADS)
-def test_it_is_known_by_its_own_map_and_not_writable(name: str) -> None:
+@pytest.mark.parametrize("name", OTHERS)
+def test_it_is_known_by_its_own_map_and_writable(name: str) -> None:
     node = Node(3)
     found = play(driver.prepare(node), reads(3, 0, *eeprom(name)))
     assert (found.table, found.details["register_map"], node.table) == (name, name, TABLES[name])
-    assert not node.writable
-    assert node.mode is None
+    assert node.writable
+    assert found.details["writable"] is True
 
 
-@pytest.mark.parametrize("name", HEADS)
+@pytest.mark.parametrize("name", OTHERS)
 def test_every_register_is_read_by_its_name(name: str) -> None:
     node = met(name)
     bytes_of = {row.name: (row.address, row.encode(max(row.low, 1))) for row in TABLES[name].values()}
@@ -140,6 +123,7 @@ def test_limits_are_told_unless_nobody_knows_what_they_mean() -> None:
     assert met("hls").limits == pytest.approx((0, 4095 * COUNT))
     assert met("scs", at_11=0x03, at_12=0xFF).limits == pytest.approx((0, 1023 * radians(300) / 1024))
     assert met("scs", at_11=0, at_12=0).limits is None
+    assert met("smcl", at_11=0, at_12=0).limits is None
 
 
 def test_a_register_of_another_map_is_refused_with_a_name() -> None:
@@ -147,78 +131,198 @@ def test_a_register_of_another_map_is_refused_with_a_name() -> None:
         play(driver.read(met("scs"), "torque_limit"))
 
 
-def test_a_group_of_several_maps_is_read_each_by_its_own() -> None:
-    sts, hls, scs = Node(1), Node(2), Node(3)
-    for node, data in ((sts, image()), (hls, eeprom("hls")), (scs, eeprom("scs"))):
-        learn(node, data)
-    result = play(
-        driver.sync_read(["present_position"], [sts, hls, scs]),
-        *(sync_reads(56, {id: data}, 2) for id, data in ((1, (0, 8)), (2, (0, 4)), (3, (2, 0)))),
+# --- writing ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "address", "goal"),
+    [
+        ("smbl", 42, (0, 8)),
+        ("smcl", 42, (0, 8)),
+        ("hls", 42, (0, 8)),
+        ("scs", 42, (2, 0)),
+        ("scs2", 42, (2, 0)),
+    ],
+)
+def test_a_goal_by_name_has_the_byte_order_of_its_map(name: str, address: int, goal: tuple[int, int]) -> None:
+    to = 2048 * COUNT if name in ("smbl", "smcl", "hls") else 512 * SCS_COUNT
+    played = watch(driver.write(met(name), goal_position=to), writes(3, address, *goal))
+    (order,) = played.exchanges[0].goals
+    assert order.quantity == "position"
+    assert order.value == pytest.approx(to)
+
+
+@pytest.mark.parametrize(
+    ("name", "lock"), [("smbl", 55), ("smcl", 48), ("scs", 48), ("scs2", 48), ("hls", 55)]
+)
+def test_eeprom_is_unlocked_where_its_map_has_the_lock(name: str, lock: int) -> None:
+    play(
+        driver.write(met(name), led_mask=1),
+        writes(3, 40, 0),
+        writes(3, lock, 0),
+        *(writes(3, 20, 1), reads(3, 20, 1)),
+        *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
     )
-    assert {id: row["present_position"] for id, row in result.values.items()} == {
-        1: pytest.approx(2048 * COUNT),
-        2: pytest.approx(1024 * COUNT),
-        3: pytest.approx(radians(150)),
-    }
-    together = play(
-        driver.sync_read_positions([sts, hls, scs]), sync_reads(56, {1: (0, 8), 2: (0, 4), 3: (2, 0)}, 2)
-    )
-    assert together.values == {1: 2048 * COUNT, 2: 1024 * COUNT, 3: pytest.approx(radians(150))}
 
 
-# --- and nothing else ---------------------------------------------------------------------------------------
-
-REFUSED: dict[str, Callable[[Node], Runnable[Any]]] = {
-    "write": lambda node: driver.write(node, led_mask=1),
-    "write goal": lambda node: driver.write(node, goal_position=0.5),
-    "reg_write": lambda node: driver.reg_write(node, goal_position=0.5),
-    "move": lambda node: driver.move(node, 0.5),
-    "stop": driver.stop,
-    "factory_restore": driver.factory_restore,
-    "sync_write": lambda node: driver.sync_write({node: {"goal_position": 0.5}}),
-    "write what only hls has": lambda node: driver.write(node, goal_torque=0.5),
-}
-
-
-@pytest.mark.parametrize("verb", REFUSED)
-@pytest.mark.parametrize("name", HEADS)
-def test_it_refuses_to_be_written_and_moved_and_not_a_byte_leaves(name: str, verb: str) -> None:
-    with pytest.raises(DeviceError, match=f"map {name} is read and not commanded yet") as caught:
-        play(REFUSED[verb](met(name)))
-    assert caught.value.node == 3
-    assert "nothing was written" in str(caught.value)
+def test_a_goal_torque_of_0_is_refused_where_it_bounds_the_current() -> None:
+    for changes in ({}, {"at_33": 1}):
+        with pytest.raises(RequestError, match="without force") as caught:
+            play(driver.write(met("hls", **changes), goal_torque=0.0))
+        assert "disable_torque()" in caught.value.advice
+    (exchange,) = watch(
+        driver.write(met("hls", at_33=2), goal_torque=-1.3), writes(3, 44, 200, 0x80)
+    ).exchanges
+    (goal,) = exchange.goals
+    assert goal.quantity == "current"
+    assert goal.value == pytest.approx(-1.3)
 
 
-@pytest.mark.parametrize("name", HEADS)
-def test_torque_is_not_switched_on(name: str) -> None:
-    with pytest.raises(DeviceError, match="not commanded yet"):
-        play(driver.enable_torque(met(name)), reads(3, 0, *eeprom(name)))
+def test_what_gives_a_goal_another_meaning_is_written_to_a_limp_servo() -> None:
+    played = watch(driver.write(met("hls"), control_loop=1), writes(3, 40, 0), writes(3, 53, 1))
+    assert played.exchanges[1].effect is Effect.NONE
+    with pytest.raises(RequestError, match="adjoining RAM registers only"):
+        play(driver.reg_write(met("hls"), control_loop=1))
 
 
-@pytest.mark.parametrize("name", HEADS)
-def test_no_loop_and_no_group_moves_it(name: str) -> None:
-    node = met(name)
-    with pytest.raises(DeviceError, match="not commanded yet"):
-        driver.sync_write_positions([node], [0.5])
-    assert node.table is not None
-    with pytest.raises(DeviceError, match="not commanded yet"):
-        move_block(node, node.table, 0.5)
+def test_a_state_of_the_torque_that_is_off_may_be_written_and_others_not() -> None:
+    play(driver.write(met("scs"), torque_enable=2), writes(3, 40, 2))
+    for name in ("sts", "hls"):
+        with pytest.raises(RequestError, match="jump to an old goal"):
+            play(driver.write(met(name), torque_enable=2))
 
 
-@pytest.mark.parametrize("name", HEADS)
+@pytest.mark.parametrize("name", TABLES)
 def test_torque_off_works_on_every_map(name: str) -> None:
     play(driver.disable_torque(met(name)), writes(3, 40, 0))
 
 
 def test_a_name_that_only_another_map_has_is_no_register_of_an_sts_servo() -> None:
-    node = Node(3)
-    learn(node, image())
     with pytest.raises(RequestError, match="table sts has no register 'goal_torque'"):
-        play(driver.write(node, goal_torque=0.5))
+        play(driver.write(met("sts"), goal_torque=0.5))
 
 
-def test_an_unknown_map_tells_no_position_to_a_loop() -> None:
-    node = Node(3)
-    learn(node, image(at_0=9, at_1=9))
-    with pytest.raises(DeviceError, match="cannot tell its position in a unit"):
-        driver.sync_read_positions([node])
+# --- holding and stopping -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["smbl", "smcl"])
+def test_little_endian_servos_hold_where_they_stand(name: str) -> None:
+    speed = [reads(3, 46, 1, 0)] if name == "smcl" else []
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom(name)), *speed, reads(3, 56, 24, 5), writes(3, 42, 24, 5), writes(3, 40, 1)),
+    )
+    play(driver.stop(met(name)), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
+
+
+@pytest.mark.parametrize("name", ["scs", "scs2"])
+def test_big_endian_servos_hold_where_they_stand(name: str) -> None:
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom(name)), reads(3, 46, 1, 0), reads(3, 56, 2, 13)),
+        *(writes(3, 42, 2, 13), writes(3, 40, 1)),
+    )
+    assert play(driver.stop(met(name)), reads(3, 56, 2, 13), writes(3, 42, 2, 13)) is Promise.HOLD_ACCEPTED
+
+
+def test_where_velocity_0_is_standstill_torque_comes_on_with_a_velocity_for_the_goals_that_follow() -> None:
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom("scs")), reads(3, 46, 0, 0), reads(3, 56, 2, 13)),
+        *(writes(3, 42, 2, 13, 0, 0, 0x0D, 0x48), writes(3, 40, 1)),
+    )
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom("sts", at_18=4)), reads(3, 46, 0, 0), reads(3, 56, 24, 5)),
+        *(writes(3, 42, 24, 5, 0, 0, 0x48, 0x0D), writes(3, 40, 1)),
+    )
+
+
+def test_an_scs_servo_beyond_its_limits_is_not_switched_on() -> None:
+    narrow = eeprom("scs", at_10=100, at_11=3, at_12=0x20)
+    with pytest.raises(LimitExceeded, match="it would jump to"):
+        play(
+            driver.enable_torque(Node(3)),
+            *(reads(3, 0, *narrow), reads(3, 46, 0, 0), reads(3, 56, 0, 90)),
+        )
+
+
+@pytest.mark.parametrize(("speed", "burst"), [((0, 0), (0x2C, 1, 68, 0)), ((9, 0), (0x2C, 1))])
+def test_hls_holds_with_a_bound_of_its_current_beside_the_goal(
+    speed: tuple[int, ...], burst: tuple[int, ...]
+) -> None:
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom("hls")), reads(3, 44, 0x2C, 1), reads(3, 46, *speed), reads(3, 56, 24, 5)),
+        *(writes(3, 42, 24, 5, *burst), writes(3, 40, 1)),
+    )
+    play(driver.stop(met("hls")), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "stopped", "promise"),
+    [
+        ("smcl", {"at_35": 1}, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
+        ("smcl", {"at_35": 2}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+        ("scs", {"at_11": 0, "at_12": 0}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+        ("scs2", {"at_11": 0, "at_12": 0}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+        ("hls", {"at_33": 2}, writes(3, 44, 0, 0), Promise.ZERO_CURRENT_ACCEPTED),
+    ],
+)
+def test_other_modes_begin_and_end_at_rest(
+    name: str, changes: dict[str, int], stopped: Line, promise: Promise
+) -> None:
+    play(
+        driver.enable_torque(Node(3)),
+        *(reads(3, 0, *eeprom(name, **changes)), stopped, writes(3, 40, 1)),
+    )
+    assert play(driver.stop(met(name, **changes)), stopped) is promise
+
+
+def test_hls_in_velocity_mode_begins_at_rest_with_a_bound_of_its_current() -> None:
+    play(
+        driver.enable_torque(Node(3)),
+        *(
+            reads(3, 0, *eeprom("hls", at_33=1)),
+            reads(3, 44, 0, 1),
+            writes(3, 44, 0, 1, 0, 0),
+            writes(3, 40, 1),
+        ),
+    )
+    play(driver.stop(met("hls", at_33=1)), writes(3, 46, 0, 0))
+
+
+NO_REST = {
+    "PWM mode of HLS": ("hls", {"at_33": 3}, "which register takes the duty"),
+    "a mode nobody explains": ("hls", {"at_33": 4}, "operating mode 4, which is not documented"),
+    "no limits on SMCL": ("smcl", {"at_11": 0, "at_12": 0}, "nobody has published what that means on smcl"),
+}
+
+
+@pytest.mark.parametrize("case", NO_REST)
+def test_where_no_order_is_known_that_moves_nothing_it_says_so(case: str) -> None:
+    name, changes, message = NO_REST[case]
+    with pytest.raises(RequestError, match=message) as caught:
+        play(driver.stop(met(name, **changes)))
+    assert "disable_torque()" in caught.value.advice
+    with pytest.raises(RequestError, match=message):
+        play(driver.enable_torque(Node(3)), reads(3, 0, *eeprom(name, **changes)))
+
+
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_a_servo_of_many_turns_that_tells_one_is_neither_held_nor_stopped_anywhere(name: str) -> None:
+    turns = {"at_11": 0, "at_12": 0, "at_18": 12}
+    bound = [reads(3, 44, 0x2C, 1), reads(3, 46, 1, 0)] if name == "hls" else []
+    image, stands = reads(3, 0, *eeprom(name, **turns)), reads(3, 56, 24, 5)
+    with pytest.raises(RequestError, match="nobody knows on which turn it stands"):
+        play(driver.enable_torque(Node(3)), image, *bound, stands)
+    with pytest.raises(RequestError, match="nobody knows on which turn it stands"):
+        play(driver.stop(met(name, **turns)), stands)
+    held = writes(3, 42, 24, 5, 0x2C, 1) if name == "hls" else writes(3, 42, 24, 5)
+    play(driver.enable_torque(Node(3), jump=48), image, *bound, stands, held, writes(3, 40, 1))
+
+
+@pytest.mark.parametrize("name", ["sts", "smbl"])
+def test_a_servo_of_many_turns_that_tells_them_holds_on_its_turn(name: str) -> None:
+    turns = {"at_11": 0, "at_12": 0, "at_18": 28}
+    play(driver.stop(met(name, **turns)), reads(3, 56, 0x88, 0xC3), writes(3, 42, 0x88, 0xC3))

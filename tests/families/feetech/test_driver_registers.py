@@ -8,8 +8,8 @@ from math import tau
 import pytest
 
 from motorbus.core.entry import Value
-from motorbus.core.operation import Effect, Goal, Rank
-from motorbus.errors import NoReply, OutcomeUnknown, RequestError
+from motorbus.core.operation import Effect, Exchange, Goal, Rank
+from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, action, action_all, read, read_raw, reg_write, write
 from motorbus.families.feetech.driver.registers import spans
 from motorbus.families.feetech.table import STS
@@ -169,8 +169,25 @@ def test_action_shows_the_gate_what_was_handed_over() -> None:
 
 
 def test_action_of_what_others_handed_over_is_leave_to_go() -> None:
-    exchange = action(Node(3))
+    exchange = action(prepared())
+    assert isinstance(exchange, Exchange)
     assert (exchange.effect, exchange.goals, exchange.repeatable) == (Effect.TORQUE, (), False)
+
+
+def test_a_servo_that_is_not_known_is_asked_what_it_is_before_action() -> None:
+    go = Line(packet(3, ACTION), packet(3, 0))
+    play(action(Node(3)), prepares(), go)
+    with pytest.raises(DeviceError, match="register map is not described"):
+        play(action(Node(3)), prepares(at_0=9))
+    with pytest.raises(DeviceError, match="register map is not described"):
+        action_all([prepared(4), prepared(3, at_0=9)])
+
+
+def test_a_servo_that_acknowledges_nothing_is_asked_whether_a_reg_write_still_waits() -> None:
+    go = Line(packet(3, ACTION), None)
+    play(action(prepared(at_8=0)), go, reads(3, 64, 0))
+    with pytest.raises(OutcomeUnknown, match="still holds a REG WRITE"):
+        play(action(prepared(at_8=0)), go, reads(3, 64, 1))
 
 
 def test_action_for_all_is_owed_no_reply() -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+import motorbus
 from motorbus.core.family import Found
 from motorbus.core.operation import Progress, Rank, Timeout
-from motorbus.errors import ChecksumError, LinkLost, RequestError
-from motorbus.families.feetech.driver import scan
+from motorbus.errors import ChecksumError, LinkError, LinkLost, RequestError
+from motorbus.families.feetech.driver import Skipped, Suspicion, scan
+from motorbus.families.feetech.driver.scanning import DRAIN
 from tests.families.feetech.driver_script import PING, Line, Played, packet, play, reads, unheard, watch
 
 
@@ -21,6 +23,10 @@ def answers(id: int) -> Line:
 
 def tells(id: int) -> Line:
     return reads(id, 0, 3, 10, 0, 9, 3)
+
+
+LOOKS = (*[reads(1, 56, *range(15))] * 2, *[reads(1, 0, *range(40))] * 2)
+"""Whether it is alone: the feedback and the EEPROM, each once plain and once with the line kept open."""
 
 
 def test_the_silent_are_asked_once_more_and_the_found_are_identified() -> None:
@@ -52,8 +58,68 @@ def test_a_scan_writes_nothing_and_yields_to_everything() -> None:
 
 
 def test_noise_is_no_answer() -> None:
+    """It is asked again, and at length; nothing comes, so nobody is there."""
     damaged = Line(packet(1, PING), ChecksumError("c"))
-    assert play(scan([1]), damaged, damaged) == []
+    silence = [unheard(line) for looked in (*LOOKS, *LOOKS) for line in (looked, reads(1, 5, 1))]
+    assert play(scan([1]), damaged, asks(1), unheard(tells(1)), *silence) == []
+
+
+def test_answers_that_stay_garbled_are_two_servos_with_one_id() -> None:
+    damaged = Line(packet(1, PING), ChecksumError("c"))
+    garbled = [
+        Line(line.sent, ChecksumError("c"))
+        for looked in (*LOOKS, *LOOKS)
+        for line in (looked, reads(1, 5, 1))
+    ]
+    played = Played([damaged, damaged, Line(tells(1).sent, ChecksumError("c")), *garbled])
+    assert played.run(scan([1])) == [Found(1, 1_000_000, None)]
+    (seen,) = [event for event in played.events if isinstance(event, Suspicion)]
+    assert (seen.node, seen.rate, seen.garbled, seen.suspected) == (1, 1_000_000, 8, True)
+
+
+def test_whoever_is_found_may_be_asked_whether_it_is_alone() -> None:
+    """Two that answer in the same moment say the same to a PING, and to a longer question they do not."""
+    with motorbus.simulate("feetech", ids=(1, 1, 2)) as simulation:
+        simulation.simulator.servos[1].raw_position = 700  # type: ignore[attr-defined]
+        events: list[object] = []
+        with motorbus.open(simulation.url) as bus:
+            found = bus.run(bus.family.scan((1, 2, 3)), report=events.append)
+    assert [(one.node, one.identity is not None) for one in found] == [(1, True), (2, True)]
+    assert [event.node for event in events if isinstance(event, Suspicion)] == [1]
+
+
+def test_a_rate_that_the_link_lacks_is_skipped_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    with motorbus.simulate("feetech", ids="1") as simulation, motorbus.open(simulation.url) as bus:
+        tune = bus.link.tune
+
+        def unable(rate: int, listen_only: bool = False) -> None:
+            if rate == 76_800:
+                raise LinkError("this adapter has no 76800 bit/s")
+            tune(rate, listen_only)
+
+        monkeypatch.setattr(bus.link, "tune", unable)
+        events: list[object] = []
+        found = bus.run(scan([1], [76_800, 1_000_000]), report=events.append)
+        assert [one.rate for one in found] == [1_000_000]
+        assert Skipped(76_800, "this adapter has no 76800 bit/s") in events
+
+
+def test_every_id_at_every_rate() -> None:
+    """The twelve codes, and the first one that answers is told before the last one is asked."""
+    with motorbus.simulate("feetech", ids="0+253") as simulation, motorbus.open(simulation.url) as bus:
+        simulation[253].memory["baud_rate"] = 7
+        events: list[object] = []
+        found = bus.run(bus.family.scan((), bus.family.link.rates), report=events.append)
+    assert [(one.node, one.rate) for one in found] == [(0, 1_000_000), (253, 38_400)]
+    early = events.index(Found(0, 1_000_000, None))
+    assert early < 5 < len(events) / 100
+    (total,) = {event.total for event in events if isinstance(event, Progress)}
+    assert total == 254 * 2 * 12
+
+
+def test_what_was_buffered_is_let_pass_at_each_rate() -> None:
+    played = watch(scan([1], [500_000, 115_200]), asks(1), asks(1), asks(1), asks(1))
+    assert played.now >= 100 + 2 * DRAIN
 
 
 def test_who_answers_and_does_not_tell_what_it_is_is_found_all_the_same() -> None:

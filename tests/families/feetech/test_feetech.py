@@ -13,7 +13,8 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Due, Reply, Timeout
 from motorbus.families import feetech
 from motorbus.families.feetech import FAMILY, AsyncServo, Servo
-from tests.families.feetech.driver_script import PING, Line, packet, play, reads
+from motorbus.families.feetech.table import MODELS
+from tests.families.feetech.driver_script import packet, play, reads
 
 
 def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
@@ -62,7 +63,8 @@ def test_stop_lets_go_of_every_node_it_is_given() -> None:
 def test_identify_and_scan_need_no_servo_object() -> None:
     head = reads(3, 0, 3, 10, 0, 9, 3)
     assert play(FAMILY.identify(3), head).model == "STS3215"
-    found = play(FAMILY.scan((3,)), Line(packet(3, PING), packet(3, 0)), head)
+    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
+        found = bus.run(FAMILY.scan((3,)))
     assert [(one.node, one.rate) for one in found] == [(3, 1_000_000)]
 
 
@@ -71,17 +73,21 @@ def test_what_explains_a_frame_is_the_family_s() -> None:
     assert explanation.fault == ""
 
 
-@pytest.mark.parametrize("model", ["STS3215", "sts3215", "STS3032", "HTS3235", "STS3025BL"])
-def test_described_models_are_axes(model: str) -> None:
+@pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()} | {"sts3215", "scs0009"}))
+def test_every_known_model_is_an_axis(model: str) -> None:
     axis = FAMILY.axis(model)
     assert {"position", "move", "stop", "state", "enable_torque", "disable_torque"} <= set(axis)
     assert all(map(callable, axis.values()))
 
 
-@pytest.mark.parametrize(
-    "model", ["SCS0009", "SCS15-2", "SM85BLHV", "SM100-360M", "HLS3950", "unknown model 9.99", "STS9999", ""]
-)
-def test_models_of_maps_not_commanded_have_no_axis(model: str) -> None:
+def test_a_model_whose_map_tells_no_current_lacks_that() -> None:
+    assert "current" in FAMILY.axis("STS3215")
+    assert "current" in FAMILY.axis("SCS15-2")
+    assert "current" not in FAMILY.axis("SCS0009")
+
+
+@pytest.mark.parametrize("model", ["unknown model 9.99", "STS9999", ""])
+def test_other_models_have_no_axis(model: str) -> None:
     assert FAMILY.axis(model) == {}
 
 

@@ -59,3 +59,20 @@ def test_the_code_of_a_mode_is_another_on_hls() -> None:
     assert CONTROL["hls"].code(Mode.PWM) == 3
     assert CONTROL["hls"].code(Mode.STEP) is None
     assert CONTROL["scs"].code(Mode.POSITION) is None
+
+
+def test_every_map_has_position_and_pwm_mode_and_its_own_besides() -> None:
+    others = {name: set(one.has) - {Mode.POSITION, Mode.PWM} for name, one in CONTROL.items()}
+    assert others == {
+        "sts": {Mode.VELOCITY, Mode.STEP},
+        "smbl": {Mode.VELOCITY, Mode.STEP},
+        "smcl": {Mode.VELOCITY},
+        "scs": set(),
+        "scs2": set(),
+        "hls": {Mode.VELOCITY, Mode.CURRENT},
+    }
+    assert all({Mode.POSITION, Mode.PWM} <= set(one.has) for one in CONTROL.values())
+
+
+def test_that_a_goal_switches_torque_on_was_measured_on_sts_alone() -> None:
+    assert [name for name, one in CONTROL.items() if one.goal_switches_on] == ["sts"]

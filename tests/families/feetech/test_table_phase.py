@@ -11,6 +11,7 @@ from motorbus.families.feetech.table import (
     velocity_scale,
     zero_is_maximum,
 )
+from motorbus.families.feetech.table.phase import many_turns_are_told
 
 SHIPPED = 12
 
@@ -49,3 +50,12 @@ def test_the_rows_name_the_bits_of_their_series() -> None:
     assert set(PHASE_BITS["scs"]) == {0, 3, 5, 6}
     assert set(PHASE_BITS["hls"]) == set(range(8))
     assert PHASE_BITS["smcl"] == {}
+
+
+@pytest.mark.parametrize(
+    ("register_map", "told"),
+    [("sts", True), ("smbl", True), ("hls", True), ("smcl", False), ("scs", False), ("scs2", False)],
+)
+def test_bit_4_lets_a_position_count_over_many_turns(register_map: str, told: bool) -> None:
+    assert many_turns_are_told(16, register_map) is told
+    assert not many_turns_are_told(0xEF, register_map)

@@ -6,7 +6,23 @@ use, see `motorbus.cli.faces`.
 
 from __future__ import annotations
 
-from motorbus.cli.feetech import tables
-from motorbus.cli.feetech.orders import Train, app, move_together, ping_everyone
+from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, tables, tuning
+from motorbus.cli.feetech.commands import COMMANDS
+from motorbus.cli.feetech.offers import say
+from motorbus.cli.feetech.orders import app
+from motorbus.cli.feetech.together import Train, move_together, ping_everyone
 
-__all__ = ["Train", "app", "move_together", "ping_everyone", "tables"]
+__all__ = [
+    "COMMANDS",
+    "Train",
+    "app",
+    "duplicates",
+    "many_turns",
+    "modes",
+    "move_together",
+    "ping_everyone",
+    "procedures",
+    "say",
+    "tables",
+    "tuning",
+]

@@ -16,18 +16,14 @@ from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
-from motorbus.core.operation import ANY, Answer, Exchange, Pause, Rank, Together
+from motorbus.core.operation import Pause
 from motorbus.errors import RequestError
-from motorbus.families.feetech import driver, wire
-from motorbus.families.feetech.driver.arrival import Move, arrive
-from motorbus.families.feetech.driver.group import sync_writes
-from motorbus.families.feetech.driver.motion import TOLERANCE, move_block
+from motorbus.families.feetech import driver
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from motorbus.bus.pump import Bus
-    from motorbus.cli.dry import DryBus
     from motorbus.core.operation import Operation
 
 NAME: Final = "feetech"
@@ -36,77 +32,6 @@ app = App(name=NAME, help="What only feetech devices can do.", help_epilogue="")
 
 Names = Annotated[str, Parameter(name="NAME=VALUE")]
 Silent = Annotated[Output, Parameter(parse=False)]
-
-
-class Train:
-    """What a control loop of several servos does each cycle: all goals in one packet, all positions in one train.
-
-    Makes nothing move. Raises NoReply when a servo that must be asked first is silent.
-    """
-
-    def __init__(self, bus: Bus, nodes: Sequence[int]) -> None:
-        self.servos = [driver.Servo(bus, node) for node in nodes]
-        for error in bus.run(driver.prepare_all(self.servos, rate=bus.rate)).values():
-            raise error
-        self.positions = driver.sync_read_positions(self.servos, rate=bus.rate)
-        self._bus = bus
-
-    def goals(self, positions: Sequence[float]) -> Exchange[None]:
-        """The exchange that sends these goals, in rad, one for each servo."""
-        return driver.sync_write_positions(self.servos, positions)
-
-    def air_time(self, positions: Sequence[float]) -> float:
-        """Seconds on the wire for one cycle, without any pause: the limit that no program can beat."""
-        family, rate = self._bus.family, self._bus.rate
-        return family.air_time(self.goals(positions), rate) + family.air_time(self.positions, rate)
-
-
-def move_together(
-    bus: Bus | DryBus,
-    goals: Mapping[int, float],
-    *,
-    velocity: float | None = None,
-    acceleration: float | None = None,
-    wait: bool = True,
-) -> None:
-    """All goals (rad by id) in one packet, so that all begin in the same instant; errors as `Servo.move` raises."""
-    servos = [driver.Servo(bus, node) for node in goals]
-    bus.run(_move_together(servos, list(goals.values()), velocity, acceleration, wait))
-
-
-def _move_together(
-    servos: Sequence[driver.Servo],
-    goals: Sequence[float],
-    velocity: float | None,
-    acceleration: float | None,
-    wait: bool,
-) -> Operation[None]:
-    for error in (yield from driver.prepare_all(servos)).values():
-        raise error
-    blocks = []
-    for servo, goal in zip(servos, goals, strict=True):
-        assert servo.table is not None
-        blocks.append(move_block(servo, servo.table, goal, velocity, acceleration))
-    for exchange in sync_writes([servo.node for servo in servos], blocks):
-        yield from exchange
-    if wait:
-        arrivals = []
-        for servo, goal in zip(servos, goals, strict=True):
-            assert servo.table is not None
-            order = Move(goal, velocity, acceleration, TOLERANCE, None)
-            arrivals.append(arrive(servo, servo.table, order))
-        yield from Together(arrivals)
-
-
-def ping_everyone(bus: Bus) -> list[int]:
-    """Who answers one broadcast PING. A hint only: the replies of several servos may collide."""
-
-    request = wire.encode_instruction(wire.BROADCAST, wire.Instruction.PING, broadcast=True)
-
-    def read(answer: Answer) -> list[int]:
-        return sorted({reply.data[2] for reply in answer.replies})
-
-    return bus.run(Exchange(request, ANY, read, rank=Rank.POLL))
 
 
 def _ours(found: Target) -> Target:

@@ -99,6 +99,8 @@ def say(event: Any) -> str:
     if isinstance(event, driver.Suspicion):
         where = f"#{event.node} " if event.node else ""
         return f"{where}at {event.rate} bit/s: {event.what}"
+    if isinstance(event, driver.PowerCycleNeeded):
+        return "take the supply of this servo away now, and give it back"
     if isinstance(event, driver.Skipped):
         return f"nothing was sent at {event.rate} bit/s: {event.why}"
     return ""

@@ -1,4 +1,4 @@
-"""FEETECH SCS, SMS, STS and HLS servos on a half-duplex serial bus: all six maps are read, that of STS is commanded.
+"""FEETECH SCS, SMS, STS and HLS servos on a half-duplex serial bus: all six register maps.
 
 `Servo` and `AsyncServo` are one servo each; the functions serve several at once, or are kept for a loop. `FAMILY`
 is what the rest of motorbus knows of these servos.
@@ -25,17 +25,24 @@ from motorbus.core.family import (
 from motorbus.core.operation import Answer, Exchange, Operation, Runnable
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
-    COMMANDED,
     AsyncServo,
+    Calibration,
+    Gains,
     GroupResult,
     Node,
     Positions,
     Promise,
+    Protection,
+    Recovery,
     Servo,
+    TorqueLimit,
+    Zero,
     action_all,
+    copyable,
     disable_torque_all,
     line,
     prepare_all,
+    read_positions,
     scan,
     sync_read,
     sync_read_positions,
@@ -47,15 +54,23 @@ from motorbus.families.feetech.table import BAUD_CODES, MODELS, TABLES
 __all__ = [
     "FAMILY",
     "AsyncServo",
+    "Calibration",
     "Feetech",
+    "Gains",
     "GroupResult",
     "Node",
     "Positions",
     "Promise",
+    "Protection",
+    "Recovery",
     "Servo",
+    "TorqueLimit",
+    "Zero",
     "action_all",
+    "copyable",
     "disable_torque_all",
     "prepare_all",
+    "read_positions",
     "scan",
     "sync_read",
     "sync_read_positions",
@@ -95,7 +110,7 @@ class Feetech:
                 "baud", int, usual, "rate of the bus in bit/s; servos of the STS series ship with 1000000"
             ),
             Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
-            Option("model", str, "sts3215", "model of the simulated servos"),
+            Option("model", str, "sts3215", "model of the simulated servos, or one for each joined by +"),
         )
         return LinkNeeds("bytes", usual, tuple(BAUD_CODES.values()), (*options, *OPTIONS))
 
@@ -135,11 +150,12 @@ class Feetech:
         return driver.identify(Node(node))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
-        return scan(ids, rates)
+        return scan(ids, rates, polls=driver.GLANCE)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        moved = {known.name for known in MODELS.values() if COMMANDED.issuperset(known.maps)}
-        return _AXIS if model.upper() in moved else {}
+        maps = next((known.maps for known in MODELS.values() if known.name == model.upper()), ())
+        tells = all(TABLES[name]["present_current"].unit for name in maps)
+        return {name: one for name, one in _AXIS.items() if tells or name != "current"} if maps else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.feetech.simulator import simulate

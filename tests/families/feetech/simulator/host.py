@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from motorbus.families.feetech.simulator import FeetechBus, simulate
 
 PING, READ, WRITE, REG_WRITE, ACTION, RESTORE = range(1, 7)
@@ -21,11 +23,17 @@ def word(value: int, sign_bit: int = 15) -> tuple[int, int]:
     return code & 255, code >> 8
 
 
+def big(value: int, sign_bit: int = 15) -> tuple[int, int]:
+    """The same for SCS servos, which have the high byte first."""
+    low, high = word(value, sign_bit)
+    return high, low
+
+
 class Host:
     """Says packets to a simulated bus, one after the other in time, and gives what comes back as hex."""
 
-    def __init__(self, ids: tuple[int, ...] = (1,), /, **options: object) -> None:
-        self.bus: FeetechBus = simulate(ids, **options)
+    def __init__(self, ids: tuple[int, ...] = (1,), model: str = "", /, **options: object) -> None:
+        self.bus: FeetechBus = simulate(ids, model, **options)
         self.now = 1.0
 
     def say(self, data: bytes | str) -> list[str]:
@@ -48,10 +56,10 @@ class Host:
         self.bus.advance(self.now)
         return self
 
-    def read(self, id: int, address: int, count: int = 2) -> int:
-        """The number in these registers, low byte first, its sign bit not heeded."""
+    def read(self, id: int, address: int, count: int = 2, order: Literal["little", "big"] = "little") -> int:
+        """The number in these registers, low byte first unless said otherwise, its sign bit not heeded."""
         (reply,) = self.say(packet(id, READ, address, count))
-        return int.from_bytes(bytes.fromhex(reply)[5:-1], "little")
+        return int.from_bytes(bytes.fromhex(reply)[5:-1], order)
 
     def write(self, id: int, address: int, *data: int) -> list[str]:
         """Write bytes; gives the replies."""

@@ -258,3 +258,28 @@ def test_sync_write_reaches_those_who_are_there() -> None:
     host = Host((1, 3))
     assert host.say(packet(ALL, SYNC_WRITE, 41, 1, 1, 10, 2, 20, 3, 30)) == []
     assert (host.read(1, 41, 1), host.read(3, 41, 1)) == (10, 30)
+
+
+# What lies between.
+
+
+def test_an_adapter_that_hears_itself_repeats_everything_before_any_answer() -> None:
+    host = Host(echo="yes")
+    assert host.say(packet(1, PING)) == ["FF FF 01 02 01 FB", "FF FF 01 02 00 FC"]
+    assert host.say("FF FF 09") == ["FF FF 09"]
+    assert host.say(packet(ALL, WRITE, 41, 5)) == [packet(ALL, WRITE, 41, 5).hex(" ").upper()]
+
+
+def test_replies_come_later_by_chance_and_the_same_again() -> None:
+    def delays(seed: int) -> list[float]:
+        host = Host(reply_jitter=0.001, seed=seed)
+        return [host.timed(packet(1, PING))[0][0] for _ in range(50)]
+
+    assert delays(1) == delays(1) != delays(2)
+    assert all(0.0 <= delay < 0.001 for delay in delays(1))
+    assert len(set(delays(1))) > 40
+
+
+def test_duplicates_with_jitter_come_apart_and_garble_each_other() -> None:
+    host = Host(duplicate="1", reply_jitter=0.0005, seed=3)
+    assert len({tuple(host.say(packet(1, PING))) for _ in range(20)}) > 5

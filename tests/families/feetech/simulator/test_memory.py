@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.families.feetech.simulator.flash import Commit, Flash
 from motorbus.families.feetech.simulator.memory import Layout, Memory, Written, code
 from motorbus.families.feetech.table import STS
 
@@ -71,3 +72,78 @@ def test_factory_rows_can_be_read_and_not_written(memory: Memory) -> None:
 )
 def test_a_number_as_bytes_cut_to_what_the_row_can_say(row: str, raw: int, data: str) -> None:
     assert code(STS[row], raw) == bytes.fromhex(data)
+
+
+# What takes its time: see test_flash.py for the cells themselves.
+
+
+class Slow:
+    """A memory whose EEPROM needs 20 ms for a write, and a clock for it."""
+
+    def __init__(self, *, lock_drops: bool = False) -> None:
+        self.now = 0.0
+        layout = Layout(STS, {"id": 9})
+        flash = Flash(layout.factory, clock=lambda: self.now, time=0.02)
+        self.memory = Memory(layout, flash, lock_drops=lock_drops)
+
+
+def test_with_the_lock_open_the_live_byte_is_first_and_the_stored_one_follows() -> None:
+    slow = Slow()
+    slow.memory.write(13, b"\x41\x50", locked=False)
+    assert slow.memory["max_temperature"] == 65
+    assert slow.memory.stored[13] == 70
+    assert slow.memory.commits == [Commit(0.01, 13, 65), Commit(0.02, 14, 80)]
+    slow.now = 0.01
+    assert (slow.memory.stored[13], slow.memory.wear) == (65, {13: 1})
+
+
+def test_a_locked_write_persists_nothing() -> None:
+    slow = Slow()
+    slow.memory.write(13, b"\x41", locked=True)
+    slow.now = 1.0
+    assert (slow.memory.commits, slow.memory.stored[13], slow.memory.wear) == ([], 70, {})
+    slow.memory.power_up()
+    assert slow.memory["max_temperature"] == 70
+
+
+def test_a_power_cut_leaves_what_was_committed_and_a_restart_all() -> None:
+    for cut, second in ((True, 80), (False, 90)):
+        slow = Slow()
+        slow.memory.write(13, b"\x41\x5a", locked=False)
+        slow.now = 0.01
+        if cut:
+            slow.memory.power_up()
+        else:
+            slow.memory.restart()
+        assert (slow.memory["max_temperature"], slow.memory["max_voltage"]) == (65, second)
+
+
+@pytest.mark.parametrize(("drops", "stored"), [(False, 65), (True, 70)])
+def test_closing_the_lock_while_storing(drops: bool, stored: int) -> None:
+    slow = Slow(lock_drops=drops)
+    slow.memory.write(55, b"\0", locked=True)
+    slow.memory.write(13, b"\x41", locked=False)
+    slow.memory.write(55, b"\x01", locked=False)
+    slow.now = 1.0
+    assert slow.memory.stored[13] == stored
+
+
+def test_an_impossible_id_or_rate_is_mended_on_wish() -> None:
+    for mend, found in ((True, (9, 0)), (False, (255, 255))):
+        slow = Slow()
+        slow.memory.stored[5:7] = b"\xff\xff"
+        slow.memory.power_up(mend=mend)
+        assert (slow.memory["id"], slow.memory["baud_rate"]) == found
+        assert slow.memory.stored[5:7] == b"\xff\xff"  # it is not written back
+
+
+def test_a_restore_of_the_factory_values_takes_its_time_too() -> None:
+    slow = Slow()
+    slow.memory.write(13, b"\x41", locked=False)
+    slow.now = 1.0
+    slow.memory.restore_factory(frozenset({"id"}), 1.0)
+    assert slow.memory["max_temperature"] == 70
+    assert slow.memory.stored[13] == 65
+    assert {commit.address for commit in slow.memory.commits} == set(range(6, 40))
+    slow.now = 2.0
+    assert (slow.memory.stored[13], slow.memory.commits) == (70, [])

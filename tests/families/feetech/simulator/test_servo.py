@@ -139,15 +139,15 @@ def test_an_id_written_while_locked_is_lost() -> None:
 
 def test_every_stored_byte_is_counted() -> None:
     host = Host()
-    wear = host.bus.nodes[1].memory.wear
+    memory = host.bus.nodes[1].memory
     host.write(1, 13, 65)
     host.write(1, ACCELERATION, 5)
-    assert wear == {}
+    assert memory.wear == {}
     host.write(1, LOCK, 0)
     host.write(1, 13, 65)
     host.write(1, 31, 1, 0)
     host.write(1, 13, 65)
-    assert wear == {13: 2, 31: 1, 32: 1}
+    assert memory.wear == {13: 2, 31: 1, 32: 1}
 
 
 def test_unplugging_stops_and_forgets_as_a_power_cut_does() -> None:

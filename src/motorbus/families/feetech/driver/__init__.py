@@ -6,6 +6,13 @@ an `Exchange`, or an operation that yields exchanges; a bus carries it out.
 
 from __future__ import annotations
 
+from motorbus.families.feetech.driver.alarm import alarms
+from motorbus.families.feetech.driver.blocked import blockers
+from motorbus.families.feetech.driver.bound import Powerless
+from motorbus.families.feetech.driver.calibration import Calibration, Zero, calibrate, zero
+from motorbus.families.feetech.driver.copying import copyable
+from motorbus.families.feetech.driver.counting import ManyTurns, Recounted, many_turns, set_many_turns
+from motorbus.families.feetech.driver.drive import set_current, set_duty, set_velocity, step
 from motorbus.families.feetech.driver.feedback import (
     current,
     load,
@@ -17,43 +24,103 @@ from motorbus.families.feetech.driver.feedback import (
 )
 from motorbus.families.feetech.driver.group import GroupResult, prepare_all, sync_read, sync_write
 from motorbus.families.feetech.driver.identity import identify, ping, prepare
-from motorbus.families.feetech.driver.loop import Positions, sync_read_positions, sync_write_positions
+from motorbus.families.feetech.driver.loop import (
+    Positions,
+    position_reads,
+    read_positions,
+    sync_read_positions,
+    sync_write_positions,
+)
+from motorbus.families.feetech.driver.modes import mode, set_mode
 from motorbus.families.feetech.driver.motion import Promise, enable_torque, move, stop
-from motorbus.families.feetech.driver.node import COMMANDED, Node, Settings
+from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.driver.overload import Recovery, recover_overload
+from motorbus.families.feetech.driver.rates import set_baud
+from motorbus.families.feetech.driver.recovery import recover
 from motorbus.families.feetech.driver.registers import action, action_all, read, read_raw, reg_write, write
+from motorbus.families.feetech.driver.renaming import set_id
 from motorbus.families.feetech.driver.restoring import factory_restore
-from motorbus.families.feetech.driver.scanning import scan
+from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
+from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
+from motorbus.families.feetech.driver.tuning import (
+    Gains,
+    Protection,
+    TorqueLimit,
+    gains,
+    protection,
+    set_gains,
+    set_protection,
+    set_torque_limit,
+    torque_limit,
+)
+from motorbus.families.feetech.driver.turns import clear_turns
 
 __all__ = [
-    "COMMANDED",
+    "GLANCE",
     "AsyncServo",
+    "Calibration",
+    "Gains",
     "GroupResult",
+    "ManyTurns",
     "Node",
     "Positions",
+    "Powerless",
     "Promise",
+    "Protection",
+    "Recounted",
+    "Recovery",
     "Servo",
     "ServoVerbs",
     "Settings",
+    "Skipped",
+    "Suspicion",
+    "TorqueLimit",
+    "Zero",
     "action",
     "action_all",
+    "alarms",
+    "blockers",
+    "calibrate",
+    "clear_turns",
+    "copyable",
     "current",
     "disable_torque",
     "disable_torque_all",
+    "duplicates",
     "enable_torque",
     "factory_restore",
+    "gains",
     "identify",
     "load",
+    "many_turns",
+    "mode",
     "move",
     "ping",
     "position",
+    "position_reads",
     "prepare",
     "prepare_all",
+    "protection",
     "read",
+    "read_positions",
     "read_raw",
+    "recover",
+    "recover_overload",
     "reg_write",
     "scan",
+    "set_baud",
+    "set_current",
+    "set_duty",
+    "set_gains",
+    "set_id",
+    "set_many_turns",
+    "set_mode",
+    "set_protection",
+    "set_torque_limit",
+    "set_velocity",
+    "step",
     "stop",
     "sync_read",
     "sync_read_positions",
@@ -61,7 +128,9 @@ __all__ = [
     "sync_write_positions",
     "telemetry",
     "temperature",
+    "torque_limit",
     "velocity",
     "voltage",
     "write",
+    "zero",
 ]

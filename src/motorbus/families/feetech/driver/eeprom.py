@@ -9,43 +9,78 @@ tools (an acknowledgement may take more than 21 ms).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
 
 from motorbus.core.entry import Table
 from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
-from motorbus.families.feetech.driver.exchanges import Block, confirmed, verified
+from motorbus.errors import OutcomeUnknown
+from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, verified
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.torque import disable_torque
 
+T = TypeVar("T")
+
 _STATUS_RETURN_LEVEL: Final = 8
 _ATTEMPTS: Final = 2
+_OPEN: Final = b"\0"
 
 
 def store(node: Node, table: Table, blocks: Sequence[Block]) -> Operation[None]:
     """Write these blocks of EEPROM registers for good, with nobody else on the bus meanwhile."""
+
+    def write() -> Operation[None]:
+        for block in blocks:
+            yield from stored(node, block._replace(effect=Effect.PERSISTENT))  # it is limp: nothing can move
+
+    yield from unlocked(node, table, write)
+
+
+def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> Operation[T]:
+    """Carry out `work` on a limp servo whose lock is open, with nobody else on the bus; the lock is closed again."""
     lock = table["lock"].address
     trouble: list[BaseException] = []
     try:
-        yield from Alone(
-            afterwards(_written(node, lock, blocks, trouble), lambda: _locked(node, lock, trouble))
+        return (
+            yield from Alone(
+                afterwards(_opened(node, lock, work, trouble), lambda: _locked(node, lock, trouble))
+            )
         )
     finally:
         node.forget_settings()
 
 
-def _written(node: Node, lock: int, blocks: Sequence[Block], trouble: list[BaseException]) -> Operation[None]:
+def _opened(
+    node: Node, lock: int, work: Callable[[], Operation[T]], trouble: list[BaseException]
+) -> Operation[T]:
     try:
         yield from disable_torque(node)
         yield from _put(node, _lock(lock, 0))
-        for block in blocks:
-            yield from _stored(node, block._replace(effect=Effect.PERSISTENT))  # it is limp: nothing can move
+        done = yield from work()
+        yield from _still_open(node, lock)
+        return done
     except BaseException as error:
         trouble.append(error)
         raise
 
 
-def _stored(node: Node, block: Block) -> Operation[None]:
+def _still_open(node: Node, lock: int) -> Operation[None]:
+    """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
+    right, and keeps none. Raises OutcomeUnknown."""
+    found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+    if found != _OPEN:
+        raise OutcomeUnknown(
+            f"node {node.node} has closed its EEPROM lock by itself while it was written to",
+            received=found,
+            expected="an open lock, 0",
+            cause="it has lost its supply for a moment, so that what was written may be gone at the next power-off",
+            advice="see that its supply stays on, then write it again",
+            node=node.node,
+        )
+
+
+def stored(node: Node, block: Block) -> Operation[None]:
+    """Write one block while the lock is open (see `unlocked`), and read it back."""
     yield from _put(node, block)
     if block.address <= _STATUS_RETURN_LEVEL < block.address + len(block.data):
         node.forget_settings()  # from now on it may acknowledge differently

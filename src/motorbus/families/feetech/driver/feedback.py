@@ -26,8 +26,8 @@ FEEDBACK: Final = 15
 def telemetry(node: Node) -> Runnable[State]:
     """One sample of everything: position, velocity, load, current, voltage, temperature, moving, alarm.
 
-    In API units (rad, rad/s, fraction of the duty, A, V, °C). What the servo does not measure, or what cannot be
-    told without knowing its register map, is None.
+    In API units (rad, rad/s, fraction of the duty, A, V, °C); the position as `position` tells it. What the servo does
+    not measure, or what cannot be told without knowing its register map, is None.
     """
     if node.table is None or node.settings is None:
         return _after(node, telemetry)
@@ -77,7 +77,10 @@ def _raw(row: Entry, data: bytes) -> int:
 
 
 def position(node: Node) -> Runnable[float]:
-    """Present position, rad. Raises DeviceError when the register map is not known."""
+    """Present position, rad, with the homing offset taken out in every mode: the servo does so in position mode only.
+
+    Raises DeviceError when the register map is not known.
+    """
     return _quantity(node, "present_position")
 
 
@@ -125,7 +128,7 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
 
 def _untold(node: Node, what: str) -> DeviceError:
     """The error for a quantity that this servo does not tell in a unit."""
-    if not node.writable and node.identity is not None and node.identity.table:
+    if node.identity is not None and node.identity.table:
         return DeviceError(
             f"node {node.node} is {node.identity.model}: nobody has published whether it tells its {what}, and in "
             "what unit",

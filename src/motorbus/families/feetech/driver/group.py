@@ -49,6 +49,7 @@ def sync_read(
 ) -> Operation[GroupResult]:
     """These registers of all these servos, by as few SYNC READs as keep each train of replies within `air` s.
 
+    Servos that know no SYNC READ are read one by one; maps may be mixed, and each value is read by the servo's own map.
     `rate` is the rate of the bus in bit/s. Who does not answer has an error in the result, and the others their
     values. Raises RequestError for an unknown name; nothing is sent then.
     """
@@ -134,9 +135,11 @@ def collected(
 ) -> Operation[dict[int, bytes]]:
     """One block of each: by SYNC READ, and by READ of those whom it did not bring; the errors of the rest by id.
 
-    Some models know no SYNC READ, and what servos do whose predecessor in the list is silent is not documented.
+    Those whose map is known to have no SYNC READ are not asked by it, and wait for nobody. What servos do whose
+    predecessor in the list is silent is not documented.
     """
-    heard = yield from outcome(block_of_each(nodes, address, count))
+    able = [node for node in nodes if node.control.sync_read]
+    heard = (yield from outcome(block_of_each(able, address, count))) if able else {}
     found = {} if isinstance(heard, MotorbusError) else heard
     for node in nodes:
         if node.node not in found:
@@ -200,9 +203,10 @@ def sync_write(
 ) -> Operation[None]:
     """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
 
-    One packet serves up to 83 servos with two bytes each; more are split, and then not simultaneous. Nobody
-    acknowledges a SYNC WRITE: follow it with sync_read() when it matters. All or nothing: raises NoReply or
-    DeviceError, with nothing written, when a servo that must be asked first is silent or unknown.
+    One packet serves up to 83 servos with two bytes each; more are split, and so are servos in whose maps the registers
+    lie elsewhere; then it is not simultaneous. Maps and byte orders may be mixed otherwise. Nobody acknowledges a SYNC
+    WRITE: follow it with sync_read() when it matters. All or nothing: raises NoReply or DeviceError, with nothing
+    written, when a servo that must be asked first is silent or unknown.
     """
     for orders in values.values():
         check_values(orders)
@@ -210,28 +214,37 @@ def sync_write(
     errors = yield from prepare_all(nodes, rate=rate, air=air)
     if errors:
         raise next(iter(errors.values()))
+    _refuse_other_names(nodes, list(values.values()))
     blocks = [_block(node, orders) for node, orders in zip(nodes, values.values(), strict=True)]
     for exchange in sync_writes([node.node for node in nodes], blocks):
         yield from exchange
 
 
 def sync_writes(ids: Sequence[int], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
-    """These blocks, all of the same registers, as few SYNC WRITEs as can carry them."""
-    first = blocks[0]
+    """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many."""
+    places: dict[tuple[int, int], list[tuple[int, Block]]] = {}
     for id, block in zip(ids, blocks, strict=True):
-        if (block.address, len(block.data)) != (first.address, len(first.data)):
+        places.setdefault((block.address, len(block.data)), []).append((id, block))
+    for (address, size), group in places.items():
+        capacity = wire.sync_write_capacity(size)
+        for start in range(0, len(group), capacity):
+            part = group[start : start + capacity]
+            goals: tuple[Goal, ...] = tuple(goal for _, block in part for goal in block.goals)
+            effect = max(block.effect for _, block in part)
+            yield unanswered(
+                wire.sync_write(address, [(id, block.data) for id, block in part]), effect, goals
+            )
+
+
+def _refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Value]]) -> None:
+    for node, orders in zip(nodes, values, strict=True):
+        if set(orders) != set(values[0]):
             raise RequestError(
-                f"node {id} is to get other registers than node {ids[0]}",
+                f"node {node.node} is to get other registers than node {nodes[0].node}",
                 expected="the same registers for every servo of a SYNC WRITE",
                 advice="write() them one by one; nothing was sent",
-                node=id,
+                node=node.node,
             )
-    capacity = wire.sync_write_capacity(len(first.data))
-    for start in range(0, len(blocks), capacity):
-        part = blocks[start : start + capacity]
-        items = [(id, block.data) for id, block in zip(ids[start : start + capacity], part, strict=True)]
-        goals: tuple[Goal, ...] = tuple(goal for block in part for goal in block.goals)
-        yield unanswered(wire.sync_write(first.address, items), max(b.effect for b in part), goals)
 
 
 def _block(node: Node, values: Mapping[str, Value]) -> Block:

@@ -1,9 +1,9 @@
 """Who is there: is it alive, what is it, which register map has it, and how is it set.
 
 The map follows from firmware and byte order, the model gives the name and the byte order (the algorithm of the
-vendor's FD 1.9.8.5). A servo whose map is known is read by that map, and written when the driver commands it. One whose
-map is unknown is read by the few rows that all maps share. Neither is ever guessed: the same address is the lock in one
-map and the torque limit in another.
+vendor's FD 1.9.8.5). A servo whose map is known is read and written by that map. One whose map is unknown is read by
+the few rows that all maps share, and never written. A map is never guessed: the same address is the lock in one map and
+the torque limit in another.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from motorbus.core.operation import Due, Exchange, Operation, Rank, Timeout
 from motorbus.errors import DeviceError, NoReply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
-from motorbus.families.feetech.driver.node import COMMANDED, IMAGE, Node, Settings, settings_of
+from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
 from motorbus.families.feetech.table import STS, TABLES, Choice, choose, model_number
 
 _HEAD: Final = 5
@@ -90,14 +90,14 @@ def known(node: Node) -> Operation[Table]:
 
 
 def writable(node: Node) -> Operation[Table]:
-    """As `known`, for those who will write. Raises DeviceError when the map is not known, or not commanded here."""
+    """As `known`, for those who will write. Raises DeviceError when the map is not known."""
     table = yield from known(node)
     refuse_unless_writable(node)
     return table
 
 
 def refuse_unless_writable(node: Node) -> None:
-    """Raise DeviceError for a servo, already known, whose map is not known or not commanded here."""
+    """Raise DeviceError for a servo that has been asked, and whose map is not known."""
     if not node.writable:
         raise unknown_map(node, "refuses to write to it")
 
@@ -132,7 +132,7 @@ def identity_of(node: int, head: bytes) -> Identity:
             "model_number": model_number(major, minor, chosen.order),
             "byte_order": chosen.order,
             "register_map": chosen.table or "unknown",
-            "writable": chosen.table in COMMANDED,
+            "writable": bool(chosen.table),
         },
     )
 
@@ -158,19 +158,14 @@ def _commoner(row: Entry, order: str) -> Entry:
 
 
 def unknown_map(node: Node, refusal: str) -> DeviceError:
-    """The error for what needs a register map that this servo's firmware does not tell, or that is only read here."""
+    """The error for what needs a register map that this servo's firmware does not tell."""
     identity = node.identity
     assert identity is not None
-    if identity.table:
-        fact = f"whose register map {identity.table} is read and not commanded yet: motorbus"
-        advice = "read() it by name, or disable_torque(); nothing was written"
-    else:
-        fact = "whose register map (unknown) is not described: motorbus"
-        advice = "read() the registers that all maps share, or disable_torque(); nothing was written"
     return DeviceError(
-        f"node {node.node} is {identity.model} with firmware {identity.firmware}, {fact} {refusal}",
-        expected=f"a servo with one of the maps {', '.join(sorted(COMMANDED))}",
+        f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map is not "
+        f"described: motorbus {refusal}",
+        expected=f"a servo with one of the maps {', '.join(sorted(TABLES))}",
         cause="the same address means different things in different maps, so a guess could damage the servo",
-        advice=advice,
+        advice="read() the registers that all maps share, or disable_torque(); nothing was written",
         node=node.node,
     )

@@ -1,6 +1,7 @@
 """Prepared group operations: exchanges that a control loop makes once, or in microseconds, and runs each cycle.
 
-They need servos that are prepared (limits, mode and units known), and ask nobody anything themselves.
+They need servos that are prepared (limits, mode and units known), and ask nobody anything themselves. Maps and byte
+orders may be mixed: present and goal position have the same place and size in all of them.
 """
 
 from __future__ import annotations
@@ -9,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Answer, Exchange
-from motorbus.errors import RequestError
-from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.core.operation import Answer, Exchange, Operation, outcome
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, read_block
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
 from motorbus.families.feetech.driver.node import Node
@@ -29,12 +30,16 @@ class Positions(NamedTuple):
 def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[Positions]:
     """The present positions of all of these in one exchange, which may be kept and run again.
 
-    Raises RequestError when a servo is not prepared, or when the replies would need more than `air` s at `rate`
-    bit/s (give a greater `air`, or divide the servos); DeviceError when the register map of one is unknown. A single
-    servo that is silent raises NoReply when run.
+    Raises RequestError when a servo is not prepared, or knows no SYNC READ (an exchange that can be kept is one packet:
+    `read_positions` takes as many as it needs), or when the replies would need more than `air` s at `rate` bit/s (give
+    a greater `air`, or divide the servos); DeviceError when the register map of one is unknown. A single servo that is
+    silent raises NoReply when run.
     """
     nodes = distinct(servos)
     rows = {node.node: _row(node, "present_position") for node in nodes}
+    for node in nodes:
+        if not node.control.sync_read:
+            raise _no_sync_read(node)
     row = next(iter(rows.values()))
     if len(list(trains(nodes, row.size, rate, air))) > 1:
         raise RequestError(
@@ -48,6 +53,60 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
         return Positions(_positions(by_id, rows, answer), answer.missing, answer.at)
 
     return sync_exchange(nodes, row.address, row.size, read)
+
+
+def position_reads(
+    servos: Sequence[Node], *, rate: int = RATE, air: float = AIR
+) -> list[Exchange[Positions]]:
+    """The exchanges that bring the present positions of all of these, which may be kept and run again.
+
+    SYNC READs that keep each train of replies within `air` s for those who answer them, a READ for each other.
+    """
+    nodes = distinct(servos)
+    size = max(_row(node, "present_position").size for node in nodes)
+    able = [node for node in nodes if node.control.sync_read]
+    found = [sync_read_positions(part, rate=rate, air=air) for part in trains(able, size, rate, air)]
+    return found + [_alone(node) for node in nodes if not node.control.sync_read]
+
+
+def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Operation[Positions]:
+    """The present positions of all of these, of whatever map; made anew for each cycle.
+
+    Who does not answer is missing from the values, and costs the others nothing. Raises RequestError when a servo is
+    not prepared, DeviceError when the register map of one is unknown.
+    """
+    values: dict[int, float] = {}
+    at = float("-inf")
+    for exchange in position_reads(servos, rate=rate, air=air):
+        found = yield from outcome(exchange)
+        if isinstance(found, DOUBTS):
+            continue
+        if isinstance(found, MotorbusError):
+            raise found
+        values.update(found.values)
+        at = max(at, found.at)
+    ids = [servo.node for servo in servos]
+    return Positions(
+        {id: values[id] for id in ids if id in values}, tuple(id for id in ids if id not in values), at
+    )
+
+
+def _alone(node: Node) -> Exchange[Positions]:
+    row = _row(node, "present_position")
+
+    def take(data: bytes) -> Positions:
+        return Positions({node.node: node.value(row, row.decode(data))}, (), node.at)
+
+    return read_block(node, row.address, row.size, take)
+
+
+def _no_sync_read(node: Node) -> RequestError:
+    return RequestError(
+        f"node {node.node} knows no SYNC READ, so one packet cannot bring its position",
+        expected="servos of another map than scs and scs2",
+        advice="use read_positions(), which asks such servos one by one; nothing was sent",
+        node=node.node,
+    )
 
 
 def _positions(nodes: Mapping[int, Node], rows: Mapping[int, Entry], answer: Answer) -> dict[int, float]:
@@ -64,7 +123,7 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
     """Goal positions in rad for all of these, in one packet that nobody acknowledges.
 
     Raises RequestError when a servo is not prepared, is not in position mode, or there are too many for a packet;
-    DeviceError when the map of one is not commanded here; LimitExceeded when a position is not a finite number. The
+    DeviceError when the map of one is not known; LimitExceeded when a position is not a finite number. The
     gate judges the limits.
     """
     nodes = distinct(servos)

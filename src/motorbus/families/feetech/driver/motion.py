@@ -12,20 +12,26 @@ import math
 from enum import Enum
 from typing import Final
 
-from motorbus.core.entry import Entry, Table
-from motorbus.core.operation import Effect, Goal, Operation
+from motorbus.core.entry import Table
+from motorbus.core.operation import Effect, Operation
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import Move, arrive
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.identity import prepare, refuse_unless_writable, writable
-from motorbus.families.feetech.driver.node import POSITION, PWM, STEP, VELOCITY, Node
+from motorbus.families.feetech.driver.bound import ask_bound
+from motorbus.families.feetech.driver.exchanges import Block, confirmed
+from motorbus.families.feetech.driver.identity import prepare, writable
+from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import position_goal
+from motorbus.families.feetech.driver.pace import burst, ramp_of
+from motorbus.families.feetech.driver.rest import at_rest, held, held_within, unknown_mode, with_bound
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
+from motorbus.families.feetech.table import Mode
 
 TOLERANCE: Final = 0.05
-"""rad; 32 counts. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user reports)."""
-NO_LOAD: Final = 3400
-"""Counts/s of an STS3215 without load. Source: STS3215 memory table V3.6."""
+"""rad; 32 counts of STS. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user
+reports)."""
+COUNTS: Final = 10
+"""Counts of any servo within which it is in position, where these are more: one of SCS is 3.3 times one of STS, and an
+angular resolution stretches each."""
 
 
 class Promise(Enum):
@@ -34,100 +40,80 @@ class Promise(Enum):
     HOLD_ACCEPTED = "goal := present position accepted: it decelerates and holds; standstill was not verified"
     ZERO_VELOCITY_ACCEPTED = "goal velocity := 0 accepted: it decelerates; standstill was not verified"
     ZERO_DUTY_ACCEPTED = "duty := 0 accepted: it runs out without holding; standstill was not verified"
+    ZERO_CURRENT_ACCEPTED = "current := 0 accepted: it runs out without holding; standstill was not verified"
     TORQUE_OFF_ACCEPTED = "torque off accepted: it goes limp at once, and an arm sags or falls"
 
+
+ON: Final = Block(TORQUE_ENABLE, b"\1", Effect.TORQUE)
+_AT_REST: Final = {
+    Mode.VELOCITY: Promise.ZERO_VELOCITY_ACCEPTED,
+    Mode.PWM: Promise.ZERO_DUTY_ACCEPTED,
+    Mode.CURRENT: Promise.ZERO_CURRENT_ACCEPTED,
+}
 
 # -- hold and let go -----------------------------------------------------------------------------------------
 
 
 def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
-    """Torque on without a jump: the goal becomes the present position first (velocity or duty 0 in those modes).
+    """Torque on without a jump: the goal becomes the present position first (velocity, duty or current 0 there).
+
+    Where a goal velocity of 0 means standstill and nothing else is set, that becomes the maximum, so that goals which
+    come without a velocity are gone to.
 
     A servo that was turned by hand beyond its limits would go for the nearer limit as soon as it holds; that is
-    refused with LimitExceeded unless the way is at most `jump` (rad).
+    refused with LimitExceeded unless the way is at most `jump` (rad). Raises RequestError where no order is known that
+    would not move it: in PWM mode of HLS, in a mode that no source explains, on SMCL with both limits 0, and on a servo
+    of many turns that tells its position within one (there `jump` must be as much as all of them).
     """
     yield from prepare(node)
     table = yield from writable(node)
-    if node.mode == POSITION:
-        stands = yield from _stands(node, table)
-        yield from confirmed(node, _hold(node, table, _within(node, table, stands, jump)))
-    elif node.mode in (VELOCITY, PWM):
-        yield from confirmed(node, _rest(node, table))
-    elif node.mode != STEP:  # where torque alone moves nothing
-        raise _unknown_mode(node)
-    yield from confirmed(node, Block(TORQUE_ENABLE, b"\1", Effect.TORQUE))
+    mode = node.known_mode
+    if mode is None:
+        raise unknown_mode(node)
+    if mode is Mode.POSITION:
+        yield from ordered(node, table, (yield from held_within(node, table, jump)))
+    elif mode is Mode.VELOCITY:
+        yield from ask_bound(node, table)
+        yield from ordered(node, table, with_bound(node, table, at_rest(node, table, mode)))
+    elif mode is not Mode.STEP:  # where torque alone moves nothing
+        yield from ordered(node, table, at_rest(node, table, mode))
+    yield from confirmed(node, ON)
 
 
 def stop(node: Node) -> Operation[Promise]:
-    """Decelerate and stay: the goal becomes the position of this moment (velocity or duty 0 in those modes).
+    """Decelerate and stay: the goal becomes the position of this moment (velocity, duty or current 0 in those modes).
 
-    Returns what was promised. A limp servo begins to hold. Raises RequestError in step mode, where a goal is a
-    way to go and nothing is known to end it but torque off.
+    Returns what was promised. A limp STS servo begins to hold, a limp one of another map may stay limp. Raises
+    RequestError where nothing is known to end a movement but torque off: in step mode, where a goal is a way to go; in
+    PWM mode of HLS; in a mode that no source explains; on a servo of many turns that tells its position within one.
     """
     table = yield from writable(node)
-    if node.mode == POSITION:
-        stands = yield from _stands(node, table)
-        yield from confirmed(node, _hold(node, table, stands))
-        return Promise.HOLD_ACCEPTED
-    if node.mode == STEP:
+    mode = node.known_mode
+    if mode is None:
+        raise unknown_mode(node)
+    if mode is Mode.STEP:
         raise RequestError(
             f"node {node.node} is in step mode, where no goal means 'stay'",
             advice="use disable_torque(), after which it is limp; nothing was sent",
             node=node.node,
         )
-    if node.mode not in (VELOCITY, PWM):
-        raise _unknown_mode(node)
-    yield from confirmed(node, _rest(node, table))
-    return Promise.ZERO_DUTY_ACCEPTED if node.mode == PWM else Promise.ZERO_VELOCITY_ACCEPTED
+    if mode is Mode.POSITION:
+        yield from ordered(node, table, (yield from held(node, table)))
+        return Promise.HOLD_ACCEPTED
+    yield from ordered(node, table, at_rest(node, table, mode))
+    return _AT_REST[mode]
 
 
-def _stands(node: Node, table: Table) -> Operation[int]:
-    """Raw present position."""
-    row = table["present_position"]
-    return (yield from read_block(node, PRESENT, row.size, row.decode))
-
-
-def _hold(node: Node, table: Table, raw: int) -> Block:
-    """Goal := this position. Staying where it stands is inside any limits, so the goal brings its own."""
-    row = table["goal_position"]
-    value = node.value(row, raw)
-    return Block(
-        row.address, row.encode(raw), row.effect, (Goal(node.node, "position", value, value, value),)
-    )
-
-
-def _rest(node: Node, table: Table) -> Block:
-    """Velocity 0 or duty 0, as the mode asks for."""
-    row, quantity = table["goal_velocity"], "velocity"
-    if node.mode == PWM:
-        row, quantity = table["goal_time"], "load"
-    return Block(row.address, row.encode(0), row.effect, (Goal(node.node, quantity, 0.0, 0.0, 0.0),))
-
-
-def _unknown_mode(node: Node) -> RequestError:
-    return RequestError(
-        f"node {node.node} is in operating mode {node.mode}, which is not documented",
-        expected="0 position, 1 velocity, 2 PWM, 3 step",
-        advice="write(operating_mode=0) puts it into position mode; disable_torque() lets it go limp",
-        node=node.node,
-    )
-
-
-def _within(node: Node, table: Table, raw: int, jump: float) -> int:
-    """Where the servo will hold: here, or at the limit it would go for, when that is near enough."""
-    row = table["goal_position"]
-    here = node.value(row, raw)
-    assert node.limits is not None
-    low, high = node.limits
-    there = min(max(here, low), high)
-    if abs(here - there) > jump + row.scale / 2:
-        raise LimitExceeded(
-            f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad: "
-            f"with torque on it would jump to {there:.4g} rad",
-            advice=f"turn it inside by hand, or say enable_torque(jump={abs(here - there) + 0.001:.3f})",
-            node=node.node,
-        )
-    return node.raw(row, there)
+def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
+    """Write an order and be sure of it; what it says of the bound of the current is known from then on."""
+    row = table[node.control.current] if node.control.current else None
+    told = row is not None and block.address <= row.address < block.address + len(block.data)
+    if row is not None and told:
+        node.bound = None
+    yield from confirmed(node, block)
+    if row is not None and told:
+        at = row.address - block.address
+        node.bound = row.decode(block.data[at : at + row.size])
 
 
 # -- move ----------------------------------------------------------------------------------------------------
@@ -139,65 +125,74 @@ def move(
     *,
     velocity: float | None = None,
     acceleration: float | None = None,
+    current: float | None = None,
     wait: bool = True,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     timeout: float | None = None,
 ) -> Operation[None]:
     """Move to `to` rad, at most at `velocity` rad/s and `acceleration` rad/s² (None: the servo's maximum).
 
-    Goal, velocity and acceleration leave in one packet. Torque goes on by itself. Returns when the servo is in
-    position within `tolerance` rad and no longer moves; at once with `wait=False`. Raises LimitExceeded when `to`
-    is not a finite number (and the gate does outside the limits), RequestError in other than position mode,
-    Stalled when it stays off its goal, MotionError after `timeout` seconds (None: from the way and the velocity).
+    Goal, velocity and acceleration leave in one packet. Torque goes on: on STS by itself, on other maps, of which
+    nobody has said that, by a packet that follows. On HLS the first packet also bounds the current: by `current` (A),
+    or as it was; 0 is never sent, and a servo that was found with 0 is reported (`Powerless`). Returns when the servo
+    is in position within `tolerance` rad (None: 0.05, or ten counts where these are more) and no longer moves; at once
+    with `wait=False`. A servo of many turns that tells its position within one is judged within that.
+
+    Raises LimitExceeded when `to` is not a finite number (and the gate does outside the limits), RequestError in other
+    than position mode, for an acceleration where the map has no register for it (SCS) or a current where it has none
+    (all but HLS), Stalled when it stays off its goal, MotionError after `timeout` seconds (None: by way and velocity).
     """
-    _finite(node, to, velocity, acceleration, tolerance, timeout)
+    finite(node, to, velocity, acceleration, current, tolerance, timeout)
     table = yield from writable(node)
-    block = move_block(node, table, to, velocity, acceleration)
-    yield from confirmed(node, block)
+    yield from ask_bound(node, table, current)
+    block = move_block(node, table, to, velocity, acceleration, current)
+    yield from ordered(node, table, block)
+    if not node.control.goal_switches_on:
+        yield from confirmed(node, ON)
     if wait:
         goal = block.goals[0].value
-        yield from arrive(node, table, Move(goal, velocity, acceleration, tolerance, timeout))
+        yield from arrive(node, table, way(node, table, goal, velocity, acceleration, tolerance, timeout))
+
+
+def way(
+    node: Node,
+    table: Table,
+    goal: float,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    tolerance: float | None = None,
+    timeout: float | None = None,
+) -> Move:
+    """The move that was ordered, for `arrive` to judge; as `move` says."""
+    count = abs(float(node.value(table["goal_position"], 1)))
+    within = max(TOLERANCE, COUNTS * count) if tolerance is None else tolerance
+    settings = node.settings
+    wraps = settings is not None and settings.many_turns and not settings.accumulates
+    turn = settings.turn * count if settings is not None and wraps else None
+    return Move(goal, velocity, acceleration, within, timeout, resolution=count, turn=turn)
 
 
 def move_block(
-    node: Node, table: Table, to: float, velocity: float | None = None, acceleration: float | None = None
+    node: Node,
+    table: Table,
+    to: float,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    current: float | None = None,
 ) -> Block:
-    """Registers 41 to 47 at once: acceleration, goal position, goal time, goal velocity.
+    """All that a move says, in one block: acceleration, goal position, bound of the current or time, velocity.
 
-    Raises DeviceError for a servo whose map is not commanded here: on HLS the 0 for the time would be a torque of 0.
+    Registers 41 to 47; on SCS, which have no acceleration, 42 to 47. The time is 0, so that the velocity counts. Raises
+    RequestError when a bound of the current is needed and not known (see `ask_bound`).
     """
-    refuse_unless_writable(node)
-    goal, time, speed, ramp = (
-        table[name] for name in ("goal_position", "goal_time", "goal_velocity", "acceleration")
-    )
-    raw, order = position_goal(node, goal, to)
-    data = ramp.encode(_positive(node, ramp, acceleration)) + goal.encode(raw) + time.encode(0)
-    return Block(ramp.address, data + speed.encode(_speed(node, speed, velocity)), goal.effect, (order,))
+    raw, order = position_goal(node, table["goal_position"], to)
+    data = table["goal_position"].encode(raw) + burst(node, table, velocity, current)
+    ramp = ramp_of(node, table, acceleration)
+    return Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, (order,))
 
 
-def _speed(node: Node, row: Entry, velocity: float | None) -> int:
-    """Raw goal velocity. Where 0 means standstill, the maximum has to be said as a number."""
-    if velocity is None and node.settings is not None and not node.settings.zero_is_maximum:
-        return max(1, node.raw(row, NO_LOAD * row.scale))
-    return _positive(node, row, velocity)
-
-
-def _positive(node: Node, row: Entry, value: float | None) -> int:
-    """Raw value of a bound that must not become 0, for 0 means 'no bound' (None says that)."""
-    if value is None:
-        return 0
-    raw = node.raw(row, value)
-    if raw > 0:
-        return raw
-    raise RequestError(
-        f"{row.name}: {value} {row.unit} is not above 0, or is less than this servo can be told",
-        expected=f"{node.value(row, 1):.4g} to {node.value(row, row.high):.4g} {row.unit}",
-        advice="leave it out for the maximum; nothing was sent",
-        node=node.node,
-    )
-
-
-def _finite(node: Node, to: float, *bounds: float | None) -> None:
+def finite(node: Node, to: float, *bounds: float | None) -> None:
+    """Raise LimitExceeded for a goal that is no number, RequestError for bounds that are none above 0."""
     if not math.isfinite(to):
         raise LimitExceeded(
             f"node {node.node}: {to} is no position",

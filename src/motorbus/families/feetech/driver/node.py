@@ -16,19 +16,26 @@ from motorbus.core.family import Identity
 from motorbus.core.operation import Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.table import alarms, tells_current, velocity_scale, zero_is_maximum
+from motorbus.families.feetech.table import (
+    CONTROL,
+    Control,
+    Mode,
+    alarms,
+    mode_of,
+    tells_current,
+    velocity_scale,
+    zero_is_maximum,
+)
+from motorbus.families.feetech.table.phase import many_turns_are_told
 
-COMMANDED: Final = frozenset(("sts",))
-"""The register maps this driver writes and moves by. Servos of other maps are read by name, and nothing more: modes,
-units and the place of the lock differ, and half of a driver for them would be worse than none."""
 IMAGE: Final = 40
 """Bytes of the EEPROM area, registers 0 to 39, which one READ brings."""
 MANY_TURNS: Final = 30719
 """Counts to either side when both limits are 0 (7.5 turns). Source: STS3215 memory table V3.6."""
-POSITION, VELOCITY, PWM, STEP = range(4)
-"""Operating modes of STS servos (register 33)."""
 
-_POSITIONS: Final = ("present_position", "goal_position", "goal_position_echo")
+_UNKNOWN: Final = Control()
+_PRESENT: Final = "present_position"
+_POSITIONS: Final = (_PRESENT, "goal_position", "goal_position_echo")
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
 SCALED: Final = frozenset((*_POSITIONS, *_VELOCITIES))
 """Rows whose unit depends on settings of the servo (angular resolution, phase)."""
@@ -39,25 +46,50 @@ alarm_names: Final = cache(alarms)
 class Settings(NamedTuple):
     """What the EEPROM of a servo says about how to talk to it.
 
-    `limits` in rad; None when its map is not known, or two limits of 0 mean what nobody has published. `mode` is the
-    operating mode; None where the driver does not command the map, whose modes have other numbers. `factors` multiply
-    what a row says of its unit, by row name. `answers_writes` is the status return level. `zero_is_maximum`: a goal
-    velocity of 0 means the maximum, otherwise it means standstill. `tells_current`: its bridge measures the current.
+    `limits`       in rad; None when its map is not known, or both are 0 and nobody has published what that means
+    `mode`         what it heeds; None when its map is not known, or the number is one that no source explains
+    `mode_code`    that number; None where the map has no operating mode and the limits decide
+    `offset`       homing offset in counts; 0 where the map has none
+    `turn`         counts after which a position over one turn begins anew
+    `many_turns`   both limits are 0 where that means many turns
+    `accumulates`  the present position is told over many turns (phase, bit 4), otherwise over one
+    `shift`        counts to take from the present position as it is told: the offset in every mode but position,
+                   for the servo itself applies it in position mode only
+    `factors`      what a row says of its unit, times this, by row name
+    `protection_current`  raw; what bounds the current after power-up where a goal register does so
+    `answers_writes`  the status return level
+    `zero_is_maximum`  a goal velocity of 0 means the maximum, otherwise it means standstill
+    `tells_current`    its bridge measures the current
     """
 
     limits: tuple[float, float] | None = None
-    mode: int | None = None
+    mode: Mode | None = None
+    mode_code: int | None = None
+    offset: int = 0
+    turn: int = 4096
+    many_turns: bool = False
+    accumulates: bool = False
+    shift: int = 0
     factors: Mapping[str, float] = {}
+    protection_current: int = 0
     answers_writes: bool = True
     zero_is_maximum: bool = True
     tells_current: bool = True
+
+    def compensated(self, raw: int) -> int:
+        """A present position in counts with the homing offset taken out, within a turn where it is told over one."""
+        if self.accumulates or not 0 <= raw < self.turn:
+            return raw - self.shift
+        return (raw - self.shift) % self.turn
 
 
 class Node:
     """One servo by its id, 0 to 253, and what is known of it.
 
     `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s);
-    `pending` what a REG WRITE from here ordered and no ACTION has carried out yet.
+    `pending` what a REG WRITE from here ordered and no ACTION has carried out yet. `bound` is the raw bound of the
+    current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
+    those (rad) that were given up to make a motor of it, where limits decide about that.
     """
 
     def __init__(self, node: int) -> None:
@@ -68,6 +100,8 @@ class Node:
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
         self.pending: tuple[Goal, ...] = ()
+        self.bound: int | None = None
+        self.former_limits: tuple[float, float] | None = None
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -75,14 +109,19 @@ class Node:
         return self.settings.limits if self.settings else None
 
     @property
-    def mode(self) -> int | None:
-        """Operating mode as last read: 0 position, 1 velocity, 2 PWM, 3 step; None when not read yet."""
+    def known_mode(self) -> Mode | None:
+        """What it heeds, as last read; None when not read yet, or when no source explains what it is set to."""
         return self.settings.mode if self.settings else None
 
     @property
+    def control(self) -> Control:
+        """Which registers of its map play which part; of an unknown map, none does."""
+        return CONTROL.get(self.identity.table, _UNKNOWN) if self.identity else _UNKNOWN
+
+    @property
     def writable(self) -> bool:
-        """Its register map is known and commanded here, so that a write does what its name says."""
-        return self.identity is not None and self.identity.table in COMMANDED
+        """Its register map is known, so that a write does what its name says."""
+        return self.identity is not None and bool(self.identity.table)
 
     def heard(self, error: int, at: float) -> None:
         """A reply came: keep its alarm bits and its time. An alarm never makes a good reply a failure."""
@@ -92,13 +131,19 @@ class Node:
     def forget_settings(self) -> None:
         """They may have changed: read them again before they are used."""
         self.settings = None
+        self.bound = None
 
     def value(self, row: Entry, raw: int) -> Value:
-        """Raw value of a register -> value in the row's unit, by the settings of this servo."""
-        value = row.to_value(raw)
-        if self.settings and row.name in self.settings.factors:
-            return value * self.settings.factors[row.name]
-        return value
+        """Raw value of a register -> value in the row's unit, by the settings of this servo.
+
+        The homing offset is taken out of a present position in the modes in which the servo itself leaves it in.
+        """
+        settings = self.settings
+        if settings is None or row.name not in settings.factors:
+            return row.to_value(raw)
+        if settings.shift and row.name == _PRESENT:
+            raw = settings.compensated(raw)
+        return row.to_value(raw) * settings.factors[row.name]
 
     def raw(self, row: Entry, value: Value) -> int:
         """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
@@ -140,25 +185,37 @@ def settings_of(table: Table, image: bytes) -> Settings:
         row = table[name]
         return row.decode(image[row.address : row.address + row.size])
 
-    phase = raw("phase")
-    turns = float(max(1, raw("angular_resolution"))) if "angular_resolution" in table else 1.0
-    limits = _limits(table, raw("min_position_limit"), raw("max_position_limit"))
-    count = table["goal_position"].scale * turns
+    def raw_or(name: str, other: int) -> int:
+        return raw(name) if name in table else other
+
+    phase, control = raw("phase"), CONTROL[table.name]
+    raw_limits = raw("min_position_limit"), raw("max_position_limit")
+    many_turns = control.many_turns and raw_limits == (0, 0)
+    code = raw("operating_mode") if "operating_mode" in table else None
+    mode = mode_of(table.name, code, raw_limits)
+    offset = raw_or("homing_offset", 0)
+    turns = float(max(1, raw_or("angular_resolution", 1)))
     return Settings(
-        limits=(limits[0] * count, limits[1] * count) if limits else None,
-        mode=raw("operating_mode") if table.name in COMMANDED else None,
+        limits=_limits(raw_limits, many_turns, table["goal_position"].scale * turns),
+        mode=mode,
+        mode_code=code,
+        offset=offset,
+        turn=control.turn,
+        many_turns=many_turns,
+        accumulates=many_turns_are_told(phase, table.name),
+        shift=0 if mode in (Mode.POSITION, None) else offset,
         factors={
             **dict.fromkeys(_POSITIONS, turns),
             **dict.fromkeys(_VELOCITIES, float(velocity_scale(phase, table.name))),
         },
+        protection_current=raw("protection_current") if control.current else 0,
         answers_writes=raw("status_return_level") != 0,
         zero_is_maximum=zero_is_maximum(phase, table.name),
         tells_current=tells_current(phase, table.name),
     )
 
 
-def _limits(table: Table, low: int, high: int) -> tuple[int, int] | None:
-    """In counts. Two zeros mean many turns on STS, a motor without limits on SCS, and who knows what elsewhere."""
-    if low or high:
-        return low, high
-    return (-MANY_TURNS, MANY_TURNS) if table.name in COMMANDED else None
+def _limits(raw: tuple[int, int], many_turns: bool, count: float) -> tuple[float, float] | None:
+    """In rad. Two zeros mean many turns where the map says so; elsewhere there is no goal that they would admit."""
+    low, high = (-MANY_TURNS, MANY_TURNS) if many_turns else raw
+    return (low * count, high * count) if low or high else None

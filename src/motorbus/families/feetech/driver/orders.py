@@ -7,17 +7,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import refuse_unless_writable
-from motorbus.families.feetech.driver.node import COMMANDED, MANY_TURNS, POSITION, SCALED, STEP, Node
-from motorbus.families.feetech.table import TABLES
+from motorbus.families.feetech.driver.node import MANY_TURNS, SCALED, Node
+from motorbus.families.feetech.table import TABLES, Mode
 
-_DUTY = 0.001
+DUTY: Final = 0.001
+"""What one count of a duty is, as a fraction. Source: STS3215 memory table V3.6; SCS memory table 1902."""
+_CALIBRATE: Final = 128
+_INSTEAD: Final = {
+    "id": "use set_id(), which sees to it that the servo is found again",
+    "baud_rate": "use set_baud(), which sees to it that the servo is found again",
+    "homing_offset": "use calibrate(), which reckons it from where the servo stands",
+}
 
 
 class Order(NamedTuple):
@@ -32,7 +39,23 @@ def orders_of(node: Node, table: Table, values: Mapping[str, Value]) -> list[Ord
     orders = [Order(table[name], node.raw(table[name], value)) for name, value in values.items()]
     for order in orders:
         _check(order, node.node)
+        if order.row.name == node.control.current:
+            _check_bound(node, order)
+            node.bound = None
     return orders
+
+
+def _check_bound(node: Node, order: Order) -> None:
+    """The trap of HLS: a goal torque of 0 in position or velocity mode makes a servo that holds nothing."""
+    if order.raw or node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
+        return
+    raise RequestError(
+        f"{order.row.name}: 0 would leave node {node.node} without force, for in {shown_mode(node)} mode this register "
+        "bounds its current",
+        expected=f"above 0, to {order.row.to_value(order.row.high):.4g} {order.row.unit}",
+        advice="disable_torque() lets it go limp; nothing was sent",
+        node=node.node,
+    )
 
 
 def blocks(node: Node, orders: Iterable[Order]) -> Iterator[Block]:
@@ -50,7 +73,7 @@ def blocks(node: Node, orders: Iterable[Order]) -> Iterator[Block]:
 def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
     """These orders as one block of RAM registers. Raises RequestError when they are not that."""
     found = list(blocks(node, orders))
-    if len(found) == 1 and all(order.row.storage is Storage.RAM for order in orders):
+    if len(found) == 1 and all(order.row.storage is Storage.RAM and not limps(order.row) for order in orders):
         return found[0]
     raise RequestError(
         f"{what} carries adjoining RAM registers only, not {', '.join(o.row.name for o in orders) or 'none'}",
@@ -60,20 +83,22 @@ def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
     )
 
 
+def limps(row: Entry) -> bool:
+    """Whether this RAM register may be written to a limp servo only: it moves a servo, and is no goal to judge."""
+    return row.effect is Effect.MOTION and row.storage is Storage.RAM and not row.name.startswith("goal_")
+
+
 def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
     """A goal position in rad: its raw value, and the goal for the gate, which judges the limits.
 
-    Raises DeviceError when its map is not commanded here, RequestError in other than position mode, LimitExceeded for
-    what is no number or fits no register.
+    Raises DeviceError when its map is not known, RequestError in other than position mode or when both its limits are
+    0 and nobody has published what that means, LimitExceeded for what is no number or fits no register.
     """
     refuse_unless_writable(node)
-    if node.mode != POSITION:
-        raise RequestError(
-            f"node {node.node} cannot go to a position in operating mode {node.mode}",
-            expected="operating mode 0, position",
-            advice="write(operating_mode=0) puts it into position mode; nothing was sent",
-            node=node.node,
-        )
+    if node.known_mode is not Mode.POSITION:
+        raise unheeded(node, Mode.POSITION, "cannot go to a position")
+    if node.limits is None:
+        raise no_limits(node)
     raw = node.raw(row, to) if math.isfinite(to) else row.high + 1
     if not row.low <= raw <= row.high:
         raise LimitExceeded(
@@ -83,6 +108,38 @@ def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
             node=node.node,
         )
     return raw, Goal(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+
+
+def unheeded(node: Node, wanted: Mode, complaint: str) -> RequestError:
+    """The error for an order that a servo does not heed in the mode it is in."""
+    code = node.control.code(wanted)
+    has = ", ".join(mode.value for mode in node.control.has)
+    return RequestError(
+        f"node {node.node} {complaint} in operating mode {shown_mode(node)}",
+        expected=f"operating mode {wanted.value}" + (f" ({code})" if code is not None else ""),
+        advice=f"set_mode({wanted.value!r}) changes that; nothing was sent"
+        if wanted in node.control.has
+        else f"servos of its map have {has} mode only; nothing was sent",
+        node=node.node,
+    )
+
+
+def no_limits(node: Node) -> RequestError:
+    """The error for a servo whose limits are both 0 in a map where nobody has published what that means."""
+    return RequestError(
+        f"both position limits of node {node.node} are 0, and nobody has published what that means on "
+        f"{node.identity.table if node.identity else 'its map'}",
+        expected="a greatest position above the least",
+        advice="write(min_position_limit=…, max_position_limit=…), or disable_torque(); nothing was sent",
+        node=node.node,
+    )
+
+
+def shown_mode(node: Node) -> str:
+    """The mode a servo is in, for reading eyes: the word, or the number that no source explains."""
+    if node.known_mode is not None:
+        return node.known_mode.value
+    return str(node.settings.mode_code) if node.settings else "unknown"
 
 
 def check_names(names: Iterable[str]) -> None:
@@ -100,7 +157,7 @@ def check_values(values: Mapping[str, Value]) -> None:
     """
     check_names(values)
     for name, value in values.items():
-        faults = [_fault(TABLES[one][name], value) for one in sorted(COMMANDED) if name in TABLES[one]]
+        faults = [_fault(table[name], value) for table in TABLES.values() if name in table]
         if faults and faults[0] is not None and all(faults):
             raise faults[0]
 
@@ -130,12 +187,12 @@ def _refusal(row: Entry, raw: int) -> tuple[str, str] | None:
     if row.effect is Effect.IDENTITY:
         return (
             "a plain write would change how the servo is found, and may lose it",
-            "leave it: safe ways to set ids and rates (set-id, set-baud) come with a later release",
+            _INSTEAD.get(row.name, "leave it as it is"),
         )
     if row.protected:
         return (
             "this register belongs to one servo alone and may not be copied; a wrong value can ruin it",
-            "leave it as it is",
+            _INSTEAD.get(row.name, "leave it as it is"),
         )
     if not row.writable:
         return "this register can only be read", "read it instead"
@@ -144,7 +201,9 @@ def _refusal(row: Entry, raw: int) -> tuple[str, str] | None:
             "an open lock would make every later write permanent",
             "just write the registers: write() opens the lock, verifies, and closes it again",
         )
-    if row.name == "torque_enable" and raw != 0:
+    if row.name == "torque_enable" and raw == _CALIBRATE:
+        return "128 is no state of the torque: it rewrites the homing offset", "use calibrate()"
+    if row.name == "torque_enable" and not row.choices.get(raw, "").startswith("off"):
         return (
             "switching torque on by a plain write can jump to an old goal",
             "use enable_torque(), which first sets the goal to where the servo stands",
@@ -159,20 +218,21 @@ def _block(node: Node, group: Sequence[Order]) -> Block:
         b"".join(row.encode(raw) for row, raw in group),
         max(row.effect for row, _ in group),
         tuple(goal for row, raw in group for goal in _goals(node, row, raw)),
-        repeatable=not any(row.name == "goal_position" and node.mode == STEP for row, _ in group),
+        repeatable=not any(row.name == "goal_position" and node.known_mode is Mode.STEP for row, _ in group),
     )
 
 
 def _goals(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
     """What this value of this row orders, in the operating mode the servo is in."""
     value = node.value(row, raw)
-    if row.name == "goal_position" and node.mode == STEP:
+    if row.name == "goal_position" and node.known_mode is Mode.STEP:
         most = MANY_TURNS * row.scale
         yield Goal(node.node, "relative", value, -most, most)
     elif row.name == "goal_position":
         yield Goal(node.node, "position", value, *(node.limits or (None, None)))
     elif row.name == "goal_velocity":
-        most = node.value(row, row.high)
-        yield Goal(node.node, "velocity", value, -most, most)
+        yield Goal(node.node, "velocity", value, node.value(row, row.low), node.value(row, row.high))
+    elif row.name == node.control.current:
+        yield Goal(node.node, "current", value, node.value(row, row.low), node.value(row, row.high))
     elif row.name == "goal_time":  # a duty in PWM mode; a time otherwise, and judged all the same
-        yield Goal(node.node, "load", raw * _DUTY, -1.0, 1.0)
+        yield Goal(node.node, "load", raw * DUTY, -1.0, 1.0)

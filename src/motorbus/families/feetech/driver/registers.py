@@ -10,14 +10,23 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
-from motorbus.core.operation import Effect, Exchange, Operation
+from motorbus.core.operation import Effect, Exchange, Operation, Runnable
 from motorbus.errors import OutcomeUnknown
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged, confirmed, read_block, unanswered
-from motorbus.families.feetech.driver.identity import known, writable
+from motorbus.families.feetech.driver.identity import known, refuse_unless_writable, writable
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.orders import blocks, check_names, check_values, only_block, orders_of
+from motorbus.families.feetech.driver.orders import (
+    Order,
+    blocks,
+    check_names,
+    check_values,
+    limps,
+    only_block,
+    orders_of,
+)
+from motorbus.families.feetech.driver.torque import disable_torque
 
 _GAP: Final = 8
 """Bytes between two rows that are cheaper to read than to leave out: a request has 8, a reply 6, and a pause."""
@@ -91,8 +100,9 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
     """Write registers by name, in API units; all are checked before the first is sent.
 
     Registers in EEPROM go through the guarded sequence: torque off (the servo goes limp and stays so), unlock,
-    write, read back, lock. Raises RequestError for what cannot or must not be written so, DeviceError when the
-    register map is not known or not commanded here, VerificationFailed when EEPROM reads back different.
+    write, read back, lock. What changes the meaning of a goal (`control_loop` of HLS) lets it go limp as well. Raises
+    RequestError for what cannot or must not be written so, DeviceError when the register map is not known,
+    VerificationFailed when EEPROM reads back different.
     """
     check_values(values)
     table = yield from writable(node)
@@ -100,8 +110,18 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
     kept = list(blocks(node, [order for order in orders if order.row.storage is Storage.EEPROM]))
     if kept:
         yield from eeprom.store(node, table, kept)
-    for block in blocks(node, [order for order in orders if order.row.storage is not Storage.EEPROM]):
+    live = [order for order in orders if order.row.storage is not Storage.EEPROM]
+    if any(limps(order.row) for order in live):
+        yield from disable_torque(node)
+        yield from _confirmed_limp(node, [order for order in live if limps(order.row)])
+    for block in blocks(node, [order for order in live if not limps(order.row)]):
         yield from confirmed(node, block)
+
+
+def _confirmed_limp(node: Node, orders: Sequence[Order]) -> Operation[None]:
+    """Write what would move a servo that holds to one that was made limp, which it cannot move."""
+    for block in blocks(node, orders):
+        yield from confirmed(node, block._replace(effect=Effect.NONE))
 
 
 def reg_write(node: Node, /, **values: Value) -> Operation[None]:
@@ -122,8 +142,7 @@ def reg_write(node: Node, /, **values: Value) -> Operation[None]:
 
 def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
-    waiting = yield from read_block(node, table["reg_write_pending"].address, 1, bytes)
-    if waiting == b"\0":
+    if not (yield from _waits(node, table)):
         raise OutcomeUnknown(
             f"node {node.node} holds no REG WRITE after one was sent",
             sent=exchange.request,
@@ -133,16 +152,53 @@ def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[No
         )
 
 
-def action(node: Node) -> Exchange[None]:
-    """ACTION for this servo: carry out what REG WRITE left. Never sent twice; nothing pending does nothing."""
-    return acknowledged(node, wire.action(node.node), _released([node]), after=lambda: _carried_out([node]))
+def _waits(node: Node, table: Table) -> Operation[bool]:
+    waiting = yield from read_block(node, table["reg_write_pending"].address, 1, bytes)
+    return waiting != b"\0"
+
+
+def action(node: Node) -> Runnable[None]:
+    """ACTION for this servo: carry out what REG WRITE left. Never sent twice; nothing pending does nothing.
+
+    Raises DeviceError when the register map is not known, for then nobody knows what waits; OutcomeUnknown when it was
+    not acknowledged, or still waits on a servo that acknowledges nothing.
+    """
+    if node.table is None or node.settings is None:
+        return _met(node)
+    refuse_unless_writable(node)
+    exchange = acknowledged(
+        node, wire.action(node.node), _released([node]), after=lambda: _carried_out([node])
+    )
+    return exchange if exchange.replies else _seen(node, node.table, exchange)
+
+
+def _met(node: Node) -> Operation[None]:
+    yield from writable(node)
+    yield from action(node)
+
+
+def _seen(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
+    """A servo that acknowledges nothing still says whether a REG WRITE waits."""
+    yield from exchange
+    if (yield from _waits(node, table)):
+        raise OutcomeUnknown(
+            f"node {node.node} still holds a REG WRITE after ACTION was sent",
+            sent=exchange.request,
+            cause="ACTION was lost on the way, or another REG WRITE came in between",
+            advice="read the goal registers before sending it again",
+            node=node.node,
+        )
 
 
 def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
     """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers.
 
-    `nodes` are those whose goals were handed over here, for the gate to see once more.
+    `nodes` are those whose goals were handed over here, for the gate to see once more. Raises DeviceError when the
+    register map of one of these is known not to be described. Servos that are not named obey as well.
     """
+    for node in nodes:
+        if node.identity is not None:
+            refuse_unless_writable(node)
     block = _released(nodes)
     return unanswered(wire.action(), block.effect, block.goals, after=lambda: _carried_out(nodes))
 

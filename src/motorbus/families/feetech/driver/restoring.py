@@ -2,15 +2,20 @@
 
 The manual says that it is for certain models only; others are silent. What is known from hardware is one report
 (servolab, STS3215 firmware 3.10): the id is kept, the homing offset becomes 0, and the servo is deaf for about a
-second. So it is looked for afterwards: under its id and under 1, at the present rate and at the factory's.
+second; feetech-cli documents id 1 and 1 Mbaud instead. So it is looked for afterwards: under its id and under 1, at
+the present rate and at those its series ships with. Who was in such a place before is not taken for it.
+
+It is not `clear_turns` (0x0A), which some SDKs call RESET too: that one forgets the turns and nothing else.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Final
 
+from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import Alone, Effect, Operation, Pause, Rank, Timeout, Tune
+from motorbus.core.operation import Alone, Effect, Operation, Pause, Rank, Timeout, Tune, afterwards
 from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, acknowledged
@@ -31,15 +36,24 @@ def factory_restore(node: Node) -> Operation[Found]:
     The bus keeps its rate, even where the servo is found at the factory's. Raises NoReply when it does not answer
     afterwards, OutcomeUnknown when it answers but has not acknowledged: its model may lack this.
     """
-    yield from writable(node)
+    table = yield from writable(node)
     try:
-        return (yield from Alone(_restored(node)))
+        return (yield from Alone(_restored(node, factory_rates(table))))
     finally:
         node.forget_settings()
 
 
-def _restored(node: Node) -> Operation[Found]:
-    others = set((yield from _others(node)))
+def factory_rates(table: Table) -> tuple[int, ...]:
+    """The rates (bit/s) at which servos of this map ship; two where that depends on the model (SCS)."""
+    code = table["baud_rate"].default
+    return (BAUD_CODES[0], BAUD_CODES[1]) if code is None else (BAUD_CODES[code],)
+
+
+def _restored(node: Node, factory: Sequence[int]) -> Operation[Found]:
+    present = yield from Tune(0)
+    ids = tuple(dict.fromkeys((node.node, _SHIPPED_ID)))
+    places = dict.fromkeys(dict.fromkeys((present, *factory)), ids)
+    taken = yield from afterwards(_taken(node, present, places), lambda: iter(Tune(present)))
     yield from disable_torque(node)
     doubt: BaseException | None = None
     try:
@@ -47,25 +61,42 @@ def _restored(node: Node) -> Operation[Found]:
     except DOUBTS as error:
         doubt = error
     yield from Pause(DEAF)
-    present = yield from Tune(0)
-    rates = () if present == BAUD_CODES[0] else (present, BAUD_CODES[0])
-    found = yield from scan([id for id in dict.fromkeys((node.node, _SHIPPED_ID)) if id not in others], rates)
-    if not found:
-        raise _gone(node, others) from doubt
-    if doubt is not None and (found[0].node, found[0].rate) == (node.node, present):
-        raise _unacknowledged(node, found[0]) from doubt
-    return found[0]
+    found = yield from _found(present, places, taken)
+    if found is None:
+        raise _gone(node, taken) from doubt
+    if doubt is not None and (found.node, found.rate) == (node.node, present):
+        raise _unacknowledged(node, found) from doubt
+    return found
 
 
-def _others(node: Node) -> Operation[list[int]]:
-    """Another servo that has the id as shipped: it must not be taken for this one afterwards."""
-    if node.node == _SHIPPED_ID:
-        return []
+def _taken(node: Node, present: int, places: Mapping[int, Sequence[int]]) -> Operation[set[tuple[int, int]]]:
+    """Where, of all the places it may go to, another servo is already: (id, rate)."""
+    taken = set()
+    for rate, ids in places.items():
+        if rate != present:
+            yield from Tune(rate)
+        for id in ids:
+            if (id, rate) != (node.node, present) and (yield from _there(id)):
+                taken.add((id, rate))
+    return taken
+
+
+def _there(id: int) -> Operation[bool]:
     try:
-        there = yield from ping(Node(_SHIPPED_ID))
+        return (yield from ping(Node(id)))
     except WireError:
-        there = True
-    return [_SHIPPED_ID] if there else []
+        return True
+
+
+def _found(
+    present: int, places: Mapping[int, Sequence[int]], taken: set[tuple[int, int]]
+) -> Operation[Found | None]:
+    for rate, ids in places.items():
+        free = [id for id in ids if (id, rate) not in taken]
+        found = (yield from scan(free, () if rate == present else (rate,))) if free else []
+        if found:
+            return found[0]
+    return None
 
 
 def _reset(node: Node) -> Operation[None]:
@@ -74,8 +105,9 @@ def _reset(node: Node) -> Operation[None]:
     yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
-def _gone(node: Node, others: set[int]) -> NoReply:
-    now = "the id of another servo" if others else "another id or rate"
+def _gone(node: Node, taken: set[tuple[int, int]]) -> NoReply:
+    others = ", ".join(f"id {id} at {rate} bit/s" for id, rate in sorted(taken))
+    now = f"the place of another servo ({others})" if others else "another id or rate"
     return NoReply(
         f"node {node.node} does not answer after its factory values were restored",
         cause=f"it may have {now} now, or take longer to start",

@@ -2,63 +2,121 @@
 
 Silence is an answer here, so nothing waits long for it; but the first packet after power-up may be missed, so the
 silent ids are asked once more. A broadcast PING would be quicker and is not used: the replies collide, and the
-protocol manual V1.01 forbids it with more than one servo.
+protocol manual V1.01 forbids it with more than one servo. A servo at another rate cannot make out a packet and is
+silent, so whatever answers in bytes that are no answer may be two servos with one id: it is asked again, at length.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
-from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, afterwards, outcome
-from motorbus.errors import NoReply, WireError
+from motorbus.core.operation import (
+    Alone,
+    Operation,
+    Pause,
+    Progress,
+    Report,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkLost, MotorbusError, NoReply, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.identity import identify, ping_exchange
 from motorbus.families.feetech.driver.node import Node, as_nodes
+from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
+
+DRAIN: Final = 0.02
+"""s of quiet at a new rate: one that was busy may answer what it has buffered in a burst. Source: feetech-cli."""
+GLANCE: Final = 8
+"""Reads that show two servos on one id in passing, where 4 of 10 are garbled (servolab): 98 times of 100."""
 
 
-def scan(ids: Sequence[int] = (), rates: Sequence[int] = ()) -> Operation[list[Found]]:
+class Skipped(NamedTuple):
+    """An event: nothing was asked at this rate (bit/s), and why."""
+
+    rate: int
+    why: str
+
+
+def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int = 0) -> Operation[list[Found]]:
     """Every servo that answers, with what it is; `ids` () means 0 to 253, `rates` () the present rate alone.
 
     The present rate of the bus is set again at the end, whatever happens. Reports `Found` as soon as one answers
-    (its identity is asked afterwards) and `Progress`. Writes nothing to any servo.
+    (its identity is asked afterwards), `Progress`, a `Suspicion` where two servos seem to share an id, and `Skipped`
+    for a rate that the link does not have. Each that is found is asked `polls` times whether it is alone; one whose
+    answers are garbled in any case, and it counts as found, without an identity, when they stay so. Writes nothing.
     """
     asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
     present = yield from Tune(0)
     if not rates:
-        return (yield from _at_one_rate(asked, present, 0, 1))
-    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(present)))))
+        return (yield from _at_one_rate(asked, present, 0, 1, polls))
+    return (yield from Alone(afterwards(_at_all_rates(asked, rates, polls), lambda: iter(Tune(present)))))
 
 
-def _at_all_rates(ids: Sequence[int], rates: Sequence[int]) -> Operation[list[Found]]:
+def _at_all_rates(ids: Sequence[int], rates: Sequence[int], polls: int) -> Operation[list[Found]]:
     found: list[Found] = []
     for index, rate in enumerate(rates):
-        yield from Tune(rate)
-        found += yield from _at_one_rate(ids, rate, index, len(rates))
+        refusal = yield from outcome(iter(Tune(rate)))
+        if isinstance(refusal, LinkLost):
+            raise refusal
+        if isinstance(refusal, MotorbusError):
+            yield from Report(Skipped(rate, refusal.summary))
+            continue
+        yield from Pause(DRAIN)
+        found += yield from _at_one_rate(ids, rate, index, len(rates), polls)
     return found
 
 
-def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int) -> Operation[list[Found]]:
+def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int, polls: int) -> Operation[list[Found]]:
     """Two passes over the ids, the second over the silent ones, then ask those who are there what they are."""
     there: list[int] = []
+    garbled: set[int] = set()
     for number in range(2):
         begun = (2 * index + number) * len(ids)
         for done, id in enumerate(ids):
-            if id not in there and (yield from _answers(id)):
+            if id not in there and (yield from _answers(id, garbled)):
                 there.append(id)
                 yield from Report(Found(id, rate, None))
             yield from Report(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
     found: list[Found] = []
-    for id in sorted(there):
+    for id in sorted({*there, *garbled}):
         identity = yield from outcome(identify(Node(id)))
-        found.append(Found(id, rate, identity if isinstance(identity, Identity) else None))
+        if isinstance(identity, WireError):
+            garbled.add(id)
+        shared = yield from _shared(id, max(polls, GLANCE) if id in garbled else polls)
+        if id in there or shared:
+            found.append(Found(id, rate, identity if isinstance(identity, Identity) else None))
     return found
 
 
-def _answers(id: int) -> Operation[bool]:
-    """Is it there? Bytes that are no answer may be noise at a wrong rate, so they do not count."""
+def _answers(id: int, garbled: set[int]) -> Operation[bool]:
+    """Is it there? Bytes that are no answer may be noise, so they do not count yet."""
     try:
         yield from ping_exchange(Node(id), scanning=True)
-    except (NoReply, WireError):
+    except NoReply:
+        return False
+    except WireError:
+        garbled.add(id)
         return False
     return True
+
+
+def _shared(id: int, polls: int) -> Operation[bool]:
+    """Do two servos seem to have this id? Says so if they do."""
+    seen = yield from outcome(_asked(id, polls))
+    if isinstance(seen, LinkLost):
+        raise seen
+    if not isinstance(seen, Suspicion) or not seen.suspected:
+        return False
+    yield from Report(seen)
+    return True
+
+
+def _asked(id: int, polls: int) -> Operation[Suspicion | None]:
+    """As `duplicates`, without its progress: that of the scan goes on."""
+    if polls:
+        return (yield from duplicates(Node(id), polls, quiet=True))
+    return None

@@ -3,7 +3,27 @@
 from __future__ import annotations
 
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
-from motorbus.families.feetech.driver import feedback, identity, motion, registers, restoring, torque
+from motorbus.families.feetech.driver import (
+    alarm,
+    blocked,
+    calibration,
+    counting,
+    drive,
+    feedback,
+    identity,
+    modes,
+    motion,
+    overload,
+    rates,
+    recovery,
+    registers,
+    renaming,
+    restoring,
+    sharing,
+    torque,
+    tuning,
+    turns,
+)
 from motorbus.families.feetech.driver.node import Node
 
 
@@ -32,7 +52,31 @@ class ServoVerbs(Node):
     disable_torque = verb(torque.disable_torque)
     move = verb(motion.move)
     stop = verb(motion.stop)
+    mode = verb(modes.mode)
+    set_mode = verb(modes.set_mode)
+    set_velocity = verb(drive.set_velocity)
+    set_duty = verb(drive.set_duty)
+    set_current = verb(drive.set_current)
+    step = verb(drive.step)
+    duplicates = verb(sharing.duplicates)
+    set_id = verb(renaming.set_id)
+    set_baud = verb(rates.set_baud)
+    recover = verb(recovery.recover)
     factory_restore = verb(restoring.factory_restore)
+    calibrate = verb(calibration.calibrate)
+    zero = verb(calibration.zero)
+    clear_turns = verb(turns.clear_turns)
+    many_turns = verb(counting.many_turns)
+    set_many_turns = verb(counting.set_many_turns)
+    torque_limit = verb(tuning.torque_limit)
+    set_torque_limit = verb(tuning.set_torque_limit)
+    gains = verb(tuning.gains)
+    set_gains = verb(tuning.set_gains)
+    protection = verb(tuning.protection)
+    set_protection = verb(tuning.set_protection)
+    recover_overload = verb(overload.recover_overload)
+    alarms = verb(alarm.alarms)
+    blockers = verb(blocked.blockers)
 
 
 class Servo(ServoVerbs, Blocking):

@@ -1,7 +1,8 @@
 """What the feedback registers say, worked out for the moment at which somebody reads them.
 
 Load is the duty of the power stage and not the torque, current is that of the supply: both follow from how fast
-the shaft turns and from what the outside takes (`Servo.torque`), so they are plausible and no more.
+the shaft turns and from what the outside takes (`Servo.torque`), so they are plausible and no more. On HLS the current
+is that of the motor's phase, which goes with the torque alone.
 """
 
 from __future__ import annotations
@@ -11,26 +12,29 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from motorbus.families.feetech.simulator import motor
-from motorbus.families.feetech.table import AMPERE, velocity_scale
+from motorbus.families.feetech.table import AMPERE, tells_current
+from motorbus.families.feetech.table.phase import many_turns_are_told
 
 if TYPE_CHECKING:
     from motorbus.families.feetech.simulator.servo import Servo
 
 
 def _position(servo: Servo, at: float) -> int:
-    return motor.reading(servo.motion.position(at), servo.zero, servo.memory["phase"], servo.model.turn)
+    model = servo.model
+    told = many_turns_are_told(servo.memory["phase"], model.table.name)
+    return motor.reading(servo.encoder(at), servo.zero, told, model.turn, servo.fold)
 
 
 def _velocity(servo: Servo, at: float) -> int:
-    return round(servo.motion.velocity(at) / velocity_scale(servo.memory["phase"]))
+    return round(servo.facing * servo.motion.velocity(at) / servo.velocity_unit)
 
 
 def _load(servo: Servo, at: float) -> int:
-    return round(1000 * servo.model.drive.duty(servo.motion.velocity(at), servo.burden))
+    return round(1000 * servo.facing * servo.duty(at))
 
 
 def _voltage(servo: Servo, at: float) -> int:
-    return round(servo.voltage * 10)
+    return servo.told_voltage
 
 
 def _temperature(servo: Servo, at: float) -> int:
@@ -46,7 +50,11 @@ def _error(servo: Servo, at: float) -> int:
 
 
 def _moving(servo: Servo, at: float) -> int:
-    return int(servo.motion.moving(at))
+    """Bit 0: it moves. On HLS bit 1 says that the goal is not reached (HLS memory table)."""
+    moving = int(servo.motion.moving(at))
+    if 1 in servo.model.table["moving"].bits and not servo.arrived(at):
+        moving |= 2
+    return moving
 
 
 def _goal(servo: Servo, at: float) -> int:
@@ -54,9 +62,9 @@ def _goal(servo: Servo, at: float) -> int:
 
 
 def _current(servo: Servo, at: float) -> int:
-    if not motor.feels_current(servo.memory["phase"]):
+    if not tells_current(servo.memory["phase"], servo.model.table.name):
         return 0
-    return round(servo.model.drive.current(servo.motion.velocity(at), servo.burden) / AMPERE)
+    return round(servo.facing * servo.current(at) / AMPERE)
 
 
 FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(

@@ -3,7 +3,7 @@
 Every byte is kept twice: the live one, which is read and obeyed, and for the EEPROM the stored one, which
 comes back after a power cycle. The lock stands between the two and not before the live one: a locked write is
 obeyed and lost (feetech-cli, measured on STS3215). There is no code for a refused write, so what may not be
-written is dropped without a word.
+written is dropped without a word. What is stored is stored cell by cell and takes its time: `flash.py`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from motorbus.core.entry import Coding, Entry, Storage, Table
+from motorbus.families.feetech.simulator.flash import Commit, Flash
+from motorbus.families.feetech.table import BAUD_CODES
 
 SIZE = 256
+_IDS = 254
+"""0 to 253; 254 means all and 255 is the head of a packet."""
 
 
 class Layout:
@@ -22,6 +26,7 @@ class Layout:
 
     def __init__(self, table: Table, defaults: Mapping[str, int]) -> None:
         self.table = table
+        self._touched: dict[tuple[int, int], tuple[Entry, ...]] = {}
         self.rows: list[Entry | None] = [None] * SIZE
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
@@ -38,27 +43,49 @@ class Layout:
         row = self.rows[address]
         return row is not None and row.storage is not Storage.RAM
 
-    def touched(self, address: int, count: int) -> list[Entry]:
+    def touched(self, address: int, count: int) -> tuple[Entry, ...]:
         """The rows of which at least one byte lies in this range, in order."""
-        found = dict.fromkeys(row.name for row in self.rows[address : address + count] if row is not None)
-        return [self.table[name] for name in found]
+        known = self._touched.get((address, count))  # hosts ask for the same ranges again and again
+        if known is None:
+            found = dict.fromkeys(row.name for row in self.rows[address : address + count] if row is not None)
+            known = self._touched[address, count] = tuple(self.table[name] for name in found)
+        return known
 
 
 class Written(NamedTuple):
-    """What a write did: the names of the rows it changed or repeated, and whether the EEPROM was written."""
+    """What a write did: the names of the rows it changed or repeated, and whether it goes to the EEPROM."""
 
     names: frozenset[str]
     stored: bool
 
 
 class Memory:
-    """256 bytes, live and stored. `wear` counts how often each EEPROM byte was written."""
+    """256 bytes, live and stored.
 
-    def __init__(self, layout: Layout) -> None:
+    `flash`        the cells of the EEPROM; without one of them storing takes no time
+    `lock_drops`   closing the lock drops what is not committed yet; else it is finished, since it was accepted
+    """
+
+    def __init__(self, layout: Layout, flash: Flash | None = None, *, lock_drops: bool = False) -> None:
         self.layout = layout
         self.live = bytearray(layout.factory)
-        self.stored = bytearray(layout.factory)
-        self.wear: Counter[int] = Counter()
+        self.flash = flash or Flash(layout.factory)
+        self.lock_drops = lock_drops
+
+    @property
+    def stored(self) -> bytearray:
+        """What the EEPROM holds by now."""
+        return self.flash.cells
+
+    @property
+    def wear(self) -> Counter[int]:
+        """How often each EEPROM byte has been written."""
+        return self.flash.wear
+
+    @property
+    def commits(self) -> list[Commit]:
+        """What will be stored if the supply lasts: moment (s), address and value, in order."""
+        return self.flash.commits
 
     def __getitem__(self, name: str) -> int:
         """The raw value of a row."""
@@ -80,46 +107,69 @@ class Memory:
     def write(self, address: int, data: bytes, *, locked: bool, strict: bool = False) -> Written:
         """Write what may be written. `strict` drops values outside the range of their row."""
         names = []
-        stored = False
+        cells: list[tuple[int, int]] = []
         for entry in self.layout.touched(address, len(data)):
             if not entry.writable or entry.storage is Storage.FACTORY:
                 continue
             if strict and not self._fits(entry, address, data):
                 continue
             names.append(entry.name)
-            stored |= self._put(entry, address, data, locked)
-        return Written(frozenset(names), stored)
+            changed = self._put(entry, address, data)
+            if entry.storage is Storage.EEPROM and not locked:
+                cells += changed
+        if cells:
+            self.flash.program(cells)
+        if self.lock_drops and "lock" in names and self["lock"]:
+            self.flash.drop()
+        return Written(frozenset(names), bool(cells))
 
     def store(self, name: str) -> None:
         """Make the live value of a row survive a power cycle."""
-        entry = self.layout.table[name]
-        for address in range(entry.address, entry.address + entry.size):
-            self.stored[address] = self.live[address]
-            self.wear[address] += 1
+        self.flash.program(self._cells(self.layout.table[name]))
 
-    def power_up(self) -> None:
-        """The EEPROM as it was stored, everything else as it is at the beginning."""
-        for address in range(SIZE):
-            keeps = self.layout.keeps(address)
-            self.live[address] = self.stored[address] if keeps else self.layout.factory[address]
+    def power_up(self, *, mend: bool = False) -> None:
+        """The supply was away: the EEPROM as it is stored, what was on its way there lost, the rest as at first.
 
-    def restore_factory(self, keep: frozenset[str]) -> None:
-        """Everything as shipped but the rows named, live and stored."""
+        `mend` gives an id or baud rate that no servo can have, as torn cells may hold, its factory value.
+        """
+        self.flash.cut()
+        self._begin(self.stored)
+        if mend:
+            for name, possible in (("id", range(_IDS)), ("baud_rate", BAUD_CODES)):
+                if self[name] not in possible:
+                    address = self.layout.table[name].address
+                    self.live[address] = self.layout.factory[address]
+
+    def restart(self) -> None:
+        """The servo starts again by itself: as `power_up`, but what was being stored is."""
+        self._begin(self.flash.intended())
+
+    def restore_factory(self, keep: frozenset[str], time: float = 0.0) -> None:
+        """Everything as shipped but the rows named; storing that takes so many seconds."""
+        cells: list[tuple[int, int]] = []
         for entry in self.layout.table.values():
             if entry.name in keep or entry.storage is Storage.FACTORY:
                 continue
             span = slice(entry.address, entry.address + entry.size)
-            self.live[span] = self.stored[span] = self.layout.factory[span]
+            self.live[span] = self.layout.factory[span]
+            if entry.storage is Storage.EEPROM and entry.writable:
+                cells += self._cells(entry)
+        self.flash.program(cells, time)
 
-    def _put(self, entry: Entry, address: int, data: bytes, locked: bool) -> bool:
-        stores = entry.storage is Storage.EEPROM and not locked
-        for place in range(entry.address, entry.address + entry.size):
-            if address <= place < address + len(data):
-                self.live[place] = data[place - address]
-                if stores:
-                    self.stored[place] = data[place - address]
-                    self.wear[place] += 1
-        return stores
+    def _begin(self, stored: bytearray) -> None:
+        for address in range(SIZE):
+            keeps = self.layout.keeps(address)
+            self.live[address] = stored[address] if keeps else self.layout.factory[address]
+
+    def _cells(self, entry: Entry) -> list[tuple[int, int]]:
+        return [(place, self.live[place]) for place in range(entry.address, entry.address + entry.size)]
+
+    def _put(self, entry: Entry, address: int, data: bytes) -> list[tuple[int, int]]:
+        """Write the part of a row that lies in these bytes; gives the cells that it has."""
+        places = range(max(entry.address, address), min(entry.address + entry.size, address + len(data)))
+        for place in places:
+            self.live[place] = data[place - address]
+        return [(place, self.live[place]) for place in places]
 
     def _fits(self, entry: Entry, address: int, data: bytes) -> bool:
         after = bytearray(self.live)

@@ -1,7 +1,8 @@
 """One simulated servo: its memory, its shaft, and what a write, an alarm or a power cut does to them.
 
 It knows nothing of packets; `bus.py` does. Each method that may change something takes the moment at which it
-happens. What was measured on a real one is said with its source; what nobody knows is a switch.
+happens. What was measured on a real one is said with its source; what nobody knows is a switch. What the registers
+ask for is worked out in `settings.py`, what an order does besides in `effects.py`, a power-up in `power.py`.
 """
 
 from __future__ import annotations
@@ -10,45 +11,42 @@ from collections.abc import Callable
 from math import inf
 
 from motorbus.core.plant import rest
-from motorbus.families.feetech.simulator import motor
+from motorbus.families.feetech.simulator import effects, motor
+from motorbus.families.feetech.simulator.body import Body
 from motorbus.families.feetech.simulator.feedback import FEEDBACK
-from motorbus.families.feetech.simulator.memory import Layout, Memory
+from motorbus.families.feetech.simulator.memory import Layout
 from motorbus.families.feetech.simulator.model import Model
-from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.table import BAUD_CODES, alarms, velocity_scale
-
-_VOLTAGE, _TEMPERATURE = 0x01, 0x04
-_CALIBRATE = 128
-_DECIDES_MOTION = frozenset(
-    {
-        "torque_enable",
-        "acceleration",
-        "goal_position",
-        "goal_time",
-        "goal_velocity",
-        "torque_limit",
-        "operating_mode",
-        "phase",
-        "min_position_limit",
-        "max_position_limit",
-        "homing_offset",
-        "unload_mask",
-        "max_voltage",
-        "min_voltage",
-        "max_temperature",
-    }
+from motorbus.families.feetech.simulator.power import power_up, stand
+from motorbus.families.feetech.simulator.protection import OVERLOAD
+from motorbus.families.feetech.simulator.settings import (
+    blind,
+    facing_of,
+    fold_of,
+    mode_now,
+    settings,
+    torque_limit,
+    velocity_steps,
 )
+from motorbus.families.feetech.simulator.switches import Switches
+from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, Mode, alarms, velocity_scale
+
+_VOLTAGE = 0x01
 
 
-class Servo:
+class Servo(Body):
     """A servo as a test pokes it.
 
+    `model`        what it is; `model.table` are its registers
     `motion`       the movement of its shaft in counts, on the bus's clock; `motion.start` says since when
     `memory`       its control table; `memory["goal_position"]` is a raw value, `memory.wear` counts EEPROM writes
     `alarm`        alarm bits that a test raises; voltage and temperature raise theirs by themselves
     `voltage`      its supply in V, and `temperature` in °C
     `torque`       what the outside takes of its stall torque, -1 to 1
     `plugged`      whether its cable is in; `lives` counts how often its supply came or went
+    `pending`      what REG WRITE left for ACTION
+    `zero`         the place of the encoder that reads 0; `facing` -1 when the encoder counts against the shaft;
+                   `fold` counts of the encoder make one of a position
+    `deaf_until`   it hears nothing before this moment
     """
 
     def __init__(
@@ -61,44 +59,47 @@ class Servo:
         renamed: Callable[[], None],
         position: int | None = None,
     ) -> None:
-        self.model = model
-        self.switches = switches
-        self.memory = Memory(layout)
-        self.torque = 0.0
-        self.plugged = True
+        super().__init__(model, layout, switches, now, model.turn // 2 if position is None else position)
         self.lives = 0
         self.pending: tuple[int, bytes] | None = None
         self.zero = 0
+        self.facing = 1
+        self.fold = 1
+        self.deaf_until = -inf
+        self.renamed = renamed
         self._alarm = 0
-        self._voltage = model.voltage
-        self._temperature = 30.0
-        self._deaf_until = -inf
-        self._now = now
-        self._renamed = renamed
-        self.motion = rest(now(), model.turn // 2 if position is None else position)
-        self.memory["id"] = id
+        self._all_codes = switches.baud_codes == "all"
+        self._steps = velocity_steps(model)
+        self._delays = "return_delay" in model.table and switches.return_delay == "heed"
+        # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
+        for name in ("id", "second_id"):
+            if name in model.table:
+                self.memory[name] = id
+        for name, raw in model.set_to.items():
+            self.memory[name] = raw
         self.memory.stored[:] = self.memory.live
-        self._power_up(now())
-        self._deaf_until = -inf
+        power_up(self, now())
+        self.deaf_until = -inf
 
     # What a test or a control socket does to it.
 
     def unplug(self) -> None:
         """Pull its cable, bus and supply in one. The shaft stays where it is; a reply on its way is lost."""
-        self.motion = rest(self._now(), self.motion.position(self._now()))
+        now = self._now()
         self.plugged = False
         self.lives += 1
+        stand(self, now)
 
     def plug(self) -> None:
         """Put its cable back: it powers up. Does nothing when it is in."""
         if not self.plugged:
             self.plugged = True
-            self._power_up(self._now())
+            power_up(self, self._now())
 
     def power_cycle(self) -> None:
         """Take its supply away and give it back: RAM and turn count are lost, the EEPROM is as it was stored."""
         if self.plugged:
-            self._power_up(self._now())
+            power_up(self, self._now())
 
     def status(self) -> dict[str, object]:
         """How it is, as plain data."""
@@ -113,51 +114,39 @@ class Servo:
             "torque_enabled": self.memory["torque_enable"] == 1,
             "moving": self.motion.moving(now),
             "locked": self.locked,
-            "alarm": list(alarms(self.error)),
+            "alarm": list(alarms(self.error, self.model.table.name)),
             "voltage": self.voltage,
             "temperature": self.temperature,
         }
 
     @property
     def alarm(self) -> int:
-        """Alarm bits raised by a test; a power cycle clears them (users report that nothing else did)."""
+        """Alarm bits that were raised by hand; they stay until they are cleared or the power is cut."""
         return self._alarm
 
     @alarm.setter
     def alarm(self, bits: int) -> None:
         self._alarm = bits
-        self._move(self._now())
+        self.move(self._now())
 
-    @property
-    def voltage(self) -> float:
-        """The supply in V; outside registers 15 to 14 it raises the voltage alarm."""
-        return self._voltage
-
-    @voltage.setter
-    def voltage(self, volts: float) -> None:
-        self._voltage = volts
-        self._move(self._now())
-
-    @property
-    def temperature(self) -> float:
-        """°C; above register 13 it raises the temperature alarm."""
-        return self._temperature
-
-    @temperature.setter
-    def temperature(self, degrees: float) -> None:
-        self._temperature = degrees
-        self._move(self._now())
+    def clear_alarm(self) -> None:
+        """Forget what was raised, as a power cut does."""
+        self._alarm = 0
+        self.protection.forget()
 
     @property
     def raw_position(self) -> int:
         """The present position in counts, as register 56 tells it."""
-        return FEEDBACK["present_position"](self, self._now())
+        now = self._now()
+        return FEEDBACK["present_position"](self, now)
 
     @raw_position.setter
     def raw_position(self, counts: int) -> None:
         """Turn the shaft by hand, at rest afterwards."""
         now = self._now()
-        self.motion = rest(now, round(self.motion.position(now)) + counts - self.raw_position)
+        turned = self.facing * self.fold * (counts - self.raw_position)
+        self.motion = rest(now, round(self.motion.position(now)) + turned)
+        self.stands(now)
 
     # What the bus asks.
 
@@ -167,14 +156,27 @@ class Servo:
         return self.memory["id"]
 
     @property
+    def second_id(self) -> int | None:
+        """The id by which it takes writes as well; None when its map has none."""
+        return self.memory["second_id"] if "second_id" in self.model.table else None
+
+    @property
     def baud_rate(self) -> int | None:
         """The rate it is set to, in bit/s; None for a code that means nothing: it hears nobody."""
-        return BAUD_CODES.get(self.memory["baud_rate"])
+        code = self.memory["baud_rate"]
+        return (
+            BAUD_CODES.get(code) if self._all_codes or code in BAUD_CODES_OF[self.model.table.name] else None
+        )
 
     @property
     def return_delay(self) -> float:
-        """Seconds between the end of a request and the beginning of the reply: register 7 in 2 µs."""
-        return self.memory["return_delay"] * 2e-6
+        """Seconds between the end of a request and the beginning of the reply: register 7 in 2 µs.
+
+        SMS: values below 50 act as 50 (FEETECH page on SMS servos). HLS has its second id there, and no delay.
+        """
+        if self._delays:
+            return max(self.memory["return_delay"] * 2e-6, self.model.personality.least_delay)
+        return self.model.personality.least_delay
 
     @property
     def locked(self) -> bool:
@@ -182,30 +184,22 @@ class Servo:
         return self.memory["lock"] != 0
 
     @property
+    def told_voltage(self) -> int:
+        """What register 62 says of its supply, in 0.1 V."""
+        return 0 if self.switches.wrong_bridge == "blind" and blind(self) else round(self.voltage * 10)
+
+    @property
     def error(self) -> int:
         """The error byte of its status packets, which register 65 repeats: alarms and nothing else."""
-        memory, bits = self.memory, self._alarm
-        if not memory["min_voltage"] <= round(self.voltage * 10) <= memory["max_voltage"]:
+        memory, bits = self.memory, self._alarm | self.protection.error
+        if not memory["min_voltage"] <= self.told_voltage <= memory["max_voltage"]:
             bits |= _VOLTAGE
-        if self.temperature > memory["max_temperature"]:
-            bits |= _TEMPERATURE
         return bits
-
-    @property
-    def strong(self) -> bool:
-        """Whether the motor may push: supply, torque on, no alarm that unloads it, a torque limit that moves it."""
-        memory = self.memory
-        wanted = memory["torque_enable"] == 1 and memory["torque_limit"] >= motor.FEEBLE
-        return self.plugged and wanted and not self.error & memory["unload_mask"]
-
-    @property
-    def burden(self) -> float:
-        """What the outside takes of the stall torque just now: nothing of a limp servo."""
-        return self.torque if self.strong else 0.0
 
     def hears(self, rate: int | None, at: float) -> bool:
         """Whether it is there, awake and set to this rate (None: whichever it is)."""
-        return self.plugged and at >= self._deaf_until and (rate is None or rate == self.baud_rate)
+        awake = self.plugged and at >= self.deaf_until and self.fed(at)
+        return awake and (rate is None or rate == self.baud_rate)
 
     def read(self, address: int, count: int, at: float) -> bytes:
         """The bytes a READ gets; readings are worked out for this moment."""
@@ -221,8 +215,10 @@ class Servo:
             address, data, locked=self.locked, strict=self.switches.out_of_range == "drop"
         )
         if done.names:
-            self._react(done.names, torque, at)
-        return self.switches.store_time if done.stored else 0.0
+            effects.react(self, done.names, torque, at)
+        if done.stored:
+            self.stores()
+        return self.storing(at)
 
     def reg_write(self, address: int, data: bytes) -> None:
         """Keep a write for `action`. A power cycle forgets it."""
@@ -236,91 +232,87 @@ class Servo:
         (address, data), self.pending = self.pending, None
         return self.write(address, data, at)
 
-    def calibrate(self, counts: int, at: float) -> None:
-        """Make the present pose read `counts` by way of the homing offset.
+    # What it does.
 
-        The old offset is taken out first: the encoder counts, not the reading. Only ±2047 can be said, so the one
-        pose that would need 2048 reads one count beside (overflows on a real one: lerobot#3370). It then holds.
+    @property
+    def mode(self) -> Mode | None:
+        """What it heeds; None when the number in its mode register is not explained by anybody."""
+        return mode_now(self)
+
+    @property
+    def velocity_unit(self) -> int:
+        """Counts/s for one unit of its velocity registers."""
+        return self._steps * velocity_scale(self.memory["phase"], self.model.table.name)
+
+    @property
+    def available(self) -> float:
+        """The share of the stall torque that the motor may give just now, 0 to 1; 0: it is limp.
+
+        Supply, torque on, no alarm that unloads it, torque limit and current cap: this is the one place for them.
         """
-        turn = self.model.turn
-        encoder = round(self.motion.position(at)) % turn
-        offset = (encoder - counts + turn // 2) % turn - turn // 2
-        self.memory["homing_offset"] = max(1 - turn // 2, offset)
-        if not self.locked or self.switches.calibration_store == "always":
-            self.memory.store("homing_offset")
-        self._count_anew(at)
-        self.memory["goal_position"] = FEEDBACK["present_position"](self, at)
-        self._move(at)
+        memory, unloading = self.memory, self.error
+        if self.tripped and not self._alarm & OVERLOAD:
+            unloading &= ~OVERLOAD  # it leaves a part of the torque
+        if not self.plugged or memory["torque_enable"] != 1 or unloading & memory["unload_mask"]:
+            return 0.0
+        return min(torque_limit(self), self.protection.left)
 
-    def restore_factory(self, at: float) -> None:
-        """0x06: as shipped, offset 0, the id kept (servolab, STS3215 firmware 3.10); then it starts again."""
-        self.memory.restore_factory(frozenset({"id"} if self.switches.restore_id == "keep" else ()))
-        self._power_up(at)
-        self._deaf_until = at + self.switches.restore_time
+    @property
+    def strong(self) -> bool:
+        """Whether the motor pushes at all."""
+        return self.available >= motor.FEEBLE
 
-    def enter_bootloader(self, at: float) -> None:
-        """0x08: deaf, and back as after power-up (every reset of that controller enters the bootloader).
+    @property
+    def burden(self) -> float:
+        """What the outside takes of the stall torque just now: nothing of a limp servo."""
+        available = self.available if self.torque else 0.0
+        return max(-available, min(available, self.torque)) if available >= motor.FEEBLE else 0.0
 
-        What the motor does meanwhile is not known; here it is limp from the beginning.
-        """
-        self._power_up(at)
-        self._deaf_until = at + self.switches.bootloader_time
+    def encoder(self, at: float) -> float:
+        """Where the encoder is, in counts without end."""
+        return self.facing * self.motion.position(at)
 
-    def _power_up(self, at: float) -> None:
-        self.lives += 1
-        self.pending = None
-        self._alarm = 0
-        memory, switches = self.memory, self.switches
-        memory.power_up()
-        memory["torque_limit"] = memory["max_torque"]
-        memory["lock"] = int(switches.lock_at_power_up)
-        memory["torque_enable"] = int(switches.torque_at_power_up)
-        self.motion = rest(at, self.motion.position(at) % self.model.turn)  # the turn count is lost
-        self._count_anew(at)
-        if switches.goal_at_power_up == "present" or switches.torque_at_power_up:
-            memory["goal_position"] = FEEDBACK["present_position"](self, at)
-        self._deaf_until = at + switches.startup_time if switches.startup_time else -inf
-        self._renamed()
-        self._move(at)
+    def arrived(self, at: float) -> bool:
+        """Whether it is where its goal is, within the dead band of its position."""
+        band = max(self.memory["dead_band_cw"], self.memory["dead_band_ccw"])
+        return abs(FEEDBACK["present_position"](self, at) - self.memory["goal_position"]) <= band
 
-    def _react(self, names: frozenset[str], torque: int, at: float) -> None:
-        memory = self.memory
-        if "id" in names:
-            self._renamed()
-        if "torque_enable" in names and memory["torque_enable"] == _CALIBRATE:
-            memory["torque_enable"] = torque  # an order and no state; what 40 reads afterwards is not known
-            self.calibrate(self.model.turn // 2, at)
-            return
-        if names & {"operating_mode", "homing_offset"}:
-            self._count_anew(at)
-        ordered = "goal_position" in names and memory["operating_mode"] in (motor.POSITION, motor.STEP)
-        if ordered and self.switches.goal_enables_torque:
-            memory["torque_enable"] = 1
-        if ordered and memory["operating_mode"] == motor.STEP:
-            self.motion = motor.step(self._settings(), self.motion, at, self.model.drive, self.switches)
-        elif names & _DECIDES_MOTION:
-            self._move(at)
+    def move(self, at: float) -> None:
+        """Think again about where to go."""
+        self._go(motor.plan, at)
 
-    def _move(self, at: float) -> None:
-        self.motion = motor.plan(self._settings(), self.motion, at, self.model.drive, self.switches)
+    def step(self, at: float) -> None:
+        """Take the step that a write of the goal orders in step mode."""
+        self._go(motor.step, at)
 
-    def _count_anew(self, at: float) -> None:
-        offset = self.memory["homing_offset"] if self.memory["operating_mode"] == motor.POSITION else 0
-        self.zero = motor.zero_for(self.motion.position(at), offset, self.model.turn)
+    def _go(self, planned: motor.Planner, at: float) -> None:
+        self.protection.weigh(at)
+        wanted, motion = settings(self, at), self.motion
+        if self.facing > 0:
+            self.bear(lambda drive: planned(wanted, motion, at, drive, self.switches), wanted, at)
+        else:
+            before, turned = (
+                motor.mirrored(motion),
+                wanted._replace(duty=-wanted.duty, current=-wanted.current),
+            )
+            self.bear(
+                lambda drive: motor.mirrored(planned(wanted, before, at, drive, self.switches)), turned, at
+            )
 
-    def _settings(self) -> motor.Settings:
-        memory = self.memory
-        return motor.Settings(
-            strong=self.strong,
-            mode=memory["operating_mode"],
-            goal=memory["goal_position"],
-            duty=memory["goal_time"],
-            goal_velocity=memory["goal_velocity"],
-            velocity_unit=velocity_scale(memory["phase"]),
-            acceleration=memory["acceleration"],
-            low=memory["min_position_limit"],
-            high=memory["max_position_limit"],
-            phase=memory["phase"],
-            zero=self.zero,
-            turn=self.model.turn,
-        )
+    def face(self, at: float) -> None:
+        """Count in the direction and the steps that the registers say; when they change, the turn count begins anew."""
+        if (self.facing, self.fold) != (facing_of(self), fold_of(self)):
+            self.count_anew(at)
+
+    def forget_turns(self, at: float) -> None:
+        """Stand still, within the first turn."""
+        self.facing, self.fold = facing_of(self), fold_of(self)
+        self.motion = rest(at, self.facing * (self.encoder(at) % self.model.turn))
+        self.count_anew(at)
+
+    def count_anew(self, at: float) -> None:
+        """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
+        self.facing, self.fold = facing_of(self), fold_of(self)
+        applied = "homing_offset" in self.model.table and self.mode is Mode.POSITION
+        offset = self.memory["homing_offset"] if applied else 0
+        self.zero = motor.zero_for(self.encoder(at), offset * self.fold, self.model.turn)

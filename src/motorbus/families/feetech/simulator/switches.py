@@ -2,7 +2,8 @@
 
 A simulator that guesses in silence teaches its users the guess. So where sources conflict or say nothing, the
 behaviour is chosen here, by name, and a test of a host can run with every choice. Each switch may also be given
-as an option of a bus string: `feetech:sim,ids=1-3,broadcast_ping=in_turn`.
+as an option of a bus string: `feetech:sim,ids=1-3,broadcast_ping=in_turn`. Those of the bus, of the movement and of
+faults have files of their own; here are those of memory and power.
 """
 
 from __future__ import annotations
@@ -10,33 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from motorbus.core.switches import switch
+from motorbus.families.feetech.simulator.switches_faults import FaultSwitches
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Switches:
+@dataclass(frozen=True, kw_only=True)
+class Switches(FaultSwitches):
     """How the simulated servos behave where real ones differ or nobody knows. Times are in seconds."""
 
-    broadcast_ping: str = switch(
-        "collide",
-        "several servos answer a broadcast PING at once and garble each other, or one after the other",
-        "collide",
-        "in_turn",
-        source="manual V1.01, 1.1 forbids it with several servos; lerobot and rustypot use it on STS",
-    )
-    reg_write_again: str = switch(
-        "replace",
-        "a second REG WRITE before ACTION replaces the first or is dropped",
-        "replace",
-        "refuse",
-        source="not documented",
-    )
-    empty_write: str = switch(
-        "ack",
-        "a WRITE of an address without a datum is acknowledged or ignored",
-        "ack",
-        "silent",
-        source="manual V1.01, 1.3 table (one parameter) against 1.3.3 (at least two)",
-    )
     out_of_range: str = switch(
         "store",
         "a value outside its register's range is stored or dropped; the write is acknowledged either way",
@@ -44,39 +25,12 @@ class Switches:
         "drop",
         source="not documented; no error code for it exists",
     )
-    beyond_limits: str = switch(
-        "clamp",
-        "a goal beyond the position limits goes as far as the limit, or nowhere",
-        "clamp",
-        "stay",
-        source="not documented",
-    )
-    sync_read_missing: str = switch(
-        "wait",
-        "when a listed servo is missing the next ones leave its time free, close up, or stay silent",
-        "wait",
-        "close_up",
-        "silent",
-        source="open question: order and timing of SYNC READ replies when one is missing",
-    )
-    id_ack: str = switch(
-        "new",
-        "a WRITE of the id is acknowledged from the new id or from the old one",
-        "new",
-        "old",
-        source="fanhao375/microduck-replica#28 (from the new id)",
-    )
-    baud_ack: str = switch(
-        "old",
-        "a WRITE of the baud rate is acknowledged at the old rate, or at the new one and so not heard",
-        "old",
-        "new",
-        source="not documented",
-    )
-    factory_restore: bool = switch(
-        True,
-        "instruction 0x06 restores the factory values; without it the servo stays silent",
-        source="servolab, measured on an STS3215 with firmware 3.10; manual V1.01: certain models only",
+    wrong_bridge: str = switch(
+        "harmless",
+        "a phase register copied from a servo with another board changes nothing more, or makes it read 0 V for ever",
+        "harmless",
+        "blind",
+        source="iotdesignshop/Feetech-tuna#2: 0.0 V and a lasting voltage alarm; that this is the cause is a guess",
     )
     restore_id: str = switch(
         "keep",
@@ -87,15 +41,8 @@ class Switches:
     )
     restore_time: float = switch(
         1.0,
-        "how long it is deaf after a factory restore",
+        "how long it is deaf after a factory restore (s)",
         source="servolab: about 1 s until it answers again",
-    )
-    calibrate: str = switch(
-        "accept",
-        "instruction 0x0B sets the present position, or is ignored",
-        "accept",
-        "ignore",
-        source="in the dispatcher of STS3215 firmware 3.10 (kuterd/feetech-fw-util); documented for HLS",
     )
     calibration_store: str = switch(
         "lock",
@@ -103,11 +50,6 @@ class Switches:
         "lock",
         "always",
         source="not documented; both ways of calibrating write register 31",
-    )
-    goal_enables_torque: bool = switch(
-        True,
-        "writing the goal position switches torque on",
-        source="feetech-cli, measured on STS3215: 40 reads 1 after a write of 42",
     )
     goal_at_power_up: str = switch(
         "zero",
@@ -126,43 +68,11 @@ class Switches:
         "the EEPROM lock is closed after power-up",
         source="memory table V3.6: open; FD 1.9.8.5 and current parts: closed",
     )
-    step_from: str = switch(
-        "goal",
-        "in step mode a write counts from the last goal while it is on its way, or from where it is",
-        "goal",
-        "present",
-        source="not documented",
-    )
-    bootloader: str = switch(
-        "silent",
-        "instruction 0x08 is not answered, or acknowledged before it goes",
-        "silent",
-        "ack",
-        source="not documented",
-    )
-    bootloader_time: float = switch(
-        0.8, "how long it is deaf after instruction 0x08", source="kuterd/feetech-fw-util: about 800 ms"
-    )
     store_time: float = switch(
         0.02,
-        "how much later a write is acknowledged that goes to the EEPROM",
+        "how much later a write is acknowledged that goes to the EEPROM (s)",
         source="public recovery tool for STS3215, measured: can exceed 21 ms",
     )
     startup_time: float = switch(
-        0.0, "how long it is deaf after power-up", source="st3215-bus: the first ping may be missed"
-    )
-    frame_gap: float = switch(
-        0.005,
-        "a pause after which half a frame is forgotten; 0: never, and one wrong length byte swallows what follows",
-        source="not documented; without one a wrong length byte makes it deaf for up to 258 bytes",
-    )
-    acceleration_unit: float = switch(
-        100.0,
-        "counts/s² for each unit of the acceleration register",
-        source="memory table V3.6: 100; servolab, firmware 3.10: 104 to 105",
-    )
-    full_acceleration: float = switch(
-        25_400.0,
-        "counts/s² when the acceleration register is 0, which means maximum",
-        source="not documented; what the greatest register value gives",
+        0.0, "how long it is deaf after power-up (s)", source="st3215-bus: the first ping may be missed"
     )

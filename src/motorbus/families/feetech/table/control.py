@@ -9,7 +9,7 @@ V3.6; HLS memory table; lerobot and rustypot for who lacks SYNC READ.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
@@ -51,6 +51,7 @@ class Control:
     `many_turns`  whether both limits 0 mean many turns
     `sync_read`   whether SYNC READ is answered, and `broadcast_ping` a broadcast PING
     `clear_turns` whether any servo of this map is known to obey 0x0A
+    `goal_switches_on`  whether a write of the goal position is known to switch torque on
     """
 
     modes: Mapping[int, Mode] = field(default_factory=dict)
@@ -65,6 +66,12 @@ class Control:
     sync_read: bool = True
     broadcast_ping: bool = True
     clear_turns: bool = False
+    goal_switches_on: bool = False
+
+    @property
+    def has(self) -> tuple[Mode, ...]:
+        """The modes that servos of this map have."""
+        return tuple(self.modes.values()) or (Mode.POSITION, Mode.PWM)
 
     def code(self, mode: Mode) -> int | None:
         """The value of `operating_mode` for this mode, or None where the map has no such value."""
@@ -72,7 +79,7 @@ class Control:
 
 
 _FOUR: Final = MappingProxyType({0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM, 3: Mode.STEP})
-_STS: Final = Control(
+_SMBL: Final = Control(
     modes=_FOUR,
     duty="goal_time",
     limit="torque_limit",
@@ -82,12 +89,15 @@ _STS: Final = Control(
     many_turns=True,
     clear_turns=True,  # brushless ones of this map obey it, an STS3215 with firmware 3.10 is silent (servolab)
 )
+_STS: Final = replace(
+    _SMBL, goal_switches_on=True
+)  # feetech-cli, measured on STS3215; of other maps nobody has said
 _SCS: Final = Control(duty="goal_time", time="goal_time", turn=1024, sync_read=False, broadcast_ping=False)
 
 CONTROL: Final[Mapping[str, Control]] = MappingProxyType(
     {
         "sts": _STS,
-        "smbl": _STS,
+        "smbl": _SMBL,
         "smcl": Control(
             modes=MappingProxyType({0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM}),
             duty="goal_time",

@@ -46,6 +46,7 @@ PHASE_BITS: Final[Mapping[str, Mapping[int, str]]] = MappingProxyType(
 
 _UNIT: Final = 2
 _ZERO: Final = 3
+_TURNS: Final = 4
 _NO_CURRENT: Final = 5
 
 
@@ -60,6 +61,16 @@ def velocity_scale(phase: int, register_map: str = "sts") -> int:
 def zero_is_maximum(phase: int, register_map: str = "sts") -> bool:
     """Whether a goal velocity of 0 means "as fast as it can" (bit 3); else, and always on HLS, it means standstill."""
     return _says(_STS[_ZERO], _ZERO, register_map) and bool(phase >> _ZERO & 1)
+
+
+def many_turns_are_told(phase: int, register_map: str = "sts") -> bool:
+    """Whether the present position is counted over many turns (bit 4); else it begins anew with every turn."""
+    return _says(_STS[_TURNS], _TURNS, register_map) and bool(phase >> _TURNS & 1)
+
+
+def with_many_turns_told(phase: int, told: bool) -> int:
+    """This phase byte of a servo with that one bit set or cleared (bit 4); all others stay as they are."""
+    return phase | 1 << _TURNS if told else phase & ~(1 << _TURNS)
 
 
 def tells_current(phase: int, register_map: str = "sts") -> bool:

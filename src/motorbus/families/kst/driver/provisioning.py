@@ -109,6 +109,16 @@ def provision(
     return (yield from Alone(afterwards(_verified(job, place), lambda: iter(Tune(rate)))))
 
 
+def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+    """Give this servo the id `new`; as `provision`, which see. It is in force after the power cycle this waits for."""
+    return (yield from provision(node, new_id=new, patience=patience))
+
+
+def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+    """Let this servo speak at `rate` bit/s; as `provision`, which see. The bus keeps its own rate."""
+    return (yield from provision(node, new_rate=rate, patience=patience))
+
+
 # --- find out where things stand, and write what is missing -------------------------------------------------
 
 
@@ -172,7 +182,7 @@ def _alone_here(job: Job, where: Place) -> Operation[None]:
     """A servo that comes back at another rate breaks the frames of those that stay at this one."""
     there: set[int] = set()
     for extended in sorted(job.old.dialect.formats):
-        there |= {reply.lane for reply in (yield from called(extended)).replies}
+        there |= {reply.lane for reply in (yield from called(extended, Rank.POLL)).replies}
     others = ", ".join(map(hexadecimal, sorted(there - {job.old.node, job.new.node})))
     if others:
         raise RequestError(

@@ -230,14 +230,14 @@ def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> Operation[list
     return there
 
 
-def called(extended: bool) -> Exchange[Answer]:
+def called(extended: bool, rank: Rank = Rank.CONFIGURATION) -> Exchange[Answer]:
     """Read the node id of everyone at once; the replies come one after the other, by arbitration."""
     return Exchange(
         wire.encode_upload(wire.EVERYONE, NODE_ID, extended=extended),
         ANY,
         _about_ids,
         lane=EVERY_LANE,
-        rank=Rank.CONFIGURATION,
+        rank=rank,
     )
 
 

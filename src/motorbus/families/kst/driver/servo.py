@@ -45,6 +45,8 @@ class ServoVerbs(Node):
     set_bit_rate = verb(identity.set_bit_rate)
     save = verb(keeping.save)
     provision = verb(provisioning.provision)
+    set_id = verb(provisioning.set_id)
+    set_baud = verb(provisioning.set_baud)
     start_reports = verb(configuration.start_reports)
     stop_reports = verb(configuration.stop_reports)
     set_mid_point = verb(configuration.set_mid_point)

@@ -1,0 +1,107 @@
+"""What common commands do with several FEETECH servos at once: begin in one instant, loop, ask who is there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from motorbus.core.operation import ANY, Answer, Exchange, Rank, Together
+from motorbus.families.feetech import driver, wire
+from motorbus.families.feetech.driver.arrival import arrive
+from motorbus.families.feetech.driver.bound import ask_bound
+from motorbus.families.feetech.driver.group import sync_writes
+from motorbus.families.feetech.driver.motion import ON, move_block, way
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from motorbus.bus.pump import Bus
+    from motorbus.cli.dry import DryBus
+    from motorbus.core.operation import Operation
+
+
+class Train:
+    """What a control loop of several servos does each cycle: all goals in one packet, all positions in one train.
+
+    Makes nothing move. Raises NoReply when a servo that must be asked first is silent.
+    """
+
+    def __init__(self, bus: Bus, nodes: Sequence[int]) -> None:
+        self.servos = [driver.Servo(bus, node) for node in nodes]
+        for error in bus.run(driver.prepare_all(self.servos, rate=bus.rate)).values():
+            raise error
+        self._bus = bus
+
+    @property
+    def positions(self) -> Operation[driver.Positions]:
+        """What reads all positions, once; of servos that know no SYNC READ one after the other."""
+        return driver.read_positions(self.servos, rate=self._bus.rate)
+
+    def goals(self, positions: Sequence[float]) -> Exchange[None]:
+        """The exchange that sends these goals, in rad, one for each servo."""
+        return driver.sync_write_positions(self.servos, positions)
+
+    def air_time(self, positions: Sequence[float]) -> float:
+        """Seconds on the wire for one cycle, without any pause: the limit that no program can beat."""
+        family, rate = self._bus.family, self._bus.rate
+        reads = driver.position_reads(self.servos, rate=rate)
+        return sum(family.air_time(one, rate) for one in (self.goals(positions), *reads))
+
+
+def move_together(
+    bus: Bus | DryBus,
+    goals: Mapping[int, float],
+    *,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    wait: bool = True,
+) -> None:
+    """All goals (rad by id) in one packet, so that all begin in the same instant; errors as `Servo.move` raises.
+
+    SCS servos get a packet of their own, for they have no acceleration to be told.
+    """
+    servos = [driver.Servo(bus, node) for node in goals]
+    bus.run(_move_together(servos, list(goals.values()), velocity, acceleration, wait))
+
+
+def _move_together(
+    servos: Sequence[driver.Servo],
+    goals: Sequence[float],
+    velocity: float | None,
+    acceleration: float | None,
+    wait: bool,
+) -> Operation[None]:
+    for error in (yield from driver.prepare_all(servos)).values():
+        raise error
+    blocks = []
+    for servo, goal in zip(servos, goals, strict=True):
+        assert servo.table is not None
+        yield from ask_bound(servo, servo.table)
+        blocks.append(move_block(servo, servo.table, goal, velocity, acceleration))
+    for exchange in sync_writes([servo.node for servo in servos], blocks):
+        yield from exchange
+    yield from _switched_on(servos)
+    if wait:
+        arrivals = []
+        for servo, goal in zip(servos, goals, strict=True):
+            assert servo.table is not None
+            order = way(servo, servo.table, goal, velocity, acceleration)
+            arrivals.append(arrive(servo, servo.table, order))
+        yield from Together(arrivals)
+
+
+def _switched_on(servos: Sequence[driver.Servo]) -> Operation[None]:
+    """Torque on for those who do not switch it on by themselves when they get a goal."""
+    off = [servo.node for servo in servos if not servo.control.goal_switches_on]
+    if off:
+        yield from next(sync_writes(off, [ON] * len(off)))
+
+
+def ping_everyone(bus: Bus) -> list[int]:
+    """Who answers one broadcast PING. A hint only: the replies of several servos may collide."""
+
+    request = wire.encode_instruction(wire.BROADCAST, wire.Instruction.PING, broadcast=True)
+
+    def read(answer: Answer) -> list[int]:
+        return sorted({reply.data[2] for reply in answer.replies})
+
+    return bus.run(Exchange(request, ANY, read, rank=Rank.POLL))

@@ -1,0 +1,142 @@
+"""`motorbus recover`: end a change of id or rate that was cut off; without a bus, say where there is one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli import dry
+from motorbus.cli.consent import consent_to
+from motorbus.cli.exits import Exit, Unforeseeable
+from motorbus.cli.identity import carried_out
+from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.target import face, offers, opened, takes, target
+from motorbus.core.operation import OUTCOME, Journal
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+    from motorbus.cli.output import Output
+    from motorbus.journal import Change
+
+app = App(
+    name="recover",
+    usage="Usage: motorbus recover [BUS] [OPTIONS]",
+    help_epilogue="""`set-id` and `set-baud` write down what they are about to do. When the program
+is killed or the power goes in the middle, this finds the device, finishes the
+change or takes it back, locks the device, and says which. It may be said again
+at any time. A device that answers under no id any more hears broadcasts at the
+most: --alone allows them, when it is the only one on its bus. --forget gives
+the change up without touching the device, as when it is gone.
+
+Examples:
+
+    motorbus recover
+    motorbus recover feetech:/dev/ttyACM0 --yes
+    motorbus recover feetech:/dev/ttyACM0 --alone --yes
+    motorbus recover feetech:/dev/ttyACM0 --forget --yes""",
+)
+
+SCHEMA = "motorbus.recover/1"
+
+
+@app.default
+def recover(
+    bus: Annotated[str, Parameter(name="BUS")] = "",
+    /,
+    *,
+    alone: Flag = False,
+    forget: Flag = False,
+    yes: Flag = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
+    """Finish or take back a change of id or rate that was cut off.
+
+    Parameters
+    ----------
+    bus
+        FAMILY:PORT, as feetech:/dev/ttyACM0; every unfinished change is listed when left out.
+    alone
+        The device is the only one on this bus, so it may be called by broadcast.
+    forget
+        Give the change up: nothing is sent, and the bus may be changed again.
+    yes
+        Do not ask before memory of the device is written, or the change is forgotten.
+    options
+        Any option of the bus string, as a flag.
+    """
+    from motorbus import session
+
+    if not bus:
+        return _listed(output, more=bool(alone or forget or dry_run or options))
+    family = target(bus).family
+    with opened(target(bus).bus, options, output) as opening:
+        change = session.unfinished(opening)
+        if change is None:
+            output.document(SCHEMA, {"bus": bus, "outcome": None})
+            output.text(f"nothing is unfinished on {bus}")
+            return Exit.OK
+        offers(family, "recover")
+        extra = {"alone": True} if alone else {}
+        takes(face(opening, change.node), "recover", extra)
+        if dry_run:
+            _rehearsed(opening, change, output, **extra)
+            return Exit.OK
+        what = _called(change)
+        consent_to(f"forget {what}" if forget else f"finish {what}, or take it back", output, yes=yes)
+        outcome = _forgotten(opening, change) if forget else _ended(opening, change, output, **extra)
+    told = {"new": "finished", "old": "taken back"}.get(outcome, "forgotten")
+    output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome})
+    output.text(f"{told}: {_called(change)}")
+    return Exit.OK
+
+
+def _listed(output: Output, *, more: bool) -> Exit:
+    from motorbus import journal
+
+    if more:
+        raise RequestError("which bus?", expected="BUS, as feetech:/dev/ttyACM0")
+    found = journal.everywhere()
+    output.document("motorbus.recover.list/1", {"changes": [_facts(one) for one in found]})
+    rows = [(one.bus, _called(one), one.begun, f"motorbus recover {one.bus}") for one in found]
+    if rows:
+        output.table("", ["bus", "unfinished", "begun", "to end it"], rows)
+    else:
+        output.text("nothing is unfinished")
+    return Exit.OK
+
+
+def _facts(change: Change) -> dict[str, object]:
+    known: dict[str, object] = {
+        name: change.facts[name] for name in ("new", "rate", "new_rate") if name in change.facts
+    }
+    return {"bus": change.bus, "change": change.verb, "id": change.node, **known, "begun": change.begun}
+
+
+def _called(change: Change) -> str:
+    facts = change.facts
+    to = f"{facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
+    return f"the change of #{change.node} to {to}"
+
+
+def _ended(bus: Bus, change: Change, output: Output, **extra: object) -> str:
+    outcome: str = carried_out(bus, change.node, "recover", change.verb, change.facts, output=output, **extra)
+    return outcome
+
+
+def _forgotten(bus: Bus, change: Change) -> str:
+    assert bus.journal is not None
+    bus.journal(Journal(change.verb, OUTCOME, {"outcome": "forgotten"}))
+    return "forgotten"
+
+
+def _rehearsed(bus: Bus, change: Change, output: Output, **extra: object) -> None:
+    rehearsal = dry.DryBus(bus)
+    try:
+        face(rehearsal, change.node).recover(change.verb, change.facts, **extra)
+    except Unforeseeable as error:
+        output.note(f"note: {error.summary}; what is shown is as far as it can be foreseen")
+    dry.show(rehearsal, output)

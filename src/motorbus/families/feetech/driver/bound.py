@@ -1,0 +1,80 @@
+"""The bound of the current that HLS servos want with every order, where other series take a time.
+
+In position and velocity mode the goal torque is the greatest current, and with 0 a servo acknowledges every order and
+never moves. So no order from here carries a 0: it carries what the servo has been given, and where that is 0 what the
+servo would set itself at power-up, its protection current. Source: FEETECH SDK, hls.py; HLS memory table.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from motorbus.core.entry import Entry, Table
+from motorbus.core.operation import Operation, Report
+from motorbus.errors import RequestError
+from motorbus.families.feetech.driver.exchanges import read_block
+from motorbus.families.feetech.driver.node import Node
+
+
+class Powerless(NamedTuple):
+    """An event for `Report`: this servo had a bound of 0 A, so that it could not move; it gets `current` (A) now."""
+
+    node: int
+    current: float
+
+    def __str__(self) -> str:
+        return (
+            f"node {self.node} had a goal torque of 0, with which it acknowledges every order and never moves; it gets "
+            f"{self.current:.4g} A"
+        )
+
+
+def ask_bound(node: Node, table: Table, current: float | None = None) -> Operation[None]:
+    """Read the present bound unless it is known, or is about to be set; nothing where the map has none.
+
+    Reports `Powerless` when it is 0. Raises RequestError when its protection current is 0 as well.
+    """
+    if not node.control.current or node.bound is not None or current is not None:
+        return
+    row = table[node.control.current]
+    node.bound = yield from read_block(node, row.address, row.size, row.decode)
+    if not node.bound:
+        raw = raw_bound(node, row, None)
+        yield from Report(Powerless(node.node, float(row.to_value(raw))))
+
+
+def raw_bound(node: Node, row: Entry, current: float | None) -> int:
+    """The raw bound for an order: `current` (A), else what is set, else the protection current.
+
+    Raises RequestError when that is 0, or is not known: an order may not make a servo powerless, and does not guess.
+    """
+    if current is not None:
+        raw = node.raw(row, current)
+        if 0 < raw <= row.high:
+            return raw
+        raise RequestError(
+            f"node {node.node}: {current} A is no bound of its current",
+            expected=f"{row.scale:.4g} to {row.to_value(row.high):.4g} A",
+            advice="leave it out to keep what is set; nothing was sent",
+            node=node.node,
+        )
+    protection = node.settings.protection_current if node.settings else 0
+    if raw := abs(node.bound or 0) or protection:
+        return raw
+    raise RequestError(
+        f"node {node.node} has a goal torque of 0 and a protection current of 0: it would never move",
+        advice="give current= in A, or write(protection_current=…); nothing was sent",
+        node=node.node,
+    )
+
+
+def refuse_current(node: Node, current: float | None) -> None:
+    """Raise RequestError for a bound of the current where no register of the map holds one."""
+    if current is None or node.control.current:
+        return
+    raise RequestError(
+        f"node {node.node} has no register that bounds its current",
+        expected="an HLS servo",
+        advice="leave current out; its torque limit bounds its torque; nothing was sent",
+        node=node.node,
+    )

@@ -1,0 +1,60 @@
+"""A change of id or baud rate from its first record to its last, with nobody else on the bus.
+
+Written, proved at the new place and locked there (`placing.py`); when anything comes in between, an error or Ctrl-C,
+the servo is looked for and brought to one of both places at once (`recovery.py`). Only what kills this process, or
+parts it from the servo, leaves the journal open.
+"""
+
+from __future__ import annotations
+
+from motorbus.core.operation import INTENT, Operation, Tune, afterwards, outcome
+from motorbus.errors import MotorbusError, VerificationFailed
+from motorbus.families.feetech.driver.jobs import Course, Job
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.placing import called, locked, look, rewritten
+from motorbus.families.feetech.driver.recovery import recovered
+
+
+def changed(job: Job, node: Node, course: Course) -> Operation[None]:
+    """Carry out the job on this servo, whose settings are known, and close its journal; the rate is the bus's own in
+    the end. On failure or interruption it is brought to one of both places, locked, as far as can be.
+
+    Raises what has failed, with a note of what became of it, unless it came to its new place all the same.
+    """
+    ends: list[str] = []
+    try:
+        yield from afterwards(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
+    except MotorbusError as error:
+        if ends[-1:] != ["new"]:
+            if ends:
+                error.add_note(ends[-1])
+            raise
+
+
+def _attempt(job: Job, node: Node, course: Course, ends: list[str]) -> Operation[None]:
+    yield from course.reach(INTENT)
+    there = yield from rewritten(job, node, job.new, course)
+    yield from locked(job, there)
+    if job.old.rate != job.new.rate:
+        yield from Tune(job.old.rate)
+    if (yield from look(job.old.id)) != b"":
+        raise VerificationFailed(
+            f"a servo answers as {job.old.id} after node {job.old.id} became {called(job, job.new)}",
+            expected="silence",
+            cause="there were two servos with this id, and one of them has not heard the order",
+            advice="take one of them off the bus, then recover()",
+            node=job.old.id,
+        )
+    yield from course.end("new")
+    ends.append("new")
+
+
+def _settled(job: Job, course: Course, ends: list[str]) -> Operation[None]:
+    """Whatever has happened: bring it to one of both places, and set the rate of the bus back."""
+    if course.reached and not ends:
+        found = yield from outcome(recovered(job, course))
+        if isinstance(found, MotorbusError):
+            ends.append(f"the change is unfinished, recover() ends it: {found.summary}")
+        else:
+            ends.append("new" if found == "new" else f"the servo is {called(job, job.old)}, and locked")
+    yield from Tune(job.old.rate)

@@ -1,0 +1,69 @@
+"""Out of an overload: torque off, a pause, the goal to where it stands, torque on; and the truth about the alarm.
+
+A servo that was overloaded for too long falls to its protective torque and stays there. What clears that is not
+documented: some get well when their torque is switched off and on, others only by a power cycle, and which is which
+shows only afterwards. An alarm never keeps the torque from being switched off.
+Source: STS3215 memory table V3.6 (registers 34 to 36); open-edge-platform/physical-ai-studio#955 (only a power cycle
+helped); humancomputerlab/lelamp_runtime#9 (libraries that take an alarm for a failure cannot switch off).
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Table
+from motorbus.core.family import State
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import DeviceError
+from motorbus.families.feetech.driver.alarm import alarms
+from motorbus.families.feetech.driver.feedback import state_exchange
+from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.motion import enable_torque
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.torque import disable_torque
+
+TRIPS: Final = frozenset(("overload", "current"))
+"""Alarms that stay after what raised them is over."""
+REST: Final = 1.0
+"""s without torque before it is switched on again."""
+
+
+class Recovery(NamedTuple):
+    """What there was to recover from, by the names of alarms (() when there was nothing, and nothing was done), and
+    the alarms that remain, in words."""
+
+    tripped: tuple[str, ...]
+    remaining: tuple[str, ...]
+
+
+def recover_overload(node: Node, *, rest: float = REST) -> Operation[Recovery]:
+    """Bring a servo back whose overload (or over-current) protection has tripped; it holds where it stands then.
+
+    Between the two it is limp for `rest` s, and an arm sags. Does nothing when neither alarm is set. Raises
+    DeviceError, with the servo limp, when the alarm stays: then only a power cycle helps; and what enable_torque()
+    raises, with the servo limp too.
+    """
+    table = yield from writable(node)
+    tripped = tuple(name for name in (yield from state_exchange(node, table)).alarm if name in TRIPS)
+    if tripped:
+        yield from disable_torque(node)
+        yield from Pause(rest)
+        yield from enable_torque(node)
+        if (yield from _tripped(node, table)):
+            yield from disable_torque(node)
+            raise _stays(node, tripped)
+    return Recovery(tripped, (yield from alarms(node)))
+
+
+def _tripped(node: Node, table: Table) -> Operation[bool]:
+    state: State = yield from state_exchange(node, table)
+    return bool(TRIPS.intersection(state.alarm))
+
+
+def _stays(node: Node, tripped: tuple[str, ...]) -> DeviceError:
+    return DeviceError(
+        f"node {node.node}: the alarm {' and '.join(tripped)} is still set after its torque was off and on again",
+        cause="some servos forget an overload only when their supply goes; or it is overloaded again already",
+        advice="take its load away, then switch its supply off and on; it is limp now",
+        node=node.node,
+    )

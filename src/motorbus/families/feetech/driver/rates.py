@@ -1,0 +1,84 @@
+"""Giving a servo another baud rate: one its map has a code for, one the link can have, and never half.
+
+The codes 5, 6 and 7 are 76800, 57600 and 38400 bit/s in every source of the vendor; some libraries write 57600, 38400
+and 19200 there and lose the servo. The bus keeps its own rate: who changes several servos of one bus opens it at the
+new rate afterwards. The rest is `changing.py`; what becomes of a crash in the middle is `recovery.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from motorbus.core.entry import Table
+from motorbus.core.family import Found
+from motorbus.core.operation import ASKED, Alone, Journal, Operation, Report, Tune, afterwards
+from motorbus.errors import RequestError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.changing import changed
+from motorbus.families.feetech.driver.exchanges import read_block
+from motorbus.families.feetech.driver.identity import identify, writable
+from motorbus.families.feetech.driver.jobs import SET_BAUD, Course, Job, Place
+from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
+from motorbus.families.feetech.driver.placing import locked, refuse_taken, whoever
+from motorbus.families.feetech.driver.renaming import others_than
+from motorbus.families.feetech.driver.sharing import refuse_duplicates
+from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF
+
+
+def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Operation[Found]:
+    """Let this servo speak at `rate` bit/s from now on, for good; gives where it is now. The bus keeps its own rate.
+
+    The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
+    some seconds to ask. What it has already is not written again.
+
+    Raises RequestError (nothing was written) for a rate that its map or the link does not have, a servo of its id that
+    answers there already, two servos that seem to have its id, an HLS servo that has it as its second id, or while
+    another change on this bus is unfinished; otherwise as `set_id`.
+    """
+    _refuse_unknown(rate)
+    asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
+    yield from Report(Journal(SET_BAUD, ASKED, {}))
+    table = yield from writable(node)
+    _refuse_lacking(node, table, rate)
+    present = yield from Tune(0)
+    here, there = Place(node.node, present), Place(node.node, rate)
+    image = yield from read_block(node, 0, IMAGE, bytes)
+    job = Job(SET_BAUD, here, there, image)
+    if rate == present:
+        yield from Alone(locked(job, node))
+        return Found(node.node, rate, (yield from identify(node)))
+    yield from refuse_duplicates(node)
+    yield from Alone(afterwards(_look_there(there), lambda: iter(Tune(present))))
+    others = yield from others_than(node, asked, (node.node,))
+    job = job._replace(others=tuple(others))
+    try:
+        yield from Alone(changed(job, node, Course(job)))
+    finally:
+        node.forget_settings()
+    return Found(node.node, rate, node.identity)
+
+
+def _refuse_unknown(rate: int) -> None:
+    if isinstance(rate, bool) or rate not in BAUD_CODES.values():
+        raise RequestError(
+            f"{rate!r} bit/s is no rate of these servos",
+            expected=", ".join(map(str, BAUD_CODES.values())),
+            advice="nothing was sent",
+        )
+
+
+def _refuse_lacking(node: Node, table: Table, rate: int) -> None:
+    known = [BAUD_CODES[code] for code in BAUD_CODES_OF[table.name]]
+    if rate not in known:
+        raise RequestError(
+            f"node {node.node} has no code for {rate} bit/s: its register map is {table.name}",
+            expected=", ".join(map(str, known)),
+            advice="nothing was written",
+            node=node.node,
+        )
+
+
+def _look_there(there: Place) -> Operation[None]:
+    """Is the link able to have this rate, and is the id free there?"""
+    yield from Tune(there.rate)
+    refuse_taken(there, (yield from whoever(there.id)))

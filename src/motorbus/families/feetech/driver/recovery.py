@@ -1,0 +1,287 @@
+"""After a crash or a loss of power in the middle of a change: find the servo, and end what was under way.
+
+Wherever it is found, it ends under its old id and rate or under its new ones, locked, and the journal says which. A
+cell whose write was cut may hold the old value, the new one, or neither: then the servo is looked for where one without
+a valid id or rate might answer, as shipped. Carrying this out again, after another crash in the middle of it, does no
+harm. One cell is one byte, so no order of writes avoids a torn one; a servo that answers to no id at all hears
+broadcasts at the most, and those may be used only when it is alone on its bus; one that heeds no rate hears nothing.
+
+Servos of one model, set alike, cannot be told apart. So whoever answered before the change began is never taken for the
+one that changes, and nothing new should be connected until the change has ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.operation import (
+    Alone,
+    Effect,
+    Operation,
+    Pause,
+    Progress,
+    Rank,
+    Report,
+    Timeout,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkLost, MotorbusError, NoReply, OutcomeUnknown, RequestError, WireError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import Block, read_block, unanswered
+from motorbus.families.feetech.driver.jobs import (
+    SET_ID,
+    SHIPPED_ID,
+    SHIPPED_RATES,
+    WRITING,
+    Course,
+    Job,
+    Place,
+    elsewhere,
+    job_of,
+)
+from motorbus.families.feetech.driver.node import IMAGE, Node
+from motorbus.families.feetech.driver.placing import AWAKE, COMMIT, OPEN, locked, look, met, rewritten
+from motorbus.families.feetech.driver.sharing import duplicates
+from motorbus.families.feetech.driver.torque import LIMP
+from motorbus.families.feetech.table import BAUD_CODES
+
+RESUMED: Final = "recovering"
+ROUNDS: Final = 3
+"""Times that everything is looked at again: a servo whose supply has just come back is deaf for a while."""
+_REPEATS: Final = 3
+_GLANCE: Final = 50
+"""Polls that show whether two servos answer to the id as shipped."""
+
+
+class Seen(NamedTuple):
+    """A servo that answered: where, and its registers 0 to 39."""
+
+    place: Place
+    image: bytes
+
+
+def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = False) -> Operation[str]:
+    """End a change that was cut off, as the journal tells of it: `change` its verb, `facts` what was known then.
+
+    Gives "new" when the servo is under its new id or rate now, "old" when the change was taken back; locked in both
+    cases. May be called again at any point. Who says `alone` vouches that no other servo is on this bus: then one that
+    answers to no id any more is given its old one by broadcast.
+
+    Raises NoReply when it is nowhere, OutcomeUnknown when two servos cannot be told apart, RequestError for facts of
+    something else, or when `alone` is not true; the journal stays open then.
+    """
+    job = job_of(change, facts)
+    course = Course(job, facts.get("reached", ()))
+    present = yield from Tune(0)
+
+    def work() -> Operation[str]:
+        yield from course.reach(RESUMED)
+        return (yield from recovered(job, course, alone=alone))
+
+    try:
+        return (yield from Alone(afterwards(work(), lambda: iter(Tune(present)))))
+    finally:
+        node.forget_settings()
+
+
+def recovered(job: Job, course: Course, *, alone: bool = False) -> Operation[str]:
+    """As `recover`, with the bus for itself; may leave it at another rate."""
+    for attempt in range(_REPEATS):
+        found = yield from _found(job, course, alone)
+        ended = yield from outcome(_ended(job, course, found))
+        if isinstance(ended, str):
+            yield from course.end(ended)
+            return ended
+        if attempt == _REPEATS - 1:
+            raise ended
+        yield from Pause(AWAKE)
+    raise AssertionError("the loop above ends by itself")
+
+
+def _ended(job: Job, course: Course, found: Seen) -> Operation[str]:
+    """Bring the servo that was found to one of both places, for good, and lock it."""
+    place = found.place
+    yield from Tune(place.rate)
+    node = met(place.id, found.image)
+    goal = place if place in (job.old, job.new) else job.old
+    if place != goal:
+        node = yield from rewritten(job, node, goal, course)
+    elif course.doubtful(goal) and (yield from read_block(node, job.lock, 1, bytes)) != OPEN:
+        node = yield from rewritten(job, node, goal, course)  # the write may have met a closed lock
+    yield from locked(job, node)
+    return "new" if goal == job.new else "old"
+
+
+# -- where is it? -------------------------------------------------------------------------------------------------
+
+
+def _found(job: Job, course: Course, alone: bool) -> Operation[Seen]:
+    """The servo, wherever it is. Raises NoReply, or OutcomeUnknown when two of them could be it."""
+    for round in range(ROUNDS):
+        here = yield from _among(job, (job.new, job.old))
+        mine = [one for one in here if job.is_it(one.image)] or here
+        if len(mine) > 1:
+            raise (yield from _two(job, mine))
+        if mine:
+            return mine[0]
+        yield from Report(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
+        yield from Pause(AWAKE)
+    if alone:
+        yield from _refuse_others(job)
+    lost = yield from _lost(job, alone)
+    if lost is not None:
+        return lost
+    if alone and job.verb == SET_ID:
+        return (yield from _called_back(job, course))
+    raise _nowhere(job)
+
+
+def _among(job: Job, places: Iterable[Place]) -> Operation[list[Seen]]:
+    """Who of its kind answers at these places."""
+    found = []
+    for place in dict.fromkeys(places):
+        yield from Tune(place.rate)
+        try:
+            image = yield from look(place.id)
+        except WireError as garbled:
+            raise _several(job, place) from garbled
+        if image and job.is_like_it(image):
+            found.append(Seen(place, image))
+    return found
+
+
+def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
+    """Where a servo may be whose cell holds neither value: as shipped; when it is alone, under any id at all.
+
+    Whoever answered there before the change began is somebody else, and may look just like it.
+    """
+    taken = _others(job, alone)
+    rates = (job.old.rate, job.new.rate)
+    possible = (job.old.id, job.new.id, *((SHIPPED_ID,) if job.verb == SET_ID else ()))
+    ids = [id for id in possible if id not in taken]
+    any_id = [id for id in range(wire.MAX_ID + 1) if id not in taken] if job.verb == SET_ID and alone else []
+    shipped = SHIPPED_RATES if job.verb == SET_ID else tuple(BAUD_CODES.values())
+    for places in (elsewhere(job, ids, (*rates, *shipped)), elsewhere(job, any_id, rates)):
+        for place in places:
+            one = yield from _glimpsed(job, place)
+            if one is not None:
+                return one
+    if SHIPPED_ID in taken and job.verb == SET_ID:
+        yield from _hidden(job)
+    return None
+
+
+def _others(job: Job, alone: bool) -> set[int]:
+    """Ids of other servos; when it is alone now, the one as shipped may be its own meanwhile."""
+    return set(job.others) - ({SHIPPED_ID} if alone else set())
+
+
+def _glimpsed(job: Job, place: Place) -> Operation[Seen | None]:
+    """This very servo at a place where nobody is expected; silence is the usual answer and is not waited for."""
+    image = yield from outcome(_asked(place))
+    if isinstance(image, LinkLost):
+        raise image
+    return Seen(place, image) if isinstance(image, bytes) and job.is_it(image) else None
+
+
+def _asked(place: Place) -> Operation[bytes]:
+    yield from Tune(place.rate)  # a rate that this link cannot have is no place to look at
+    return (yield from read_block(Node(place.id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+
+
+def _hidden(job: Job) -> Operation[None]:
+    """Raise OutcomeUnknown when it seems to have joined another servo at the id as shipped."""
+    yield from Tune(job.old.rate)
+    found = yield from outcome(duplicates(Node(SHIPPED_ID), _GLANCE))
+    if not isinstance(found, MotorbusError) and found.suspected:
+        raise _several(job, Place(SHIPPED_ID, job.old.rate))
+
+
+def _called_back(job: Job, course: Course) -> Operation[Seen]:
+    """Give a servo that answers to no id its old one by broadcast; nobody else is there to hear it."""
+    yield from Tune(job.old.rate)
+    limp = wire.write(wire.BROADCAST, LIMP.address, LIMP.data)
+    yield from unanswered(limp, LIMP.effect, rank=Rank.STOP)
+    yield from course.reach(WRITING, job.old)
+    for block in (Block(job.lock, OPEN, Effect.PERSISTENT), job.block(job.old)):
+        request = wire.write(wire.BROADCAST, block.address, block.data)
+        yield from unanswered(request, block.effect, rank=Rank.CONFIGURATION)
+        yield from Pause(COMMIT)
+    found = yield from _among(job, (job.old,))
+    if not found:
+        raise NoReply(
+            f"the servo that was {job.old.id} does not answer after a broadcast either",
+            cause="it has no power, it is not connected, or it heeds no rate that is tried",
+            advice="FD, the vendor's program, may find it; `motorbus recover BUS --forget` gives the change up",
+            node=job.old.id,
+        )
+    return found[0]
+
+
+def _refuse_others(job: Job) -> Operation[None]:
+    """Raise RequestError when somebody answers who cannot be the servo, or more than one does."""
+    yield from Tune(job.old.rate)
+    there = []
+    for id in range(wire.MAX_ID + 1):
+        answer = yield from outcome(read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+        if isinstance(answer, LinkLost):
+            raise answer
+        if not isinstance(answer, NoReply):
+            known = id in _others(job, alone=True)
+            there.append((id, isinstance(answer, bytes) and job.is_it(answer) and not known))
+    others = [id for id, is_it in there if not is_it or len(there) > 1]
+    if others:
+        raise RequestError(
+            f"the servo is not alone: {', '.join(map(str, others))} answer",
+            expected="no other servo on this bus",
+            cause="servos of one kind, set alike, cannot be told apart, and a broadcast reaches them all",
+            advice="take every other servo off this bus; nothing was written",
+            node=others[0],
+        )
+
+
+def _nowhere(job: Job) -> NoReply:
+    ids = " or ".join(str(id) for id in dict.fromkeys((job.old.id, job.new.id)))
+    rates = " or ".join(str(rate) for rate in dict.fromkeys((job.old.rate, job.new.rate)))
+    by_broadcast = (
+        "; when it is the only servo on this bus, recover(alone=True) gives it its old id by broadcast"
+        if job.verb == SET_ID
+        else ""
+    )
+    return NoReply(
+        f"the servo that was {job.old.id} is nowhere: neither as {ids} at {rates} bit/s nor as shipped",
+        cause="it has no power, it is not connected, or the write of its cell was cut and it heeds no id or rate now",
+        advice=f"see that it has power, then recover() again{by_broadcast}",
+        node=job.old.id,
+    )
+
+
+# -- what cannot be decided ---------------------------------------------------------------------------------------
+
+
+def _two(job: Job, found: Sequence[Seen]) -> Operation[MotorbusError]:
+    """Both places are taken by servos of its kind: lock both, for one of them may be open, and say so."""
+    for one in found:
+        yield from Tune(one.place.rate)
+        yield from outcome(locked(job, met(one.place.id, one.image)))
+    where = " and ".join(f"{one.place.id} at {one.place.rate} bit/s" for one in found)
+    return OutcomeUnknown(
+        f"servos answer as {where}: which of them is the one that was to change is not known",
+        expected="one of them",
+        cause="another servo was connected meanwhile, or two had the same id",
+        advice="take the one off this bus that does not belong to the change, then recover() again; both are locked",
+        node=job.old.id,
+    )
+
+
+def _several(job: Job, place: Place) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"two servos seem to answer as {place.id} at {place.rate} bit/s",
+        expected="one",
+        cause="two servos had one id, or the one that was to change has become what it was as shipped",
+        advice="connect the one that was to change alone, then recover(alone=True)",
+        node=place.id,
+    )

@@ -1,0 +1,97 @@
+"""What a servo does beyond keeping what is written to it: calibrate, turn on, change its mode, restore, clear.
+
+Each function takes the servo and the moment. Who observed it is said with each; what nobody knows is a switch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from motorbus.families.feetech.simulator.feedback import FEEDBACK
+from motorbus.families.feetech.simulator.power import power_up
+from motorbus.families.feetech.simulator.settings import DECIDES_MOTION
+from motorbus.families.feetech.table import Middle, Mode
+
+if TYPE_CHECKING:
+    from motorbus.families.feetech.simulator.servo import Servo
+
+_CALIBRATE: Final = 128
+_COUNTS: Final = frozenset({"operating_mode", "homing_offset"})
+_FACES: Final = frozenset({"phase", "angular_resolution"})
+_LIMITS: Final = frozenset({"min_position_limit", "max_position_limit"})
+
+
+def react(servo: Servo, names: frozenset[str], torque: int, at: float) -> None:
+    """Do what a write of these rows orders; `torque` is the torque switch before it."""
+    memory, control = servo.memory, servo.model.control
+    if "id" in names or "second_id" in names:
+        servo.renamed()
+    if (
+        "torque_enable" in names
+        and memory["torque_enable"] == _CALIBRATE
+        and control.middle is Middle.SWITCH  # elsewhere 128 is a number that means nothing
+    ):
+        memory["torque_enable"] = torque  # an order and no state; what 40 reads afterwards is not known
+        calibrate(servo, control.turn // 2, at)
+        return
+    if "torque_enable" in names and not memory["torque_enable"]:
+        servo.protection.torque_off()
+    if names & _FACES:
+        servo.face(at)
+    if names & _COUNTS or (names & _LIMITS and not control.modes):  # there the limits decide about the mode
+        servo.count_anew(at)
+    ordered = "goal_position" in names and servo.mode in (Mode.POSITION, Mode.STEP)
+    if ordered and _goal_enables(servo):
+        memory["torque_enable"] = 1
+    if ordered and servo.mode is Mode.STEP:
+        servo.step(at)
+    elif names & DECIDES_MOTION:
+        servo.move(at)
+
+
+def _goal_enables(servo: Servo) -> bool:
+    wish = servo.switches.goal_enables_torque
+    return servo.model.personality.goal_enables if wish == "by_map" else wish == "yes"
+
+
+def calibrate(servo: Servo, counts: int, at: float) -> None:
+    """Make the present pose read `counts` by way of the homing offset.
+
+    The old offset is taken out first: the encoder counts, not the reading. An STS can only say ±2047, so the one pose
+    that would need 2048 reads one count beside (overflows on a real one: lerobot#3370). It then holds.
+    """
+    memory, turn, row = servo.memory, servo.model.turn, servo.model.table["homing_offset"]
+    counted = round(servo.encoder(at)) - counts * servo.fold
+    offset = round(((counted + turn // 2) % turn - turn // 2) / servo.fold)
+    memory["homing_offset"] = max(row.low, min(row.high, offset))
+    if not servo.locked or servo.switches.calibration_store == "always":
+        memory.store("homing_offset")
+        servo.stores()
+    servo.count_anew(at)
+    memory["goal_position"] = FEEDBACK["present_position"](servo, at)
+    servo.move(at)
+
+
+def clear_turns(servo: Servo, at: float) -> None:
+    """0x0A: the position begins anew within one turn (FTServo_Python, hls/reset.py). It then holds where it is."""
+    servo.forget_turns(at)
+    servo.memory["goal_position"] = FEEDBACK["present_position"](servo, at)
+    servo.move(at)
+
+
+def restore_factory(servo: Servo, at: float) -> None:
+    """0x06: as shipped, offset 0, the id kept (servolab, STS3215 firmware 3.10); then it starts again."""
+    kept = frozenset({"id", "second_id"} if servo.switches.restore_id == "keep" else ())
+    servo.memory.restore_factory(kept, servo.switches.restore_time)
+    servo.stores()
+    power_up(servo, at, cut=False)
+    servo.deaf_until = at + servo.switches.restore_time
+
+
+def enter_bootloader(servo: Servo, at: float) -> None:
+    """0x08: deaf, and back as after power-up (every reset of that controller enters the bootloader).
+
+    What the motor does meanwhile is not known; here it is limp from the beginning.
+    """
+    power_up(servo, at, cut=False)
+    servo.deaf_until = at + servo.switches.bootloader_time

@@ -1,0 +1,156 @@
+"""Killed in the middle, in earnest: the next command says so, and `recover` ends it; else there is nothing to do."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import motorbus
+from motorbus import session
+from motorbus.cli.simulated import Simulated
+from motorbus.core.operation import INTENT, Journal
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+KILLED_AT = """
+import os, signal, sys
+from motorbus.cli import main
+from motorbus.journal import BusJournal
+
+record, state = BusJournal.__call__, sys.argv[1]
+
+def last(self, event):
+    record(self, event)
+    if event.state == state:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+BusJournal.__call__ = last
+main(sys.argv[2:])
+"""
+
+
+def killed(state: str, *words: str) -> None:
+    """This command in a process of its own, killed by kill -9 as soon as the journal has that state."""
+    command = [sys.executable, "-c", KILLED_AT, state, *words]
+    ended = subprocess.run(command, capture_output=True, timeout=60, check=False)
+    assert ended.returncode == -signal.SIGKILL, ended.stderr
+
+
+@pytest.mark.parametrize(("state", "end"), [("intent", "old"), ("writing 7", "old"), ("written 7", "new")])
+def test_kill_9_in_the_middle_of_an_id(state: str, end: str, run: Run, served: Simulated) -> None:
+    killed(state, "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
+    (listed,) = run("recover", "--json").document["changes"]
+    assert (listed["bus"], listed["change"], listed["id"], listed["new"]) == (served.bus, "set_id", 3, 7)
+    told = run("ping", f"{served.bus}#1")
+    assert told.code == 0
+    assert f"motorbus recover {served.bus}" in told.err
+    refused = run("set-id", f"{served.bus}#1", "8", "--yes")
+    assert refused.code == 2
+    assert f"motorbus recover {served.bus}" in refused.err
+    ran = run("recover", served.bus, "--yes", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.document["outcome"] == end
+    there = 7 if end == "new" else 3
+    rows = run("read", f"{served.bus}#{there}", "id", "lock", "--json").document["registers"]
+    assert [row["raw"] for row in rows] == [there, 1]
+    assert run("recover").out == "nothing is unfinished\n"
+
+
+def test_kill_9_in_the_middle_of_a_rate(run: Run, served: Simulated) -> None:
+    killed("written 1", "set-baud", f"{served.bus}#3", "500000", "--yes", "--among", "1-9")
+    assert "motorbus recover" in run("recover").out
+    ran = run("recover", served.bus, "--yes")
+    assert ran.code == 0, ran.err
+    assert ran.out == "finished: the change of #3 to 500000 bit/s\n"
+    assert run("ping", f"{served.bus},baud=500000#3").code == 0
+
+
+def test_kill_9_in_the_middle_of_the_recovery(run: Run, served: Simulated) -> None:
+    killed("writing 7", "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
+    killed("recovering", "recover", served.bus, "--yes")
+    ran = run("recover", served.bus, "--yes")
+    assert ran.code == 0, ran.err
+    assert ran.out == "taken back: the change of #3 to #7\n"
+
+
+@pytest.fixture
+def half(arm: Simulation) -> Simulation:
+    """A bus on which the id of servo 3 is half changed."""
+    with motorbus.open(arm.url) as bus:
+        assert bus.journal is not None
+        image = bytes(arm[3].memory.read(0, 40)).hex()
+        facts = {
+            "node": 3,
+            "new": 7,
+            "rate": 1_000_000,
+            "new_rate": 1_000_000,
+            "registers": image,
+            "others": [1],
+        }
+        bus.journal(Journal("set_id", INTENT, facts))
+    return arm
+
+
+def test_it_is_asked_before(run: Run, half: Simulation) -> None:
+    ran = run("recover", half.url)
+    assert ran.code == 8
+    assert "finish the change of #3 to #7, or take it back" in ran.err
+    with motorbus.open(half.url) as bus:
+        assert session.unfinished(bus) is not None
+
+
+def test_a_dry_run_shows_what_it_would_send(run: Run, half: Simulation) -> None:
+    ran = run("recover", half.url, "--dry-run")
+    assert ran.code == 0
+    assert "lock 1 (closed" in ran.out
+    assert "motorbus recover" in ran.err
+
+
+def test_a_change_is_given_up(run: Run, half: Simulation) -> None:
+    half[3].unplug()
+    ran = run("recover", half.url, "--yes")
+    assert ran.code == 5
+    assert "`motorbus recover BUS --alone`" in ran.err
+    assert run("recover", half.url, "--forget").code == 8
+    ran = run("recover", half.url, "--forget", "--yes", "-vv")
+    assert (ran.code, ran.out) == (0, "simulated\nforgotten: the change of #3 to #7\n")
+    assert " 03 " not in ran.err
+    assert run("set-id", f"{half.url}#2", "8", "--yes", "--among", "1-9").code == 0
+
+
+def test_alone_is_not_believed_when_others_answer(run: Run, half: Simulation) -> None:
+    half[3].unplug()
+    ran = run("recover", half.url, "--alone", "--yes")
+    assert ran.code == 2
+    assert "the servo is not alone: " in ran.err
+
+
+def test_nothing_to_do(run: Run, arm: Simulation, state_folder: Path) -> None:
+    assert run("recover", arm.url).out == f"simulated\nnothing is unfinished on {arm.url}\n"
+    assert run("recover", arm.url, "--json").document["outcome"] is None
+    assert run("recover", "--json").document == {"schema": "motorbus.recover.list/1", "changes": []}
+
+
+@pytest.mark.parametrize("words", ["--alone", "--forget", "--dry-run", "--baud 1M"])
+def test_without_a_bus_there_is_nothing_to_do_it_to(words: str, run: Run, state_folder: Path) -> None:
+    assert run("recover", *words.split()).code == 2
+
+
+def test_a_journal_of_a_later_version_is_told_and_touched_by_nobody(run: Run, served: Simulated) -> None:
+    from motorbus.link.lock import journal_path
+
+    path = journal_path(served.bus.partition(":")[2])
+    path.write_text(json.dumps({"format": 2}) + "\n")
+    told = run("ping", f"{served.bus}#1")
+    assert told.code == 0
+    assert "does not know" in told.err
+    for words in (["recover"], ["recover", served.bus], ["set-id", f"{served.bus}#1", "9", "--yes"]):
+        ran = run(*words)
+        assert ran.code == 2
+        assert "version that wrote it" in ran.err
+    assert path.read_text() == '{"format": 2}\n'

@@ -1,0 +1,34 @@
+"""Velocity, acceleration and bound of the current as bytes beside a goal; a bound never becomes 0 by rounding."""
+
+from __future__ import annotations
+
+from math import tau
+
+import pytest
+
+from motorbus.errors import RequestError
+from motorbus.families.feetech.driver.pace import burst, ramp_of
+from motorbus.families.feetech.table import HLS, SCS, STS
+from tests.families.feetech.driver_script import met
+
+COUNT = tau / 4096
+
+
+def test_behind_the_goal_come_time_or_bound_and_velocity() -> None:
+    assert burst(met("sts"), STS, 1000 * COUNT, None) == b"\0\0\xe8\3"
+    assert burst(met("scs"), SCS, 256 * SCS["goal_velocity"].scale, None) == b"\0\0\1\0"
+    assert burst(met("hls"), HLS, 1000 * COUNT, 1.3) == b"\xc8\0\x14\0"
+
+
+def test_a_velocity_that_rounds_to_0_is_no_maximum() -> None:
+    with pytest.raises(RequestError, match="is less than this servo can be told") as caught:
+        burst(met("hls"), HLS, 20 * COUNT, 1.3)
+    assert "0.0767 to" in caught.value.expected
+
+
+def test_before_the_goal_comes_the_acceleration_where_there_is_one() -> None:
+    assert ramp_of(met("sts"), STS, None) == b"\0"
+    assert ramp_of(met("hls"), HLS, 5000 * COUNT) == b"\x32"
+    assert ramp_of(met("scs"), SCS, None) == b""
+    with pytest.raises(RequestError, match="no acceleration register"):
+        ramp_of(met("scs"), SCS, 1.0)

@@ -1,0 +1,51 @@
+"""Orders that make nothing move, and where none is known."""
+
+from __future__ import annotations
+
+from math import tau
+
+import pytest
+
+from motorbus.core.operation import Effect, Goal
+from motorbus.errors import RequestError
+from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.families.feetech.driver.rest import at_rest, held, held_within, with_bound
+from motorbus.families.feetech.table import CONTROL, HLS, STS, TABLES, Mode
+from tests.families.feetech.driver_script import met, play, prepared, reads
+
+COUNT = tau / 4096
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [(name, mode) for name in TABLES for mode in CONTROL[name].has if mode not in (Mode.POSITION, Mode.STEP)],
+)
+def test_rest_is_a_0_in_the_register_that_the_mode_heeds(name: str, mode: Mode) -> None:
+    node = met(name)
+    if (name, mode) == ("hls", Mode.PWM):
+        with pytest.raises(RequestError, match="nobody has published which register takes the duty"):
+            at_rest(node, TABLES[name], mode)
+        return
+    block = at_rest(node, TABLES[name], mode)
+    names = {Mode.VELOCITY: "goal_velocity", Mode.CURRENT: "goal_torque", Mode.PWM: "goal_time"}
+    assert block.address == TABLES[name][names[mode]].address
+    assert (block.data, block.effect) == (b"\0\0", Effect.MOTION)
+    assert [goal[2:] for goal in block.goals] == [(0.0, 0.0, 0.0)]
+
+
+def test_held_is_where_it_stands_whatever_its_limits() -> None:
+    block = play(held(prepared(at_12=0), STS), reads(3, 56, 0x84, 3))
+    assert block == Block(42, b"\x84\x03", Effect.MOTION, (Goal(3, "position", *[900 * COUNT] * 3),))
+
+
+def test_held_within_goes_to_the_limit_that_is_near() -> None:
+    block = play(held_within(prepared(at_12=0), STS, jump=5.0), reads(3, 56, 0x84, 3))
+    assert block.data == b"\xff\x00"
+
+
+def test_a_bound_stands_before_a_velocity_and_behind_a_goal() -> None:
+    node = met("hls")
+    node.bound = 300
+    assert with_bound(node, HLS, Block(46, b"\1\2")) == Block(44, b"\x2c\1\1\2")
+    assert with_bound(node, HLS, Block(42, b"\1\2")) == Block(42, b"\1\2\x2c\1")
+    assert with_bound(prepared(), STS, Block(42, b"\1\2")) == Block(42, b"\1\2")
