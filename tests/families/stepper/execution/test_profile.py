@@ -130,3 +130,18 @@ def test_however_long_it_is_in_closed_form(pulses: int, run: int) -> None:
         made = motion(pulses, float(run), ramp)
         half = made.done(made.duration / 2)
         assert abs(half - pulses / 2) <= 2 + pulses * 1e-6
+
+
+@pytest.mark.parametrize("by_pulse", [False, True])
+@pytest.mark.parametrize("pulses", [None, 1, 100, 8000])
+def test_the_moment_of_a_pulse_is_when_it_is_out(by_pulse: bool, pulses: int | None) -> None:
+    made = motion(pulses, 8000.0, Ramp(50.0, 30.0 if by_pulse else 30_000.0, by_pulse))
+    for count in (1, 2, 50, 51, 99, 100, 4000, 8000, 20_000):
+        at = made.moment(count)
+        if pulses is not None and count > pulses:
+            assert at == inf
+            continue
+        assert made.done(at) >= count
+        assert made.done(at * (1 - 1e-6)) < count
+    assert made.moment(0) == 0
+    assert still().moment(1) == inf

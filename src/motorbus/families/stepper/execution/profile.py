@@ -73,6 +73,20 @@ class Motion:
             at -= piece.duration
         return 0.0
 
+    def moment(self, pulses: int) -> float:
+        """When so many pulses are out; infinity when it has not so many."""
+        if pulses <= 0:
+            return 0.0
+        if not self.pieces or (self.pulses is not None and pulses > self.pulses):
+            return inf
+        low, high = 0.0, self.duration if self.pulses is not None else 1.0
+        while self.done(high) < pulses:
+            low, high = high, 2 * high
+        for _ in range(80):  # each one halves what is left; a float has no more halves
+            middle = (low + high) / 2
+            low, high = (low, middle) if self.done(middle) >= pulses else (middle, high)
+        return high
+
     def slowing(self, at: float) -> Motion:
         """What a slow stop at this moment makes of it: down to the start frequency, then nothing."""
         now, ramp = self.frequency(at), self.ramp

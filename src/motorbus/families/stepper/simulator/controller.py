@@ -14,6 +14,7 @@ from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.execution import Behaviour, Happening, Next, Phase, State
 from motorbus.families.stepper.simulator.memory import Memory, Rows
 from motorbus.families.stepper.simulator.switches import Switches
+from motorbus.families.stepper.simulator.travel import Travel
 from motorbus.families.stepper.table import EDITS, HOME_INPUT, PROJECTS, Project, is_allowed
 
 _WHICH: Final = frozenset({"project", "step", "port"})
@@ -52,6 +53,7 @@ class Controller:
 
     `state`    what it is doing, a value of `execution`
     `store`    what it remembers; `memory` is the same by the names of the rows
+    `travel`   where its load is, which it does not know
     `told`     everything that happened, `log` remarks on what a host should know and is not told
     `powered`  whether the supply is there and the cable in
     """
@@ -64,6 +66,7 @@ class Controller:
         self.powered = True
         self._ends: list[float] = []
         self._around = around
+        self.travel = Travel(switches)
         self._inputs: frozenset[int] = (
             frozenset({HOME_INPUT}) if switches.home_switch == "stuck" else frozenset()
         )
@@ -134,6 +137,7 @@ class Controller:
             "powered": self.powered,
             "phase": self.state.phase.value,
             "position": self.state.position(now),
+            "load": self.travel.position(self.state, now),
             "frequency": self.state.frequency(now),
             "homed": self.state.homed,
             "project": run.project.number if run else None,
@@ -150,6 +154,9 @@ class Controller:
     def power_up(self, at: float) -> None:
         """The supply comes, at this moment."""
         base = self.state.position(at)
+        if self.switches.home_switch == "wired":
+            on_it = frozenset({HOME_INPUT}) if self.travel.closed(self.state, at) else frozenset()
+            self._inputs = self._inputs - {HOME_INPUT} | on_it
         self.store.restart()
         homes = self.store.project(1)
         home_with = homes if homes.power_on_home else None
@@ -161,16 +168,24 @@ class Controller:
 
     def due(self) -> float:
         """When something happens by itself."""
-        return execution.due(self.state)
+        return min(execution.due(self.state), self._meets())
+
+    def _meets(self) -> float:
+        return self.travel.crossing(self.state, HOME_INPUT in self._inputs)
 
     def advance(self, to: float) -> tuple[Happening, ...]:
-        """Let time pass; gives what happened."""
+        """Let time pass, at most until `due`; gives what happened."""
+        if self._meets() <= min(to, execution.due(self.state)):
+            return self._wire(HOME_INPUT, HOME_INPUT not in self._inputs, self._meets())
         return self._take(execution.advance(self.state, to))
 
     def input(self, port: int, active: bool, at: float) -> tuple[Happening, ...]:
         """An input changes; without supply it is so when the supply comes."""
         if port == HOME_INPUT and self.switches.home_switch != "free":
             return ()
+        return self._wire(port, active, at)
+
+    def _wire(self, port: int, active: bool, at: float) -> tuple[Happening, ...]:
         self._inputs = self._inputs | {port} if active else self._inputs - {port}
         chosen = self.store.selected if self.switches.in3_project == "selected" else 1
         project = self.store.project(chosen)
@@ -258,6 +273,7 @@ class Controller:
     # -- keeping books ------------------------------------------------------------------------------------------
 
     def _take(self, found: Next) -> tuple[Happening, ...]:
+        self.travel.follow(self.state, found.told)
         self.state = found.state
         self.told += found.told
         self._ends += [one.at for one in found.told if one.kind == "completed"]

@@ -141,9 +141,16 @@ class Switches(Behaviour):
     bounce_ms: float = switch(1.0, "ms between two of these", source=_FAULT, span=(1e-3, 1e3))
     home_switch: str = switch(
         "free",
-        "input 5 goes as it is set, is stuck active, or never becomes active",
+        "input 5 goes as it is set, is closed by the load at its place, is stuck active, or never becomes active",
         "free",
+        "wired",
         "stuck",
         "never",
         source=_FAULT,
+    )
+    home_at: int = switch(
+        -1600,
+        "that place, with home_switch=wired: so many pulses from where the motor was first, and everything behind it",
+        source=_FAULT,
+        span=(-1e9, 1e9),
     )
