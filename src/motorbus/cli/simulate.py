@@ -36,7 +36,7 @@ app = App(
 removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
-status, power-cycle [ID], unplug ID, plug ID, help.
+status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off, help.
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
