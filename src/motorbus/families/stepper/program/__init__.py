@@ -21,6 +21,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
 from motorbus.families.stepper.program.course import Course, Picture, Stretch, course, picture
+from motorbus.families.stepper.program.fit import Fit, Run, fit
 from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, Finding, Rule, lint, net_units
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
 from motorbus.families.stepper.program.schema import schema
@@ -139,15 +140,18 @@ __all__ = [
     "Course",
     "Estimate",
     "Finding",
+    "Fit",
     "Picture",
     "Plan",
     "Program",
     "Rule",
+    "Run",
     "StepPlan",
     "Stretch",
     "course",
     "duration",
     "estimate",
+    "fit",
     "lint",
     "net_units",
     "picture",
