@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from types import MappingProxyType
 
-from motorbus.errors import LinkError, RequestError
+from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
@@ -59,7 +59,7 @@ class Program:
 
     @classmethod
     def load(cls, path: str) -> Program:
-        """From a file. Raises RequestError for what it says, LinkError when it cannot be read.
+        """From a file. Raises RequestError when it cannot be read, and for what it says.
 
         The one place where a family opens a file: one that its caller names, and only to read it.
         """
@@ -69,7 +69,10 @@ class Program:
         except UnicodeDecodeError as error:
             raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
         except OSError as error:
-            raise LinkError(f"{path} cannot be read: {error.strerror or error}") from error
+            why = (error.strerror or str(error)).lower()
+            raise RequestError(
+                f"{path} cannot be read: {why}", advice="see that the path is right"
+            ) from error
         return cls.parse(source)
 
     @classmethod
