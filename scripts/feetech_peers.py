@@ -162,7 +162,8 @@ def _value(value: Any) -> str:
 def _registers(controller: str) -> Iterator[str]:
     yield f"### rustypot: {controller}PyController, by registers\n"
     yield "Every generated call, with a number that has a sign where there is one. `agrees`: what was read is what the"
-    yield "servo held, and what was written is what it meant.\n"
+    yield "servo held, and what was written is what it meant. An SCS0009 does not know SYNC READ: there the calls that"
+    yield f"use it are run for `{registers.UNANSWERED}` alone, and for every register on the others.\n"
     rows = []
     for register in registers.registers(controller):
         unit, _, note = register.unit.words.rpartition(" ")

@@ -233,6 +233,13 @@ def unfinished(bus: BusFace) -> Change | None:
     return bus.journal.unfinished() if isinstance(bus.journal, BusJournal) else None
 
 
+def journal_of(address: str) -> BusJournal | None:
+    """The journal of a real port, open or not; None where none is kept. Raises RequestError for a bad address."""
+    name = lock_name(address, {})
+    simulated = name == "sim" or name.startswith("sim:")
+    return BusJournal(address, journal_path(name)) if name and not simulated else None
+
+
 def simulate(
     family: str,
     *,
@@ -277,9 +284,7 @@ def _stop_socket(opening: Opening, link: Link) -> Path | None:
     return socket_path(name) if name else None
 
 
-def _journal(
-    spot: Address, options: Mapping[str, object], opening: Opening, link: Link
-) -> BusJournal | None:
+def _journal(spot: Address, options: Mapping[str, object], opening: Opening, link: Link) -> BusJournal | None:
     """Who records the changes on this bus; None for a channel that belongs to nobody, where none can be guarded."""
     merged = {**spot.options, **{name: str(value) for name, value in options.items()}}
     address = spot._replace(options=merged).bus

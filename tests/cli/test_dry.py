@@ -66,6 +66,24 @@ def test_an_answer_that_only_a_real_run_gets_is_no_number(arm: Simulation) -> No
                 use()
 
 
+def test_who_is_asked_for_the_first_time_after_a_withheld_write_is_not_foreseen(arm: Simulation) -> None:
+    """Nothing is known of the servo, and its answer would be one of before the write."""
+    with motorbus.open(arm.url) as bus:
+        servo = Servo(DryBus(bus), 1)
+        servo.disable_torque()
+        for verb in (servo.position, servo.read, servo.stop, servo.enable_torque):
+            with pytest.raises(Unforeseeable):
+                verb()
+
+
+def test_another_device_is_apart_and_its_frames_are_shown_with_the_rest(arm: Simulation) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        rehearsal.run(action_all())
+        Servo(rehearsal.apart(), 2).enable_torque()
+        assert [frame[4] for frame in rehearsal.frames] == [5, 3, 3]
+
+
 def test_the_rate_of_the_bus_is_known(arm: Simulation) -> None:
     with motorbus.open(arm.url) as bus:
         assert DryBus(bus).run(iter(Tune(0))) == 1_000_000

@@ -78,6 +78,9 @@ FEETECH = [
     "feetech protection BUS#1 torque=30% --dry-run",
     "feetech recover-overload BUS#1",
     "feetech clear-turns BUS#1 --dry-run",
+    "feetech many-turns BUS#1",
+    "feetech many-turns BUS#1 on --yes",
+    "feetech many-turns BUS#1 on --dry-run",
 ]
 KST = [
     "ping BUS --broadcast",

@@ -187,3 +187,16 @@ def test_a_table_redraws_itself_only_on_a_terminal(monkeypatch: pytest.MonkeyPat
     watched(monkeypatch)
     assert Output().live
     assert not Output(json=True).live
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), errors.NoReply("node 3 did not answer")])
+def test_what_was_added_to_an_error_on_its_way_is_told(
+    error: BaseException, capsys: pytest.CaptureFixture[str]
+) -> None:
+    error.add_note("the servo is 3, and locked")
+    Output().error(error)
+    assert capsys.readouterr().err.endswith("\n  note: the servo is 3, and locked\n")
+    Output(json=True).error(error)
+    facts = json.loads(capsys.readouterr().err)
+    assert facts["notes"] == ["the servo is 3, and locked"]
+    assert "\n" not in facts["summary"]

@@ -14,6 +14,8 @@ import motorbus
 from motorbus import session
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import INTENT, Journal
+from motorbus.journal import BusJournal
+from motorbus.link.lock import journal_path
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -130,20 +132,40 @@ def test_alone_is_not_believed_when_others_answer(run: Run, half: Simulation) ->
     assert "the servo is not alone: " in ran.err
 
 
+def test_a_port_that_has_another_name_since(run: Run, served: Simulated, tmp_path: Path) -> None:
+    """The journal is that of the name; the adapter came back under another one."""
+    killed("written 7", "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
+    (path,) = (tmp_path / "state" / "motorbus").glob("*.journal")
+    gone = "feetech:/dev/ttyACM42"
+    path.rename(journal_path("/dev/ttyACM42"))
+    assert run("recover", served.bus).out == f"nothing is unfinished on {served.bus}\n"
+    ran = run("recover", served.bus, "--of", gone, "--yes")
+    assert (ran.code, ran.out) == (0, "finished: the change of #3 to #7\n"), ran.err
+    assert run("recover").out == "nothing is unfinished\n"
+
+
+def test_a_change_on_a_port_that_is_gone_is_given_up_without_it(run: Run, state_folder: Path) -> None:
+    kept = BusJournal("feetech:/dev/ttyACM42", journal_path("/dev/ttyACM42"))
+    kept(Journal("set_id", INTENT, {"node": 3, "new": 7}))
+    assert run("recover", "feetech:/dev/ttyACM42", "--yes").code == 3
+    assert run("recover", "feetech:/dev/ttyACM42", "--forget").code == 8
+    ran = run("recover", "feetech:/dev/ttyACM42", "--forget", "--yes")
+    assert (ran.code, ran.out) == (0, "forgotten: the change of #3 to #7\n")
+    assert kept.unfinished() is None
+
+
 def test_nothing_to_do(run: Run, arm: Simulation, state_folder: Path) -> None:
     assert run("recover", arm.url).out == f"simulated\nnothing is unfinished on {arm.url}\n"
     assert run("recover", arm.url, "--json").document["outcome"] is None
     assert run("recover", "--json").document == {"schema": "motorbus.recover.list/1", "changes": []}
 
 
-@pytest.mark.parametrize("words", ["--alone", "--forget", "--dry-run", "--baud 1M"])
+@pytest.mark.parametrize("words", ["--alone", "--forget", "--dry-run", "--baud 1M", "--of feetech:COM1"])
 def test_without_a_bus_there_is_nothing_to_do_it_to(words: str, run: Run, state_folder: Path) -> None:
     assert run("recover", *words.split()).code == 2
 
 
 def test_a_journal_of_a_later_version_is_told_and_touched_by_nobody(run: Run, served: Simulated) -> None:
-    from motorbus.link.lock import journal_path
-
     path = journal_path(served.bus.partition(":")[2])
     path.write_text(json.dumps({"format": 2}) + "\n")
     told = run("ping", f"{served.bus}#1")

@@ -43,6 +43,12 @@ def test_other_rates_are_tried_when_asked(run: Run, arm: Simulation) -> None:
     assert [one["baud"] for one in document["devices"]] == [1_000_000]
 
 
+def test_who_answers_is_told_at_once_where_it_takes_long(run: Run, arm: Simulation) -> None:
+    ran = run("scan", arm.url, "--ids", "1-2", "--baud", "500000,1000000")
+    assert ran.err.splitlines() == ["#1 answers at 1000000 bit/s", "#2 answers at 1000000 bit/s"]
+    assert run("scan", arm.url, "--ids", "1-2").err == ""
+
+
 def test_nobody_ends_with_5_and_says_where_to_look(run: Run, arm: Simulation) -> None:
     ran = run("scan", arm.url, "--ids", "9")
     assert ran.code == 5

@@ -76,3 +76,10 @@ def test_what_is_said_of_one_of_several_is_worded_too(run: Run, arm: Simulation)
     ran = run("stop", f"{arm.url}#1")
     assert ran.code == 2
     assert "use `motorbus torque off`, after which it is limp" in ran.err
+
+
+def test_notes_are_worded_too_those_of_an_interruption_as_well() -> None:
+    error = KeyboardInterrupt()
+    error.add_note("the change is unfinished, recover() ends it")
+    wording.in_words_of_the_shell(error, families.load("feetech"))
+    assert error.__notes__ == ["the change is unfinished, `motorbus recover BUS` ends it"]

@@ -65,6 +65,15 @@ class DryBus:
         self._gate = Gate()
         self._written: set[int] = set()
 
+    def apart(self) -> DryBus:
+        """The same bus for another device: what is withheld here and from it hides nothing of the other.
+
+        Who is addressed can be told from an exchange that is answered, and from no other.
+        """
+        other = DryBus(self._bus)
+        other.frames = self.frames
+        return other
+
     def run(self, operation: Runnable[T], report: object = None) -> T:
         """Carry out an operation, reading only. Raises as the operation does, LimitExceeded of the gate included."""
         answer: Any = self._one(operation) if isinstance(operation, Exchange) else self._all(operation)

@@ -41,8 +41,9 @@ def each(
         with opened(name, options, output) as bus:
             visited = everyone(name, bus, nodes, output)
             rehearsal = DryBus(bus)
-            carrier = rehearsal if dry_run else bus
-            results += [{"bus": name, "id": node, **_tried(carrier, node, verb, errors)} for node in visited]
+            for node in visited:
+                carrier = rehearsal.apart() if dry_run else bus
+                results.append({"bus": name, "id": node, **_tried(carrier, node, verb, errors)})
             if dry_run:
                 show(rehearsal, output)
     if dry_run:

@@ -182,15 +182,20 @@ def _error_text(error: BaseException) -> Any:
 
 
 def _message(error: BaseException) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return "cancelled"
-    return str(error) or type(error).__name__
+    said = "cancelled" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
+    return "\n".join([said, *(f"  note: {note}" for note in _notes(error))])
+
+
+def _notes(error: BaseException) -> list[str]:
+    """What was added to it on its way, such as what has become of the device."""
+    return list(getattr(error, "__notes__", ()))
 
 
 def _error_facts(error: BaseException) -> dict[str, object]:
-    facts = {"schema": "motorbus.error/1", "error": type(error).__name__, "exit": exit_code(error)}
+    facts: dict[str, object] = {"schema": "motorbus.error/1", "error": type(error).__name__}
+    facts |= {"exit": exit_code(error), **({"notes": _notes(error)} if _notes(error) else {})}
     if not hasattr(error, "summary"):
-        return {**facts, "summary": _message(error)}
+        return {**facts, "summary": _message(error).partition("\n")[0]}
     parts = (
         "summary",
         "sent",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -16,9 +17,11 @@ from motorbus.core.operation import OUTCOME, Journal
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
-    from motorbus.journal import Change
+    from motorbus.journal import BusJournal, Change
 
 app = App(
     name="recover",
@@ -28,13 +31,15 @@ is killed or the power goes in the middle, this finds the device, finishes the
 change or takes it back, locks the device, and says which. It may be said again
 at any time. A device that answers under no id any more hears broadcasts at the
 most: --alone allows them, when it is the only one on its bus. --forget gives
-the change up without touching the device, as when it is gone.
+the change up without touching the device, as when it is gone. --of is for a
+port that has another name since, as after the adapter was plugged in again.
 
 Examples:
 
     motorbus recover
     motorbus recover feetech:/dev/ttyACM0 --yes
     motorbus recover feetech:/dev/ttyACM0 --alone --yes
+    motorbus recover feetech:/dev/ttyACM1 --of feetech:/dev/ttyACM0 --yes
     motorbus recover feetech:/dev/ttyACM0 --forget --yes""",
 )
 
@@ -48,6 +53,7 @@ def recover(
     *,
     alone: Flag = False,
     forget: Flag = False,
+    of: str = "",
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -63,35 +69,81 @@ def recover(
         The device is the only one on this bus, so it may be called by broadcast.
     forget
         Give the change up: nothing is sent, and the bus may be changed again.
+    of
+        The name that this bus had when the change was cut off; its journal is the one that is ended.
     yes
         Do not ask before memory of the device is written, or the change is forgotten.
     options
         Any option of the bus string, as a flag.
     """
-    from motorbus import session
-
     if not bus:
-        return _listed(output, more=bool(alone or forget or dry_run or options))
-    family = target(bus).family
-    with opened(target(bus).bus, options, output) as opening:
-        change = session.unfinished(opening)
+        return _listed(output, more=bool(alone or forget or of or dry_run or options))
+    if forget:
+        return _given_up(of or bus, options, output, yes=yes)
+    with _journal_elsewhere(of) as kept, opened(target(bus).bus, options, output) as opening:
+        change = _unfinished(opening, kept)
         if change is None:
-            output.document(SCHEMA, {"bus": bus, "outcome": None})
-            output.text(f"nothing is unfinished on {bus}")
-            return Exit.OK
-        offers(family, "recover")
+            return _nothing(of or bus, output)
+        offers(opening.family, "recover")
         extra = {"alone": True} if alone else {}
         takes(face(opening, change.node), "recover", extra)
         if dry_run:
             _rehearsed(opening, change, output, **extra)
             return Exit.OK
-        what = _called(change)
-        consent_to(f"forget {what}" if forget else f"finish {what}, or take it back", output, yes=yes)
-        outcome = _forgotten(opening, change) if forget else _ended(opening, change, output, **extra)
-    told = {"new": "finished", "old": "taken back"}.get(outcome, "forgotten")
+        consent_to(f"finish {_called(change)}, or take it back", output, yes=yes)
+        outcome = carried_out(
+            opening, change.node, "recover", change.verb, change.facts, output=output, **extra
+        )
+        if kept is not None:
+            kept(Journal(change.verb, OUTCOME, {"outcome": outcome}))
+    return _told(bus, change, outcome, output)
+
+
+@contextmanager
+def _journal_elsewhere(of: str) -> Iterator[BusJournal | None]:
+    """The journal of a port by the name it had, while nobody else uses that name."""
+    from motorbus import session
+    from motorbus.link.lock import PortLock
+
+    kept = session.journal_of(of) if of else None
+    if kept is None:
+        yield None
+        return
+    with PortLock(session.lock_name(of, {})):
+        yield kept
+
+
+def _unfinished(bus: Bus, kept: BusJournal | None) -> Change | None:
+    from motorbus import session
+
+    return session.unfinished(bus) if kept is None else kept.unfinished()
+
+
+def _nothing(bus: str, output: Output) -> Exit:
+    output.document(SCHEMA, {"bus": bus, "outcome": None})
+    output.text(f"nothing is unfinished on {bus}")
+    return Exit.OK
+
+
+def _told(bus: str, change: Change, outcome: str, output: Output) -> Exit:
+    told = {"new": "finished", "old": "taken back"}.get(outcome, outcome)
     output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome})
     output.text(f"{told}: {_called(change)}")
     return Exit.OK
+
+
+def _given_up(bus: str, options: Mapping[str, str], output: Output, *, yes: bool) -> Exit:
+    """Close the journal as it is; the port need not be there any more."""
+    with ExitStack() as stack:
+        kept: Any = stack.enter_context(_journal_elsewhere(bus))
+        if kept is None:
+            kept = stack.enter_context(opened(bus, options, output)).journal
+        change = kept.unfinished()
+        if change is None:
+            return _nothing(bus, output)
+        consent_to(f"forget {_called(change)}", output, yes=yes)
+        kept(Journal(change.verb, OUTCOME, {"outcome": "forgotten"}))
+    return _told(bus, change, "forgotten", output)
 
 
 def _listed(output: Output, *, more: bool) -> Exit:
@@ -120,17 +172,6 @@ def _called(change: Change) -> str:
     facts = change.facts
     to = f"{facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
     return f"the change of #{change.node} to {to}"
-
-
-def _ended(bus: Bus, change: Change, output: Output, **extra: object) -> str:
-    outcome: str = carried_out(bus, change.node, "recover", change.verb, change.facts, output=output, **extra)
-    return outcome
-
-
-def _forgotten(bus: Bus, change: Change) -> str:
-    assert bus.journal is not None
-    bus.journal(Journal(change.verb, OUTCOME, {"outcome": "forgotten"}))
-    return "forgotten"
 
 
 def _rehearsed(bus: Bus, change: Change, output: Output, **extra: object) -> None:

@@ -17,7 +17,7 @@ from motorbus.core.operation import Progress
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from motorbus.cli.output import Bar
     from motorbus.cli.target import Target
@@ -84,9 +84,11 @@ def scan(
     notes: list[str] = []
     with opened(wanted.bus, options, output) as opening:
         operation = opening.family.scan(asked, tried or (opening.rate,))
+        tell = output.note if len(tried) > 1 else None  # it takes a while: who answers is told at once
         try:
             with output.progress("scanning") as bar:
-                found = opening.run(operation, report=partial(_heard, wanted.family.name, early, bar, notes))
+                told = partial(_heard, wanted.family.name, early, bar, notes, tell=tell)
+                found = opening.run(operation, report=told)
         finally:
             _show(wanted, early if found is None else found, notes, output)
         if not found:
@@ -140,8 +142,18 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
         ) from None
 
 
-def _heard(family: str, found: list[Found], bar: Bar, notes: list[str], event: object) -> None:
+def _heard(
+    family: str,
+    found: list[Found],
+    bar: Bar,
+    notes: list[str],
+    event: object,
+    *,
+    tell: Callable[[str], None] | None = None,
+) -> None:
     listen(event, found, bar)
+    if isinstance(event, Found) and tell is not None and not bar.shown:
+        tell(_early(event))
     say = faces.offer(family, "say")
     text = say(event) if say is not None else ""
     if text and text not in notes:
@@ -152,7 +164,7 @@ def listen(event: object, found: list[Found], bar: Bar) -> None:
     """Take note of what a scan reports on its way: an early result, or how far it has come."""
     if isinstance(event, Found):
         found.append(event)
-        bar.say(f"#{event.node} answers at {event.rate} bit/s")
+        bar.say(_early(event))
     elif isinstance(event, Progress):
         bar.advance(event.done, event.total, event.what)
 
@@ -170,6 +182,10 @@ def mixed_firmware(found: Iterable[Found], family: Family) -> list[str]:
         for model, by_version in versions.items()
         if len(by_version) > 1
     ]
+
+
+def _early(one: Found) -> str:
+    return f"#{one.node} answers at {one.rate} bit/s"
 
 
 def _model(one: Found) -> str:

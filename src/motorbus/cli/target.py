@@ -90,7 +90,7 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
             output.note(f"note: {warning}")
         try:
             yield found
-        except MotorbusError as error:
+        except (MotorbusError, KeyboardInterrupt) as error:
             in_words_of_the_shell(error, found.family)
             raise
         finally:

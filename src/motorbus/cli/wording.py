@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING, Final
 
 from motorbus.cli import faces
+from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from motorbus.core.family import Family
-    from motorbus.errors import MotorbusError
 
 COMMANDS: Final[Mapping[str, str]] = {
     "stop()": "`motorbus stop`",
@@ -31,10 +31,13 @@ _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b")
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 
-def in_words_of_the_shell(error: MotorbusError, family: Family) -> None:
-    """Name commands where this error names methods; what has no command stays as it is."""
-    for part in _PARTS:
+def in_words_of_the_shell(error: BaseException, family: Family) -> None:
+    """Name commands where this error and its notes name methods; what has no command stays as it is."""
+    for part in _PARTS if isinstance(error, MotorbusError) else ():
         setattr(error, part, shell_words(getattr(error, part), family))
+    notes = getattr(error, "__notes__", None)
+    if notes:
+        notes[:] = [shell_words(note, family) for note in notes]
 
 
 def shell_words(text: str, family: Family) -> str:

@@ -100,6 +100,10 @@ def test_an_order_that_cannot_work_says_which_setting_blocks_it(run: Run, servo:
     ran = run("feetech", "drive", f"{servo.url}#3", "velocity=-1", "--yes")
     assert ran.code == 1
     assert "took the order velocity=-1, and will not obey it: its torque is off" in ran.err
+    assert "give the order again, for torque comes on at rest" in ran.err
+    assert servo[3].memory["goal_velocity"] != 0
+    assert run("torque", "on", f"{servo.url}#3").code == 0
+    assert servo[3].memory["goal_velocity"] == 0
 
 
 @pytest.mark.parametrize(

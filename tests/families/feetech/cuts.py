@@ -116,6 +116,7 @@ class World:
     servo: Servo = field(init=False)
     journal: BusJournal = field(init=False)
     now: float = 0.0
+    notes: list[str] = field(default_factory=list)
     link: Doomed = field(init=False)
 
     def __post_init__(self) -> None:
@@ -177,7 +178,7 @@ class World:
         bus.run(iter(Alone(changed(self.job(), node, Course(self.job())))))
 
     def job(self) -> Job:
-        return Job(self.verb, self.old, self.new, self.servo.read(0, 40, self.devices.now), (STRANGER,))
+        return Job(self.verb, self.old, self.new, bytes(self.servo.memory.live[:40]), (STRANGER,))
 
     def recovery(self, bus: Bus, *, alone: bool = False) -> str | None:
         """What the next host does: end what the journal calls unfinished."""

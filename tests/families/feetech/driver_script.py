@@ -86,32 +86,6 @@ def image(id: int = 3, **changes: int) -> bytes:
     return bytes(values)
 
 
-def _at(**changes: int) -> dict[str, int]:
-    return changes
-
-
-HEADS = {
-    "sts": _at(),
-    "smbl": _at(at_0=2, at_1=45, at_3=8, at_4=44),
-    "smcl": _at(at_0=1, at_1=10, at_3=6, at_4=12, at_31=0, at_33=0)
-    | _at(at_34=0, at_35=0, at_36=200, at_37=20, at_38=200, at_39=80),
-    "scs": _at(at_0=0, at_1=10, at_2=1, at_3=5, at_4=4, at_11=3, at_12=0xFF, at_18=0),
-    "scs2": _at(at_0=3, at_1=25, at_2=1, at_3=9, at_4=15, at_11=3, at_12=0xFF, at_18=0, at_34=0),
-    "hls": _at(at_0=3, at_1=43, at_3=10, at_4=18, at_7=0),
-}
-"""Map -> what makes an image one of this map: firmware, model, limits over everything, no offset, position mode."""
-
-
-def eeprom(name: str, id: int = 3, **changes: int) -> bytes:
-    """Registers 0 to 39 of a servo of this map."""
-    return image(id, **{**HEADS[name], **changes})
-
-
-def met(name: str, id: int = 3, **changes: int) -> Node:
-    """A servo of this map that has been asked already."""
-    return prepared(id, **{**HEADS[name], **changes})
-
-
 def prepares(id: int = 3, **changes: int) -> Line:
     """The one READ that tells identity and settings."""
     return reads(id, 0, *image(id, **changes))

@@ -1,7 +1,7 @@
-"""Servos of every map for scripts of bytes: what they have in registers 0 to 39, with a few values said by name.
+"""Servos of every map for scripts of bytes: what they have in registers 0 to 39, and simulated models of each map.
 
-Values lie where the rows of the map say; the packets around them are made by hand. `MODELS` are simulated models of
-each map.
+Their bytes are made by hand, as the packets around them: no row of a table says where they lie, unless a test changes
+a value by the name of its row.
 """
 
 from __future__ import annotations
@@ -15,16 +15,8 @@ from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.identity import learn
 from motorbus.families.feetech.driver.node import IMAGE
 from motorbus.families.feetech.table import TABLES
-from tests.families.feetech.driver_script import Line, reads
+from tests.families.feetech.driver_script import Line, image, reads
 
-_HEADS: Final = {
-    "sts": (3, 10, 0, 9, 3),
-    "smbl": (2, 45, 0, 8, 44),
-    "smcl": (1, 10, 0, 6, 12),
-    "scs": (0, 10, 1, 5, 4),
-    "scs2": (3, 25, 1, 9, 15),
-    "hls": (3, 43, 0, 10, 18),
-}
 MODELS: Final = {
     "sts": "sts3215",
     "smbl": "sm85blhv",
@@ -34,33 +26,47 @@ MODELS: Final = {
     "hls": "hls3925",
 }
 _RATES: Final = {"smbl": "115200", "smcl": "115200"}
-_LIMITS: Final = {"sts": (0, 4095), "smbl": (0, 4095), "smcl": (0, 4095), "hls": (0, 4095)}
 
 
-def eeprom(name: str, **values: int) -> bytes:
-    """Registers 0 to 39 of servo 3 with this map: as shipped where that is known, but for raw `values` by name."""
-    low, high = _LIMITS.get(name, (20, 1003))
-    told = {"id": 3, "min_position_limit": low, "max_position_limit": high, **values}
-    data = bytearray(IMAGE)
-    for row in TABLES[name].values():
-        if row.address < IMAGE:
-            raw = told.get(
-                row.name, row.default if row.default is not None else row.low if row.low > 0 else 0
-            )
-            data[row.address : row.address + row.size] = row.encode(raw)
-    data[:5] = bytes(_HEADS[name])
+def _at(**changes: int) -> dict[str, int]:
+    return changes
+
+
+HEADS: Final = {
+    "sts": _at(),
+    "smbl": _at(at_0=2, at_1=45, at_3=8, at_4=44),
+    "smcl": _at(at_0=1, at_1=10, at_3=6, at_4=12, at_31=0, at_33=0)
+    | _at(at_34=0, at_35=0, at_36=200, at_37=20, at_38=200, at_39=80),
+    "scs": _at(at_0=0, at_1=10, at_2=1, at_3=5, at_4=4, at_11=3, at_12=0xFF, at_18=0),
+    "scs2": _at(at_0=3, at_1=25, at_2=1, at_3=9, at_4=15, at_11=3, at_12=0xFF, at_18=0, at_34=0),
+    "hls": _at(at_0=3, at_1=43, at_3=10, at_4=18, at_7=0),
+}
+"""Map -> what makes an image one of this map: firmware, model, limits over everything, no offset, position mode."""
+
+
+def eeprom(name: str, id: int = 3, **changes: int) -> bytes:
+    """Registers 0 to 39 of a servo of this map, made by hand.
+
+    But for `changes`: bytes by address, as `at_33=1`, and raw values by the name of the row.
+    """
+    by_address = {key: byte for key, byte in changes.items() if key.startswith("at_")}
+    data = bytearray(image(id, **{**HEADS[name], **by_address}))
+    for row_name in changes.keys() - by_address.keys():
+        row = TABLES[name][row_name]
+        data[row.address : row.address + row.size] = row.encode(changes[row_name])
+    assert len(data) == IMAGE
     return bytes(data)
 
 
-def prepares_as(name: str, **values: int) -> Line:
+def prepares_as(name: str, id: int = 3, **changes: int) -> Line:
     """The READ that tells what such a servo is and how it is set."""
-    return reads(3, 0, *eeprom(name, **values))
+    return reads(id, 0, *eeprom(name, id, **changes))
 
 
-def met(name: str, **values: int) -> Node:
+def met(name: str, id: int = 3, **changes: int) -> Node:
     """Such a servo, asked already."""
-    node = Node(3)
-    learn(node, eeprom(name, **values))
+    node = Node(id)
+    learn(node, eeprom(name, id, **changes))
     return node
 
 

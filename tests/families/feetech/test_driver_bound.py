@@ -11,7 +11,8 @@ from motorbus.families.feetech import driver
 from motorbus.families.feetech.driver import Powerless
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
 from motorbus.families.feetech.table import HLS
-from tests.families.feetech.driver_script import Line, Played, eeprom, met, play, reads, unheard, writes
+from tests.families.feetech.driver_script import Line, Played, play, reads, unheard, writes
+from tests.families.feetech.maps import eeprom, met
 
 COUNT = tau / 4096
 GOAL = 1024 * COUNT

@@ -266,6 +266,7 @@ def test_turns_that_were_counted_are_to_be_forgotten_first() -> None:
         play(calibrate(Node(3)), counting, *pose(6015, 0))
     assert "bit 4 of its phase register" in caught.value.cause
     assert "clear_turns()" in caught.value.advice
+    assert "set_many_turns(False)" in caught.value.advice
     play(
         calibrate(Node(3)),
         *(counting, *pose(600, 0), OFF, OPEN, *pose(600, 0), MIDDLE, OFF, *pose(2048, -1448), *DONE),

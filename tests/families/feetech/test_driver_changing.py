@@ -6,6 +6,7 @@ import pytest
 
 from motorbus.core.operation import Data
 from motorbus.errors import LinkLost, NoReply
+from motorbus.families.feetech.driver.placing import called
 from motorbus.link.memory import MemoryLink
 from tests.families.feetech.cuts import NEVER, VERBS, Cut, Doomed, World
 
@@ -35,8 +36,9 @@ def interrupted(verb: str, interrupting: Interrupting, monkeypatch: pytest.Monke
     world = World(verb, {})
     with monkeypatch.context() as patched:
         patched.setattr(Doomed, "write", lambda link, data: interrupting(link, data))
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt) as caught:
             world.run(world.change)
+    world.notes = caught.value.__notes__
     return world
 
 
@@ -46,6 +48,7 @@ def test_ctrl_c_at_any_packet(verb: str, monkeypatch: pytest.MonkeyPatch) -> Non
         world = interrupted(verb, Interrupting(at), monkeypatch)
         assert world.faults(None) == [], at
         assert world.link.rate == world.rate
+        assert world.notes == [f"the servo is {called(world.job(), world.place)}, and locked"]
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -16,7 +16,6 @@ from tests.families.feetech.driver_script import (
     Line,
     Played,
     low_high,
-    met,
     play,
     prepares,
     reads,
@@ -24,6 +23,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 SCS_COUNT = radians(300) / 1024

@@ -12,9 +12,7 @@ from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.identity import learn
 from tests.families.feetech.driver_script import (
     Line,
-    eeprom,
     image,
-    met,
     packet,
     play,
     prepared,
@@ -22,6 +20,7 @@ from tests.families.feetech.driver_script import (
     sync_reads,
     unheard,
 )
+from tests.families.feetech.maps import eeprom, met
 
 COUNT = tau / 4096
 SCS_COUNT = radians(300) / 1024

@@ -10,7 +10,8 @@ from motorbus.core.operation import Effect
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.feetech.driver import Node, mode, set_mode
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
-from tests.families.feetech.driver_script import HEADS, Line, eeprom, met, play, reads, watch, writes
+from tests.families.feetech.driver_script import Line, play, reads, watch, writes
+from tests.families.feetech.maps import HEADS, eeprom, met
 
 SCS_COUNT = radians(300) / 1024
 MODE_AT = {"sts": 33, "smbl": 33, "smcl": 35, "hls": 33}

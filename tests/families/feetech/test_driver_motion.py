@@ -14,7 +14,6 @@ from motorbus.families.feetech.table import CONTROL, STS, TABLES
 from tests.families.feetech.driver_script import (
     Line,
     low_high,
-    met,
     play,
     prepared,
     prepares,
@@ -23,6 +22,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 ON = writes(3, 40, 1)

@@ -11,7 +11,8 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.node import as_nodes
 from motorbus.families.feetech.table import CONTROL, STS, TABLES, Control, Mode
-from tests.families.feetech.driver_script import met, prepared
+from tests.families.feetech.driver_script import prepared
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 

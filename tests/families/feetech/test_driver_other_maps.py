@@ -14,15 +14,8 @@ from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.feetech import driver
 from motorbus.families.feetech.driver import Node, Promise
 from motorbus.families.feetech.table import TABLES
-from tests.families.feetech.driver_script import (
-    Line,
-    eeprom,
-    met,
-    play,
-    reads,
-    watch,
-    writes,
-)
+from tests.families.feetech.driver_script import Line, play, reads, watch, writes
+from tests.families.feetech.maps import eeprom, met
 
 OTHERS = [name for name in TABLES if name != "sts"]
 COUNT = tau / 4096

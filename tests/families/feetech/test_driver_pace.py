@@ -9,7 +9,7 @@ import pytest
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.pace import burst, ramp_of
 from motorbus.families.feetech.table import HLS, SCS, STS
-from tests.families.feetech.driver_script import met
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 

@@ -11,7 +11,8 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.rest import at_rest, held, held_within, with_bound
 from motorbus.families.feetech.table import CONTROL, HLS, STS, TABLES, Mode
-from tests.families.feetech.driver_script import met, play, prepared, reads
+from tests.families.feetech.driver_script import play, prepared, reads
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 

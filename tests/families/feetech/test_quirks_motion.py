@@ -45,7 +45,7 @@ def test_quirk_10_a_homing_offset_never_overflows(encoder: int) -> None:
 def test_quirk_10_a_servo_that_counts_turns_is_not_calibrated_over_its_turn() -> None:
     """The same with bit 4 of the phase set, where the position leaves 0 to 4095: refused, and told what to do.
 
-    huggingface/lerobot#3373 clears that bit by itself; here the phase register is the servo's own.
+    huggingface/lerobot#3373 clears that bit by itself; here that is a verb of its own, and somebody's decision.
     """
     with bench() as there:
         simulated, servo = there.simulated(), there.servo()
@@ -55,6 +55,8 @@ def test_quirk_10_a_servo_that_counts_turns_is_not_calibrated_over_its_turn() ->
         with pytest.raises(RequestError, match="6015.*not within one turn"):
             servo.calibrate()
         assert bytes(simulated.memory.live[:40]) == before
+        servo.set_many_turns(False)
+        assert servo.calibrate().raw_old_offset == 0
 
 
 @pytest.mark.parametrize("name", [name for name, table in TABLES.items() if "homing_offset" in table])

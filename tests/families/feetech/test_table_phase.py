@@ -11,7 +11,7 @@ from motorbus.families.feetech.table import (
     velocity_scale,
     zero_is_maximum,
 )
-from motorbus.families.feetech.table.phase import many_turns_are_told
+from motorbus.families.feetech.table.phase import many_turns_are_told, with_many_turns_told
 
 SHIPPED = 12
 
@@ -50,6 +50,13 @@ def test_the_rows_name_the_bits_of_their_series() -> None:
     assert set(PHASE_BITS["scs"]) == {0, 3, 5, 6}
     assert set(PHASE_BITS["hls"]) == set(range(8))
     assert PHASE_BITS["smcl"] == {}
+
+
+def test_that_bit_alone_is_set_and_cleared() -> None:
+    for phase in range(256):
+        on, off = with_many_turns_told(phase, True), with_many_turns_told(phase, False)
+        assert (on ^ off, on & off, phase in (on, off)) == (16, phase & 0xEF, True)
+        assert (many_turns_are_told(on), many_turns_are_told(off)) == (True, False)
 
 
 @pytest.mark.parametrize(

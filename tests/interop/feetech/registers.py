@@ -199,6 +199,9 @@ OURS: Final[dict[str, str]] = {
 MODEL: Final = ("model", "model_number")
 IDENTITY: Final = ("id", "baudrate", "baud_rate", "response_status_level")
 """Registers whose change is felt at once: `controllers` writes them, each in its own way."""
+UNANSWERED: Final = "id"
+"""Where SYNC READ is not known, the register whose call shows it; the others would time out in the same way, and are
+answered by the servos that know it."""
 _SAMPLES: Final = {
     "max_voltage_limit": 100,
     "min_voltage_limit": 30,
@@ -268,7 +271,10 @@ def _signs(register: Register, row: Entry) -> list[str]:
 
 
 def steps(register: Register, kind: Kind) -> Iterator[Step]:
-    """Every call of one register on servos of this kind, but for those that change the identity."""
+    """Every call of one register on servos of this kind, but for those that change the identity.
+
+    Where SYNC READ is not known, the same silence is not waited for register by register.
+    """
     why = " ".join(differences(register, kind))
     samples = [register.unit.bytes(_sample(register), register.size)] if _settable(register, kind) else [None]
     row = row_at(register, kind)
@@ -315,7 +321,7 @@ def _reading(register: Register, kind: Kind, sample: list[int] | None, why: str)
             found.append(Call("controller", name, (1,), values[:1]))
         elif CONTROL[kind.map].sync_read:
             found.append(Call("controller", name, (NODES,), values))
-        else:
+        elif register.name == UNANSWERED:
             found.append(Call("controller", name, (NODES,), Raised("timed out")))
     before = {(node, register.address): sample for node in NODES} if sample else {}
     return Step(tuple(found), before=before, why=why)

@@ -1,4 +1,4 @@
-"""`motorbus feetech many-turns`: whether a servo counts over many turns, and making it do so, goals and position alike."""
+"""`motorbus feetech many-turns`: over how many turns a servo counts, goals and position alike."""
 
 from __future__ import annotations
 

@@ -133,7 +133,8 @@ def _heeds(one: Servo) -> dict[str, Any]:
 `motorbus feetech mode` sets the mode, `motorbus torque on` the torque, which
 comes on at rest. What turns without end needs --yes, and so does a step of
 more than 180 degrees; `motorbus stop` or an order of 0 ends it. Ends with exit
-code 1 and the reason where a setting keeps the servo from obeying.
+code 1 and the reason where a setting keeps the servo from obeying. What a limp
+servo was told is forgotten when its torque comes on: nothing jumps.
 
 Examples:
 
@@ -214,7 +215,8 @@ def _blockers(one: Servo) -> list[str]:
 def _powerless(node: int, order: str, said: Sequence[str]) -> MotionError:
     return MotionError(
         f"#{node} took the order {order}, and will not obey it: {'; '.join(said)}",
-        advice="`motorbus feetech mode` says this without an order",
+        advice="mend that, then give the order again, for torque comes on at rest; `motorbus feetech mode` says this "
+        "without an order",
         node=node,
     )
 

@@ -130,11 +130,10 @@ def action(
     wanted = _ours(target(bus))
     with opened(wanted.bus, options, output) as opening:
         rehearsal = dry.DryBus(opening)
-        carrier = rehearsal if dry_run else opening
         for node in wanted.nodes:
-            face(carrier, node).action()
+            face(rehearsal.apart() if dry_run else opening, node).action()
         if not wanted.nodes:
-            carrier.run(_action_all(opening))
+            (rehearsal if dry_run else opening).run(_action_all(opening))
         if dry_run:
             dry.show(rehearsal, output)
             return Exit.OK

@@ -218,7 +218,7 @@ def test_every_step_of_a_write_can_be_cut(commits: float, torn: str) -> None:
     expected = [*new[:done], *middle, *old[done + len(middle) :]]
     host.wait(0.1)
     assert list(servo.memory.stored[9:13]) == expected
-    assert list(host.bus.nodes[1].read(9, 4, host.now)) == expected
+    assert list(host.bus.nodes[1].memory.read(9, 4)) == expected
     assert sum(servo.memory.wear.values()) == done + len(middle)
     assert servo.locked  # as after any power-up
     assert host.write(1, 41, 7) == ["FF FF 01 02 00 FC"]  # it happens once

@@ -30,7 +30,7 @@ def test_every_model_that_has_a_number_can_be_simulated() -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_what_a_model_tells_leads_back_to_it_and_to_its_map(name: str) -> None:
     servo = simulate((1,), name).nodes[1]
-    major, minor, end, *number = servo.read(0, 5, 0.0)
+    major, minor, end, *number = servo.memory.read(0, 5)
     found = choose((major, minor), (number[0], number[1]), end)
     assert found.model is not None
     assert (found.model.name.lower(), found.table) == (name, servo.model.table.name)

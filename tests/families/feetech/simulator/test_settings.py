@@ -373,7 +373,7 @@ def test_a_single_direction_bit_turns_drive_and_feedback(name: str, bit: int) ->
 def test_the_units_of_every_map_are_those_of_its_rows() -> None:
     for name, model in USUAL.items():
         servo = Host((1,), model).bus.nodes[1]
-        assert servo.velocity_unit == (50 if name == "hls" else 1)
+        assert servo.asked.unit == (50 if name == "hls" else 1)
 
 
 def test_a_read_of_everything_works_in_every_mode() -> None:

@@ -21,17 +21,24 @@ def changed(job: Job, node: Node, course: Course) -> Operation[None]:
 
     Raises what has failed, with a note of what became of it, unless it came to its new place all the same.
     """
-    ends: list[str] = []
+    ends: list[str | MotorbusError] = []
     try:
         yield from afterwards(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
-    except MotorbusError as error:
-        if ends[-1:] != ["new"]:
-            if ends:
-                error.add_note(ends[-1])
-            raise
+    except BaseException as error:
+        if isinstance(error, MotorbusError) and ends == ["new"]:
+            return
+        for end in ends:
+            error.add_note(_became(job, end))
+        raise
 
 
-def _attempt(job: Job, node: Node, course: Course, ends: list[str]) -> Operation[None]:
+def _became(job: Job, end: str | MotorbusError) -> str:
+    if isinstance(end, MotorbusError):
+        return f"the change is unfinished, recover() ends it: {end.summary}"
+    return f"the servo is {called(job, job.new if end == 'new' else job.old)}, and locked"
+
+
+def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
     yield from course.reach(INTENT)
     there = yield from rewritten(job, node, job.new, course)
     yield from locked(job, there)
@@ -49,12 +56,8 @@ def _attempt(job: Job, node: Node, course: Course, ends: list[str]) -> Operation
     ends.append("new")
 
 
-def _settled(job: Job, course: Course, ends: list[str]) -> Operation[None]:
+def _settled(job: Job, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
     """Whatever has happened: bring it to one of both places, and set the rate of the bus back."""
     if course.reached and not ends:
-        found = yield from outcome(recovered(job, course))
-        if isinstance(found, MotorbusError):
-            ends.append(f"the change is unfinished, recover() ends it: {found.summary}")
-        else:
-            ends.append("new" if found == "new" else f"the servo is {called(job, job.old)}, and locked")
+        ends.append((yield from outcome(recovered(job, course))))
     yield from Tune(job.old.rate)

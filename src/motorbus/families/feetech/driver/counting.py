@@ -21,12 +21,12 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Operation, Rank, Timeout, afterwards, outcome
-from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.core.operation import Effect, Exchange, Operation, Rank, Timeout, afterwards, outcome
+from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.identity import prepare, writable
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.identity import learn, writable
+from motorbus.families.feetech.driver.node import IMAGE, Node
 from motorbus.families.feetech.driver.orders import unheeded
 from motorbus.families.feetech.table import CONTROL, Mode
 from motorbus.families.feetech.table.phase import many_turns_are_told, with_many_turns_told
@@ -79,10 +79,10 @@ class _Change(NamedTuple):
 
 def many_turns(node: Node) -> Operation[ManyTurns]:
     """How this servo counts, asked anew; changes nothing. Raises RequestError where its map has one turn only."""
-    yield from prepare(node)
+    image = yield from _image(node)
     table = yield from writable(node)
     _refuse_one_turn(node, table)
-    return (yield from _counts(node, table))
+    return (yield from _counts(node, table, image))
 
 
 def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | None = None) -> Operation[Recounted]:
@@ -99,26 +99,39 @@ def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | None = No
     """
     if not isinstance(on, bool):
         raise RequestError(f"{on!r} is neither True nor False", advice="nothing was sent", node=node.node)
-    yield from prepare(node)
+    image = yield from _image(node)
     table = yield from writable(node)
     _refuse_one_turn(node, table)
     if node.known_mode is not Mode.POSITION:
         raise unheeded(node, Mode.POSITION, "cannot be told over how many turns it counts")
-    before = yield from _counts(node, table)
+    before = yield from _counts(node, table, image)
     raws = _limits(node, table, on, limits, before)
-    yield from eeprom.unlocked(node, table, lambda: _recounted(node, table, on, raws, before.raw_phase))
-    yield from prepare(node)
-    after = yield from _counts(node, table)
+    yield from eeprom.unlocked(node, table, lambda: _recounted(node, table, on, raws, image))
+    after = yield from _counts(node, table, (yield from _image(node)))
     return Recounted(before, after, f"it is limp now; {_FORGETS}" if on else "it is limp now")
 
 
-def _counts(node: Node, table: Table) -> Operation[ManyTurns]:
+def _image(node: Node) -> Exchange[bytes]:
+    """Registers 0 to 39, from which the node learns what it is and how it is set."""
+
+    def take(image: bytes) -> bytes:
+        learn(node, image)
+        return image
+
+    return read_block(node, 0, IMAGE, take)
+
+
+def _counts(node: Node, table: Table, image: bytes) -> Exchange[ManyTurns]:
     row, position = table["phase"], table["present_position"]
-    phase = yield from read_block(node, row.address, row.size, row.decode)
-    raw = yield from read_block(node, PRESENT, position.size, position.decode)
-    assert node.settings is not None
-    told = many_turns_are_told(phase, table.name)
-    return ManyTurns(node.settings.many_turns, told, node.limits, float(node.value(position, raw)), phase)
+
+    def take(data: bytes) -> ManyTurns:
+        assert node.settings is not None
+        phase = row.decode(image[row.address : row.address + row.size])
+        here = float(node.value(position, position.decode(data)))
+        told = many_turns_are_told(phase, table.name)
+        return ManyTurns(node.settings.many_turns, told, node.limits, here, phase)
+
+    return read_block(node, PRESENT, position.size, take)
 
 
 # -- what is to be done --------------------------------------------------------------------------------------
@@ -188,20 +201,16 @@ def _widest(node: Node, table: Table) -> str:
 # -- doing it ------------------------------------------------------------------------------------------------
 
 
-def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], seen: int) -> Operation[None]:
+def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], image: bytes) -> Operation[None]:
     row, low, high = (table[name] for name in ("phase", "min_position_limit", "max_position_limit"))
-    phase = yield from read_block(node, row.address, row.size, row.decode, timeout=Timeout.STORE)
-    if phase != seen:
-        raise VerificationFailed(
-            f"node {node.node}: its phase register reads {phase}, and read {seen} just before",
-            expected="the same twice, for all its other bits are to stay as they are",
-            cause="another program writes to this servo, or two servos answer to this id",
-            advice="see that nobody else uses this bus (duplicates() looks for two); nothing was written",
-            node=node.node,
-        )
-    held = yield from read_block(node, low.address, low.size + high.size, bytes, timeout=Timeout.STORE)
+    seen = image[low.address : row.address + row.size]
+    again = yield from read_block(node, low.address, len(seen), bytes, timeout=Timeout.STORE)
+    if again != seen:
+        raise _unsteady(node, low.address, seen, again)
+    phase = image[row.address]
     bit = _Change(row.address, row.encode(phase), row.encode(with_many_turns_told(phase, on)))
-    bounds = _Change(low.address, held, low.encode(limits[0]) + high.encode(limits[1]))
+    wide = low.size + high.size
+    bounds = _Change(low.address, seen[:wide], low.encode(limits[0]) + high.encode(limits[1]))
     yield from _changed(node, table["lock"].address, (bit, bounds) if on else (bounds, bit))
 
 
@@ -221,8 +230,7 @@ def _attempt(
         for change in changes:
             begun.append(change)
             yield from eeprom.stored(node, Block(change.address, change.after, Effect.PERSISTENT))
-        if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) != b"\0":
-            raise _lost_supply(node)
+        yield from eeprom.still_open(node, lock)
         begun.clear()
     except BaseException as error:
         trouble.append(error)
@@ -254,11 +262,12 @@ def _restored(node: Node, lock: int, change: _Change) -> Operation[None]:
     yield from eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
 
 
-def _lost_supply(node: Node) -> MotorbusError:
-    return OutcomeUnknown(
-        f"node {node.node} has closed its lock by itself: it has lost its supply in the middle of the change",
-        expected="an open lock",
-        cause="a loose supply cable, or somebody switched it off",
-        advice="see that its supply stays on, then try again",
+def _unsteady(node: Node, address: int, seen: bytes, again: bytes) -> VerificationFailed:
+    return VerificationFailed(
+        f"node {node.node}: registers {address} to {address + len(seen) - 1} read different the second time",
+        received=f"{seen.hex(' ')}, then {again.hex(' ')}",
+        expected="the same twice, for all other bits of its phase register are to stay as they are",
+        cause="another program writes to this servo, or two servos answer to this id",
+        advice="see that nobody else uses this bus (duplicates() looks for two); nothing was changed",
         node=node.node,
     )

@@ -57,14 +57,14 @@ def _opened(
         yield from disable_torque(node)
         yield from _put(node, _lock(lock, 0))
         done = yield from work()
-        yield from _still_open(node, lock)
+        yield from still_open(node, lock)
         return done
     except BaseException as error:
         trouble.append(error)
         raise
 
 
-def _still_open(node: Node, lock: int) -> Operation[None]:
+def still_open(node: Node, lock: int) -> Operation[None]:
     """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
     right, and keeps none. Raises OutcomeUnknown."""
     found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)

@@ -83,9 +83,11 @@ def prepare(node: Node) -> Exchange[Identity]:
 
 def known(node: Node) -> Operation[Table]:
     """The register map of this servo; asks it when its settings are not known yet."""
-    if node.table is None or node.settings is None:
-        yield from prepare(node)
-    assert node.table is not None
+    if node.table is not None and node.settings is not None:
+        return node.table
+    identity = yield from prepare(node)
+    if node.table is None:  # who answered stands for a servo and is none, as in a dry run: its answer says so
+        return TABLES[identity.table]
     return node.table
 
 

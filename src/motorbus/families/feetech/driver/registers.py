@@ -28,6 +28,8 @@ from motorbus.families.feetech.driver.orders import (
 )
 from motorbus.families.feetech.driver.torque import disable_torque
 
+_IDLE: Final = b"\0"
+_WAITING: Final = b"\1"
 _GAP: Final = 8
 """Bytes between two rows that are cheaper to read than to leave out: a request has 8, a reply 6, and a pause."""
 
@@ -142,7 +144,7 @@ def reg_write(node: Node, /, **values: Value) -> Operation[None]:
 
 def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
-    if not (yield from _waits(node, table)):
+    if (yield from _waits(node, table)) != _WAITING:
         raise OutcomeUnknown(
             f"node {node.node} holds no REG WRITE after one was sent",
             sent=exchange.request,
@@ -152,9 +154,11 @@ def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[No
         )
 
 
-def _waits(node: Node, table: Table) -> Operation[bool]:
-    waiting = yield from read_block(node, table["reg_write_pending"].address, 1, bytes)
-    return waiting != b"\0"
+def _waits(node: Node, table: Table) -> Exchange[bytes]:
+    """`_WAITING` or `_IDLE`. It is held against what it ought to be, which a dry run takes for granted."""
+    return read_block(
+        node, table["reg_write_pending"].address, 1, lambda told: _IDLE if told == _IDLE else _WAITING
+    )
 
 
 def action(node: Node) -> Runnable[None]:
@@ -180,7 +184,7 @@ def _met(node: Node) -> Operation[None]:
 def _seen(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
     yield from exchange
-    if (yield from _waits(node, table)):
+    if (yield from _waits(node, table)) != _IDLE:
         raise OutcomeUnknown(
             f"node {node.node} still holds a REG WRITE after ACTION was sent",
             sent=exchange.request,

@@ -125,8 +125,8 @@ def _know_the_turn(node: Node, raw: int, jump: float = 0.0) -> None:
     raise RequestError(
         f"node {node.node} counts its goals over many turns and tells its position within one (bit 4 of phase is "
         "clear), so nobody knows on which turn it stands, and a goal 'here' may be turns away",
-        advice="set_many_turns(True) makes it tell them; or move() it to a goal you know, or disable_torque() lets it go "
-        "limp; nothing was sent",
+        advice="set_many_turns(True) makes it tell its turns; or move() it to a goal you know, or let it go limp by "
+        "disable_torque(); nothing was sent",
         node=node.node,
     )
 

@@ -1,8 +1,8 @@
 """A servo as a thing in the world: what pushes it, blocks it, heats it and feeds it, and what it then does by itself.
 
 The registers say where the shaft ought to go; `effort.py` says how far the world lets it, `protection.py` what it
-trips over, `supply.py` when it loses its supply. Here a test pokes at all of that, and here is what the bus calls when
-the moment of such an event has come. `servo.py` builds the rest of the servo upon it.
+trips over. Here a test pokes at all of that, and here is what is called when the moment of such an event has come
+(`fate.py`, and `supply.py` for the supply that several servos share). `servo.py` builds the rest of the servo upon it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING
 
 from motorbus.core.plant import Drive, Motion, rest
 from motorbus.families.feetech.simulator.effort import Load, World, carried_out, loads
@@ -20,10 +19,6 @@ from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.motor import Settings
 from motorbus.families.feetech.simulator.protection import OVERLOAD, Protection
 from motorbus.families.feetech.simulator.switches import Switches
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.fate import Fate
-    from motorbus.families.feetech.simulator.supply import Supply
 
 
 class Body(ABC):
@@ -51,9 +46,9 @@ class Body(ABC):
         self._world = World()
         self._given = 0.0
         self._again = self._cut_at = self._cut_after = inf
-        self._fate: Fate | None = None
-        self._supply: Supply | None = None
-        self.protection = Protection(self)
+        self._expect: Callable[[float], None] | None = None
+        self._sag: Callable[[float], float] | None = None
+        self.protection = Protection(self.memory, switches)
 
     # What a test does to it.
 
@@ -80,7 +75,7 @@ class Body(ABC):
     @property
     def voltage(self) -> float:
         """What its supply is at this moment, in V; outside registers 15 to 14 it raises the voltage alarm."""
-        return self._voltage - self._supply.sag(self._now()) if self._supply else self._voltage
+        return self._voltage - self._sag(self._now()) if self._sag else self._voltage
 
     @voltage.setter
     def voltage(self, volts: float) -> None:
@@ -139,7 +134,7 @@ class Body(ABC):
         """Something has been given to the EEPROM."""
         if self._cut_after < inf:
             self._cut_at = self.memory.flash.moment_of(self._cut_after)
-            self._expect()
+            self._tell()
 
     def storing(self, at: float) -> float:
         """How much later (s) it acknowledges anything because its EEPROM is at work."""
@@ -164,11 +159,13 @@ class Body(ABC):
         """When that happens next; infinity when nothing will."""
         return min(self.protection.next, self._again, self._cut_at)
 
-    def join(self, fate: Fate) -> None:
-        """From now on its next moments belong to this."""
-        self._fate = fate
-        self._supply = fate.supply
-        self._expect()
+    def join(self, expect: Callable[[float], None], sag: Callable[[float], float] | None) -> None:
+        """From now on `expect` is told its next moment whenever that may be another one.
+
+        `sag` gives by how many V its supply is lower at a moment than without current; None: it never is.
+        """
+        self._expect, self._sag = expect, sag
+        self._tell()
 
     def live(self, at: float) -> None:
         """Its next moment has come."""
@@ -200,7 +197,7 @@ class Body(ABC):
 
     def fed(self, at: float) -> bool:
         """Whether its supply suffices at this moment."""
-        return self._supply is None or self._voltage - self._supply.sag(at) >= self.threshold
+        return self._sag is None or self._voltage - self._sag(at) >= self.threshold
 
     def _load(self, at: float) -> Load:
         return next(loads(self.motion, self.push, self._world, self._given, self.model.drive, at))
@@ -211,8 +208,8 @@ class Body(ABC):
         if push is None and not (world.torque and self._given):
             calm = (not motion.phases and not motion.cruise) or self.protection.lets_run(motion, drive)
         self.protection.changed(at, None if calm else loads(motion, push, world, self._given, drive, at))
-        self._expect()
+        self._tell()
 
-    def _expect(self) -> None:
-        if self._fate and (self._supply or self.next < inf):
-            self._fate.expect(self.next)
+    def _tell(self) -> None:
+        if self._expect:
+            self._expect(self.next)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
+from motorbus.families.feetech.simulator import effects
 from motorbus.families.feetech.simulator.chance import Chance
 from motorbus.families.feetech.simulator.collision import BITS, Speech, heard, overlapping
 from motorbus.families.feetech.simulator.fate import Fate
@@ -196,7 +197,7 @@ class FeetechBus:
         for id, data in order.items:
             named = self._ids().get(id, _NOBODY)
             for servo in self._hearing([*named, *self._by_second.get(id, _NOBODY)], at):
-                servo.write(order.address, data, at)
+                effects.write(servo, order.address, data, at)
 
     def _sync_read(self, packet: InstructionPacket, at: float) -> None:
         """One packet per listed servo, back to back, in the order of the list (FTServo_Linux, FTServo_Python)."""

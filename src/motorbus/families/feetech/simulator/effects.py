@@ -1,19 +1,15 @@
-"""What a servo does beyond keeping what is written to it: calibrate, turn on, change its mode, restore, clear.
+"""What a servo does when it is written to, and by order: keep it, calibrate, turn on, change its mode, restore, clear.
 
 Each function takes the servo and the moment. Who observed it is said with each; what nobody knows is a switch.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from motorbus.families.feetech.simulator.feedback import FEEDBACK
-from motorbus.families.feetech.simulator.power import power_up
+from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.settings import DECIDES_MOTION
 from motorbus.families.feetech.table import Middle, Mode
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.servo import Servo
 
 _CALIBRATE: Final = 128
 _COUNTS: Final = frozenset({"operating_mode", "homing_offset"})
@@ -21,7 +17,32 @@ _FACES: Final = frozenset({"phase", "angular_resolution"})
 _LIMITS: Final = frozenset({"min_position_limit", "max_position_limit"})
 
 
-def react(servo: Servo, names: frozenset[str], torque: int, at: float) -> None:
+def write(servo: Servo, address: int, data: bytes, at: float) -> float:
+    """Obey a WRITE; gives how much later (s) it is acknowledged because the EEPROM took its time."""
+    torque, strict = servo.memory["torque_enable"], servo.switches.out_of_range == "drop"
+    done = servo.memory.write(address, data, locked=servo.locked, strict=strict)
+    if done.names:
+        _react(servo, done.names, torque, at)
+    if done.stored:
+        servo.stores()
+    return servo.storing(at)
+
+
+def reg_write(servo: Servo, address: int, data: bytes) -> None:
+    """Keep a write for `action`. A power cycle forgets it."""
+    if servo.pending is None or servo.switches.reg_write_again == "replace":
+        servo.pending = address, data
+
+
+def action(servo: Servo, at: float) -> float:
+    """Carry out what REG WRITE left; nothing when there is nothing. Gives the delay as `write` does."""
+    if servo.pending is None:
+        return 0.0
+    (address, data), servo.pending = servo.pending, None
+    return write(servo, address, data, at)
+
+
+def _react(servo: Servo, names: frozenset[str], torque: int, at: float) -> None:
     """Do what a write of these rows orders; `torque` is the torque switch before it."""
     memory, control = servo.memory, servo.model.control
     if "id" in names or "second_id" in names:
@@ -68,14 +89,14 @@ def calibrate(servo: Servo, counts: int, at: float) -> None:
         memory.store("homing_offset")
         servo.stores()
     servo.count_anew(at)
-    memory["goal_position"] = FEEDBACK["present_position"](servo, at)
+    memory["goal_position"] = servo.position(at)
     servo.move(at)
 
 
 def clear_turns(servo: Servo, at: float) -> None:
     """0x0A: the position begins anew within one turn (FTServo_Python, hls/reset.py). It then holds where it is."""
     servo.forget_turns(at)
-    servo.memory["goal_position"] = FEEDBACK["present_position"](servo, at)
+    servo.memory["goal_position"] = servo.position(at)
     servo.move(at)
 
 
@@ -84,7 +105,7 @@ def restore_factory(servo: Servo, at: float) -> None:
     kept = frozenset({"id", "second_id"} if servo.switches.restore_id == "keep" else ())
     servo.memory.restore_factory(kept, servo.switches.restore_time)
     servo.stores()
-    power_up(servo, at, cut=False)
+    servo.power_up(at, cut=False)
     servo.deaf_until = at + servo.switches.restore_time
 
 
@@ -93,5 +114,5 @@ def enter_bootloader(servo: Servo, at: float) -> None:
 
     What the motor does meanwhile is not known; here it is limp from the beginning.
     """
-    power_up(servo, at, cut=False)
+    servo.power_up(at, cut=False)
     servo.deaf_until = at + servo.switches.bootloader_time

@@ -166,7 +166,9 @@ def _blocked(carried: Carried, wanted: Settings, world: World, switches: Switche
         return carried._replace(motion=motion)
     way = 1.0 if motion.goal >= high else -1.0
     if not carried.motion.cruise and low <= carried.motion.goal <= high:
-        return Carried(motion, None, motion.done_at if motion.phases else inf)
+        # So near that the clock does not show the way: it is there already, or this would happen again and again.
+        met = motion if motion.done_at > motion.start else rest(motion.start, motion.goal)
+        return Carried(met, None, met.done_at)
     return Carried(motion, way * _strength(wanted, abs(carried.motion.goal - motion.goal), switches))
 
 

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TYPE_CHECKING
 
+from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.supply import Supply
 from motorbus.families.feetech.simulator.switches import Switches
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.servo import Servo
 
 
 class Fate:
@@ -25,7 +22,7 @@ class Fate:
         self.supply = Supply(servos, switches) if switches.supply_resistance or switches.brown_out else None
         self._servos = servos
         for servo in servos:
-            servo.join(self)
+            servo.join(self.expect, self.supply.sag if self.supply else None)
 
     def expect(self, moment: float) -> None:
         """Something of a servo has changed, and by itself it will do something at this moment."""

@@ -9,24 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from motorbus.families.feetech.simulator import motor
+from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.table import AMPERE, tells_current
-from motorbus.families.feetech.table.phase import many_turns_are_told
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.servo import Servo
 
 
 def _position(servo: Servo, at: float) -> int:
-    model = servo.model
-    told = many_turns_are_told(servo.memory["phase"], model.table.name)
-    return motor.reading(servo.encoder(at), servo.zero, told, model.turn, servo.fold)
+    return servo.position(at)
 
 
 def _velocity(servo: Servo, at: float) -> int:
-    return round(servo.facing * servo.motion.velocity(at) / servo.velocity_unit)
+    return round(servo.facing * servo.motion.velocity(at) / servo.asked.unit)
 
 
 def _load(servo: Servo, at: float) -> int:
@@ -82,3 +76,11 @@ FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(
     }
 )
 """Row name -> raw value at a moment."""
+
+
+def read(servo: Servo, address: int, count: int, at: float) -> bytes:
+    """The bytes a READ gets."""
+    for row in servo.memory.layout.touched(address, count):
+        if row.name in FEEDBACK:
+            servo.memory[row.name] = FEEDBACK[row.name](servo, at)
+    return servo.memory.read(address, count)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.families.feetech.simulator import effects
+from motorbus.families.feetech.simulator import effects, feedback
 from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.table import Middle
 from motorbus.families.feetech.wire import Instruction
@@ -39,19 +39,19 @@ def _ping(servo: Servo, parameters: bytes, at: float) -> Answer | None:
 def _read(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) != 2 or parameters[1] > MOST:
         return None
-    return Answer(servo.read(parameters[0], parameters[1], at), later=_busy(servo, at))
+    return Answer(feedback.read(servo, parameters[0], parameters[1], at), later=_busy(servo, at))
 
 
 def _write(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) < 2:
         return _empty(servo, parameters)
-    return Answer(later=servo.write(parameters[0], parameters[1:], at))
+    return Answer(later=effects.write(servo, parameters[0], parameters[1:], at))
 
 
 def _reg_write(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) < 2:
         return _empty(servo, parameters)
-    servo.reg_write(parameters[0], parameters[1:])
+    effects.reg_write(servo, parameters[0], parameters[1:])
     return Answer(later=_busy(servo, at))
 
 
@@ -60,7 +60,7 @@ def _empty(servo: Servo, parameters: bytes) -> Answer | None:
 
 
 def _action(servo: Servo, parameters: bytes, at: float) -> Answer | None:
-    return None if parameters else Answer(later=servo.action(at))
+    return None if parameters else Answer(later=effects.action(servo, at))
 
 
 def _restore_factory(servo: Servo, parameters: bytes, at: float) -> Answer | None:

@@ -13,15 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from math import inf
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from motorbus.core.plant import Drive, Motion
 from motorbus.families.feetech.simulator import thermal
 from motorbus.families.feetech.simulator.effort import Load
+from motorbus.families.feetech.simulator.memory import Memory
+from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.table import AMPERE
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.body import Body
 
 HEAT, CURRENT, OVERLOAD = 0x04, 0x08, 0x20
 _SAME: Final = 1e-9
@@ -95,26 +94,28 @@ class Protection:
     moment to call `fire` at.
     """
 
-    def __init__(self, servo: Body) -> None:
+    def __init__(self, memory: Memory, switches: Switches) -> None:
         self.error = 0
         self.next = inf
-        self._servo = servo
-        self._ambient = servo.switches.ambient
+        self._memory = memory
+        self._switches = switches
+        self._ambient = switches.ambient
         self._degrees = self._ambient
         self._start = 0.0
         self._loads: list[Load] = []
         self._quiet = True
-        self._by_duty = servo.switches.overload_of == "duty"
+        self._by_duty = switches.overload_of == "duty"
+        table = memory.layout.table
         self._watches = {OVERLOAD: Watch(), CURRENT: Watch()}
         self._has = {
-            OVERLOAD: "overload_torque" in servo.model.table,
-            CURRENT: "overcurrent_time" in servo.model.table and "protection_current" in servo.model.table,
+            OVERLOAD: "overload_torque" in table,
+            CURRENT: "overcurrent_time" in table and "protection_current" in table,
         }
 
     @property
     def left(self) -> float:
         """The share of the stall torque that it allows itself after an overload."""
-        if self.error & OVERLOAD and self._servo.memory["unload_mask"] & OVERLOAD:
+        if self.error & OVERLOAD and self._memory["unload_mask"] & OVERLOAD:
             return self._number("protective_torque")
         return 1.0
 
@@ -136,7 +137,7 @@ class Protection:
         self._roll(at)
         self._degrees = degrees
         self._quiet = False
-        self._tell(HEAT, degrees > self._servo.memory["max_temperature"])
+        self._tell(HEAT, degrees > self._memory["max_temperature"])
 
     def forget(self) -> None:
         """Nothing has tripped: its controller starts anew. It does not get cooler by that."""
@@ -145,17 +146,17 @@ class Protection:
 
     def torque_off(self) -> None:
         """Torque was switched off, which may or may not end what is latched."""
-        if self._servo.switches.overload_clears == "torque_off":
+        if self._switches.overload_clears == "torque_off":
             self.error &= HEAT
 
     def weigh(self, at: float) -> None:
         """Before the servo thinks again at this moment: is it too hot by what its registers say now?"""
         self._roll(at)
-        limit = self._servo.memory["max_temperature"]
+        limit = self._memory["max_temperature"]
         if self._degrees > limit:
             self._tell(HEAT, True)
         elif self.error & HEAT:
-            self._tell(HEAT, self._degrees > limit - self._servo.switches.cool_down + _CLOSE)
+            self._tell(HEAT, self._degrees > limit - self._switches.cool_down + _CLOSE)
 
     def changed(self, at: float, loads: Iterable[Load] | None) -> None:
         """From this moment on the motor does this; None: nothing that heats it or that it could trip over."""
@@ -180,7 +181,7 @@ class Protection:
 
     def lets_run(self, motion: Motion, drive: Drive) -> bool:
         """Whether a motor that moves so without a burden could trip over nothing."""
-        if self._has[CURRENT] and 0 < self._servo.memory["protection_current"] < drive.idle_current / AMPERE:
+        if self._has[CURRENT] and 0 < self._memory["protection_current"] < drive.idle_current / AMPERE:
             return False
         if not self._by_duty or not self._has[OVERLOAD]:
             return True
@@ -219,8 +220,8 @@ class Protection:
 
     def _heat(self, at: float) -> float:
         """When it becomes too hot, or is no longer."""
-        servo, degrees, hot = self._servo, self._degrees, self.error & HEAT
-        limit = servo.memory["max_temperature"] - (servo.switches.cool_down if hot else 0.0)
+        degrees, hot = self._degrees, self.error & HEAT
+        limit = self._memory["max_temperature"] - (self._switches.cool_down if hot else 0.0)
         way = -1.0 if hot else 1.0
         for load in self._loads or _NOTHING:
             begin = max(load.begin, at)
@@ -243,4 +244,4 @@ class Protection:
 
     def _number(self, name: str) -> float:
         """The value of a row in its unit."""
-        return self._servo.memory[name] * self._servo.model.table[name].scale
+        return self._memory[name] * self._memory.layout.table[name].scale

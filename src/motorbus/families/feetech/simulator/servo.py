@@ -1,8 +1,9 @@
-"""One simulated servo: its memory, its shaft, and what a write, an alarm or a power cut does to them.
+"""One simulated servo: its memory, its shaft, and what an alarm or a power cut does to them.
 
 It knows nothing of packets; `bus.py` does. Each method that may change something takes the moment at which it
 happens. What was measured on a real one is said with its source; what nobody knows is a switch. What the registers
-ask for is worked out in `settings.py`, what an order does besides in `effects.py`, a power-up in `power.py`.
+ask for is worked out in `settings.py`. What is read of it stands in `feedback.py`, what a write or an order does to it
+in `effects.py`: both know the servo, which knows neither.
 """
 
 from __future__ import annotations
@@ -11,24 +12,14 @@ from collections.abc import Callable
 from math import inf
 
 from motorbus.core.plant import rest
-from motorbus.families.feetech.simulator import effects, motor
+from motorbus.families.feetech.simulator import motor, power
 from motorbus.families.feetech.simulator.body import Body
-from motorbus.families.feetech.simulator.feedback import FEEDBACK
 from motorbus.families.feetech.simulator.memory import Layout
 from motorbus.families.feetech.simulator.model import Model
-from motorbus.families.feetech.simulator.power import power_up, stand
 from motorbus.families.feetech.simulator.protection import OVERLOAD
-from motorbus.families.feetech.simulator.settings import (
-    blind,
-    facing_of,
-    fold_of,
-    mode_now,
-    settings,
-    torque_limit,
-    velocity_steps,
-)
+from motorbus.families.feetech.simulator.settings import Asked, Registers
 from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, Mode, alarms, velocity_scale
+from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, Mode, alarms
 
 _VOLTAGE = 0x01
 
@@ -60,6 +51,7 @@ class Servo(Body):
         position: int | None = None,
     ) -> None:
         super().__init__(model, layout, switches, now, model.turn // 2 if position is None else position)
+        self._registers = Registers(model, self.memory, switches)
         self.lives = 0
         self.pending: tuple[int, bytes] | None = None
         self.zero = 0
@@ -69,7 +61,6 @@ class Servo(Body):
         self.renamed = renamed
         self._alarm = 0
         self._all_codes = switches.baud_codes == "all"
-        self._steps = velocity_steps(model)
         self._delays = "return_delay" in model.table and switches.return_delay == "heed"
         # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
         for name in ("id", "second_id"):
@@ -78,28 +69,29 @@ class Servo(Body):
         for name, raw in model.set_to.items():
             self.memory[name] = raw
         self.memory.stored[:] = self.memory.live
-        power_up(self, now())
+        self.power_up(now())
         self.deaf_until = -inf
 
     # What a test or a control socket does to it.
 
     def unplug(self) -> None:
-        """Pull its cable, bus and supply in one. The shaft stays where it is; a reply on its way is lost."""
-        now = self._now()
+        """Pull its cable, bus and supply in one. The shaft stays where it is; a reply on its way is lost, and so is
+        what was on its way to the EEPROM."""
         self.plugged = False
         self.lives += 1
-        stand(self, now)
+        self.memory.flash.cut()
+        self.move(self._now())
 
     def plug(self) -> None:
         """Put its cable back: it powers up. Does nothing when it is in."""
         if not self.plugged:
             self.plugged = True
-            power_up(self, self._now())
+            self.power_up(self._now())
 
     def power_cycle(self) -> None:
         """Take its supply away and give it back: RAM and turn count are lost, the EEPROM is as it was stored."""
         if self.plugged:
-            power_up(self, self._now())
+            self.power_up(self._now())
 
     def status(self) -> dict[str, object]:
         """How it is, as plain data."""
@@ -129,16 +121,10 @@ class Servo(Body):
         self._alarm = bits
         self.move(self._now())
 
-    def clear_alarm(self) -> None:
-        """Forget what was raised, as a power cut does."""
-        self._alarm = 0
-        self.protection.forget()
-
     @property
     def raw_position(self) -> int:
         """The present position in counts, as register 56 tells it."""
-        now = self._now()
-        return FEEDBACK["present_position"](self, now)
+        return self.position(self._now())
 
     @raw_position.setter
     def raw_position(self, counts: int) -> None:
@@ -147,6 +133,36 @@ class Servo(Body):
         turned = self.facing * self.fold * (counts - self.raw_position)
         self.motion = rest(now, round(self.motion.position(now)) + turned)
         self.stands(now)
+
+    # What its supply does to it.
+
+    def power_up(self, at: float, *, cut: bool = True) -> None:
+        """Start anew at this moment: limp, at rest, within one turn, and nothing pending (users of STS servos).
+
+        With `cut` the supply was away, and what was on its way to the EEPROM is lost.
+        """
+        switches = self.switches
+        self.lives += 1
+        self.pending = None
+        self._alarm = 0
+        self.protection.forget()
+        power.begin(self.memory, switches, cut=cut)
+        self.forget_turns(at)
+        if switches.goal_at_power_up == "present" or switches.torque_at_power_up:
+            self.memory["goal_position"] = self.position(at)
+        self.deaf_until = at + switches.startup_time if switches.startup_time else -inf
+        self.renamed()
+        self.move(at)
+
+    def brown_out(self, at: float) -> None:
+        """The supply was too low for a moment, and the torque is off whatever it is after a real power-up.
+
+        A servo that held its load again at once would fall again at once, and for ever; what real ones do is not known.
+        """
+        self.power_up(at)
+        if self.memory["torque_enable"]:
+            self.memory["torque_enable"] = 0
+            self.move(at)
 
     # What the bus asks.
 
@@ -186,7 +202,7 @@ class Servo(Body):
     @property
     def told_voltage(self) -> int:
         """What register 62 says of its supply, in 0.1 V."""
-        return 0 if self.switches.wrong_bridge == "blind" and blind(self) else round(self.voltage * 10)
+        return 0 if self.switches.wrong_bridge == "blind" and self.asked.blind else round(self.voltage * 10)
 
     @property
     def error(self) -> int:
@@ -201,48 +217,17 @@ class Servo(Body):
         awake = self.plugged and at >= self.deaf_until and self.fed(at)
         return awake and (rate is None or rate == self.baud_rate)
 
-    def read(self, address: int, count: int, at: float) -> bytes:
-        """The bytes a READ gets; readings are worked out for this moment."""
-        for row in self.memory.layout.touched(address, count):
-            if row.name in FEEDBACK:
-                self.memory[row.name] = FEEDBACK[row.name](self, at)
-        return self.memory.read(address, count)
-
-    def write(self, address: int, data: bytes, at: float) -> float:
-        """Obey a WRITE; gives how much later (s) it is acknowledged because the EEPROM took its time."""
-        torque = self.memory["torque_enable"]
-        done = self.memory.write(
-            address, data, locked=self.locked, strict=self.switches.out_of_range == "drop"
-        )
-        if done.names:
-            effects.react(self, done.names, torque, at)
-        if done.stored:
-            self.stores()
-        return self.storing(at)
-
-    def reg_write(self, address: int, data: bytes) -> None:
-        """Keep a write for `action`. A power cycle forgets it."""
-        if self.pending is None or self.switches.reg_write_again == "replace":
-            self.pending = address, data
-
-    def action(self, at: float) -> float:
-        """Carry out what REG WRITE left; nothing when there is nothing. Gives the delay as `write` does."""
-        if self.pending is None:
-            return 0.0
-        (address, data), self.pending = self.pending, None
-        return self.write(address, data, at)
-
     # What it does.
+
+    @property
+    def asked(self) -> Asked:
+        """What its registers ask for."""
+        return self._registers.asked
 
     @property
     def mode(self) -> Mode | None:
         """What it heeds; None when the number in its mode register is not explained by anybody."""
-        return mode_now(self)
-
-    @property
-    def velocity_unit(self) -> int:
-        """Counts/s for one unit of its velocity registers."""
-        return self._steps * velocity_scale(self.memory["phase"], self.model.table.name)
+        return self.asked.mode
 
     @property
     def available(self) -> float:
@@ -255,7 +240,7 @@ class Servo(Body):
             unloading &= ~OVERLOAD  # it leaves a part of the torque
         if not self.plugged or memory["torque_enable"] != 1 or unloading & memory["unload_mask"]:
             return 0.0
-        return min(torque_limit(self), self.protection.left)
+        return min(self.asked.limit, self.protection.left)
 
     @property
     def strong(self) -> bool:
@@ -272,10 +257,16 @@ class Servo(Body):
         """Where the encoder is, in counts without end."""
         return self.facing * self.motion.position(at)
 
+    def position(self, at: float) -> int:
+        """The present position in counts, as it says it."""
+        return motor.reading(
+            self.encoder(at), self.zero, self.asked.settings.told, self.model.turn, self.fold
+        )
+
     def arrived(self, at: float) -> bool:
         """Whether it is where its goal is, within the dead band of its position."""
         band = max(self.memory["dead_band_cw"], self.memory["dead_band_ccw"])
-        return abs(FEEDBACK["present_position"](self, at) - self.memory["goal_position"]) <= band
+        return abs(self.position(at) - self.memory["goal_position"]) <= band
 
     def move(self, at: float) -> None:
         """Think again about where to go."""
@@ -287,7 +278,7 @@ class Servo(Body):
 
     def _go(self, planned: motor.Planner, at: float) -> None:
         self.protection.weigh(at)
-        wanted, motion = settings(self, at), self.motion
+        wanted, motion = self._wanted(), self.motion
         if self.facing > 0:
             self.bear(lambda drive: planned(wanted, motion, at, drive, self.switches), wanted, at)
         else:
@@ -299,20 +290,28 @@ class Servo(Body):
                 lambda drive: motor.mirrored(planned(wanted, before, at, drive, self.switches)), turned, at
             )
 
+    def _wanted(self) -> motor.Settings:
+        return self.asked.settings._replace(
+            torque=self.available,
+            burden=self.facing * self.burden,
+            goal=self.memory["goal_position"],
+            zero=self.zero,
+        )
+
     def face(self, at: float) -> None:
         """Count in the direction and the steps that the registers say; when they change, the turn count begins anew."""
-        if (self.facing, self.fold) != (facing_of(self), fold_of(self)):
+        if (self.facing, self.fold) != (self.asked.facing, self.asked.fold):
             self.count_anew(at)
 
     def forget_turns(self, at: float) -> None:
         """Stand still, within the first turn."""
-        self.facing, self.fold = facing_of(self), fold_of(self)
+        self.facing, self.fold = self.asked.facing, self.asked.fold
         self.motion = rest(at, self.facing * (self.encoder(at) % self.model.turn))
         self.count_anew(at)
 
     def count_anew(self, at: float) -> None:
         """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
-        self.facing, self.fold = facing_of(self), fold_of(self)
+        self.facing, self.fold = self.asked.facing, self.asked.fold
         applied = "homing_offset" in self.model.table and self.mode is Mode.POSITION
         offset = self.memory["homing_offset"] if applied else 0
         self.zero = motor.zero_for(self.encoder(at), offset * self.fold, self.model.turn)

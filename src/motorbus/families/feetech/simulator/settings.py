@@ -1,20 +1,20 @@
 """What the registers of one servo ask of its motor, in counts, seconds and shares, whatever its map calls them.
 
 Which register plays which part comes from `table.control`, what a bit of the phase register means from `table.phase`,
-and what only some servos do from `personality`. So nothing here asks for a map by its name.
+and what only some servos do from `personality`. So nothing here asks for a map by its name. Nor does anything here
+know where the shaft is or what pushes it: that is the business of `servo.py`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
+from motorbus.families.feetech.simulator.memory import Memory
+from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.motor import Settings
-from motorbus.families.feetech.table import AMPERE, Mode, mode_of, zero_is_maximum
+from motorbus.families.feetech.simulator.switches import Switches
+from motorbus.families.feetech.table import AMPERE, Mode, mode_of, velocity_scale, zero_is_maximum
 from motorbus.families.feetech.table.phase import many_turns_are_told
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.model import Model
-    from motorbus.families.feetech.simulator.servo import Servo
 
 DECIDES_MOTION: Final = frozenset(
     {
@@ -28,125 +28,142 @@ DECIDES_MOTION: Final = frozenset(
 """A write of one of these makes the servo think again about where it goes."""
 
 
-def mode_now(servo: Servo) -> Mode | None:
-    """What it heeds at present; None for a number that no source explains."""
-    control = servo.model.control
-    if not control.modes:
-        return mode_of(servo.model.table.name, None, _limits(servo))
-    found = control.modes.get(servo.memory["operating_mode"])
-    return Mode.POSITION if found is None and servo.switches.unknown_mode == "position" else found
+class Asked(NamedTuple):
+    """What all registers but the goal position come to.
 
-
-def velocity_steps(model: Model) -> int:
-    """Counts/s for one unit of the velocity registers, as the rows have it: 1, and 50 on HLS."""
-    return round(model.table["goal_velocity"].scale / model.table["goal_position"].scale)
-
-
-def facing_of(servo: Servo) -> int:
-    """-1 when its feedback counts the other way than its shaft turns, else 1 (bit 7 of phase on STS)."""
-    bits = servo.model.personality.reversed_by
-    return -1 if bits and servo.memory["phase"] >> bits[1] & 1 else 1
-
-
-def blind(servo: Servo) -> bool:
-    """Whether its phase register tells of another board than it has, as after copying that of another servo."""
-    bit, model = servo.model.personality.bridge_bit, servo.model
-    shipped = model.defaults.get("phase", model.table["phase"].default) or 0
-    return bit is not None and bool((servo.memory["phase"] ^ shipped) >> bit & 1)
-
-
-def fold_of(servo: Servo) -> int:
-    """Counts of the encoder for one count of its positions: its angular resolution (STS3215 memory table V3.6)."""
-    if "angular_resolution" not in servo.model.table or servo.switches.angular_resolution == "ignore":
-        return 1
-    return servo.memory["angular_resolution"] or 1
-
-
-def torque_limit(servo: Servo) -> float:
-    """The share of the stall torque that its registers allow: torque limit, and where there is one the current cap.
-
-    A map without a torque limit has `max_torque` of its EEPROM for it. An HLS with 0 as its goal torque never moves in
-    position and velocity mode (seen on hardware, where the burst of seven bytes that suits an STS had written it).
+    `mode`      what it heeds; None for a number that no source explains
+    `facing`    -1 when its feedback counts the other way than its shaft turns, else 1 (bit 7 of phase on STS)
+    `fold`      counts of the encoder for one of its positions: its angular resolution (STS3215 memory table V3.6)
+    `blind`     its phase register tells of another board than it has, as after copying that of another servo
+    `unit`      counts/s for one unit of its velocity registers
+    `limit`     the share of the stall torque that they allow
+    `settings`  all of that for its motor; what is not in registers is left as it is
     """
-    memory, control = servo.memory, servo.model.control
-    share = memory[control.limit or "max_torque"] / 1000
-    if control.current and servo.mode in (Mode.POSITION, Mode.VELOCITY):
-        share = min(share, abs(_current(servo)))
-    return share
+
+    mode: Mode | None
+    facing: int
+    fold: int
+    blind: bool
+    unit: int
+    limit: float
+    settings: Settings
 
 
-def settings(servo: Servo, at: float) -> Settings:
-    """Everything that decides about movement at this moment."""
-    memory, switches = servo.memory, servo.switches
-    low, high = _limits(servo)
-    endless = low == high == 0
-    velocity = memory["goal_velocity"] * servo.velocity_unit
-    phase = memory["phase"]
-    mode = servo.mode
-    return Settings(
-        torque=servo.available,
-        burden=servo.facing * servo.burden,
-        mode=mode,
-        goal=memory["goal_position"],
-        low=low,
-        high=high,
-        endless=endless,
-        turns=endless and servo.model.control.many_turns,
-        duty=_duty(servo) if mode is Mode.PWM else 0.0,
-        current=_current(servo) if mode is Mode.CURRENT else 0.0,
-        velocity=velocity,
-        fastest=not velocity
-        and (switches.zero_velocity == "maximum" or zero_is_maximum(phase, servo.model.table.name)),
-        time=0.0 if velocity else _time(servo),
-        acceleration=_acceleration(servo),
-        runs_away=switches.half_reversed == "runaway" and _drive(servo) != servo.facing,
-        told=many_turns_are_told(phase, servo.model.table.name),
-        zero=servo.zero,
-        turn=servo.model.turn,
-        fold=servo.fold,
-    )
+class Registers:
+    """The registers of one servo, as something that asks for movements."""
 
+    def __init__(self, model: Model, memory: Memory, switches: Switches) -> None:
+        goal, readings = model.table["goal_position"], model.table["present_position"]
+        self._model, self._memory, self._switches = model, memory, switches
+        self._before = slice(goal.address)
+        self._after = slice(goal.address + goal.size, readings.address)
+        self._steps = round(model.table["goal_velocity"].scale / goal.scale)  # 1, and 50 on HLS
+        self._seen = bytearray(), bytearray()
+        self._asked = self._work_out()
 
-def _limits(servo: Servo) -> tuple[int, int]:
-    return servo.memory["min_position_limit"], servo.memory["max_position_limit"]
+    @property
+    def asked(self) -> Asked:
+        """What they ask for at present."""
+        live = self._memory.live
+        seen = live[self._before], live[self._after]
+        if seen != self._seen:  # hosts write goals and little else, so this is rare
+            self._seen, self._asked = seen, self._work_out()
+        return self._asked
 
+    def _work_out(self) -> Asked:
+        memory, switches, model = self._memory, self._switches, self._model
+        phase, name = memory["phase"], model.table.name
+        low, high = self._limits()
+        endless = low == high == 0
+        mode, facing, fold = self._mode(), self._facing(), self._fold()
+        unit = self._steps * velocity_scale(phase, name)
+        velocity = memory["goal_velocity"] * unit
+        settings = Settings(
+            mode=mode,
+            low=low,
+            high=high,
+            endless=endless,
+            turns=endless and model.control.many_turns,
+            duty=self._duty() * facing if mode is Mode.PWM else 0.0,
+            current=self._current() if mode is Mode.CURRENT else 0.0,
+            velocity=velocity,
+            fastest=not velocity and (switches.zero_velocity == "maximum" or zero_is_maximum(phase, name)),
+            time=0.0 if velocity else self._time(),
+            acceleration=self._acceleration(),
+            runs_away=switches.half_reversed == "runaway" and self._drive() != facing,
+            told=many_turns_are_told(phase, name),
+            turn=model.turn,
+            fold=fold,
+        )
+        return Asked(mode, facing, fold, self._blind(), unit, self._limit(mode), settings)
 
-def _drive(servo: Servo) -> int:
-    """-1 when the motor drives the other way (bit 0 of phase on STS and SCS), else 1."""
-    bits = servo.model.personality.reversed_by
-    return -1 if bits and servo.memory["phase"] >> bits[0] & 1 else 1
+    def _mode(self) -> Mode | None:
+        control, switches = self._model.control, self._switches
+        if not control.modes:
+            return mode_of(self._model.table.name, None, self._limits())
+        found = control.modes.get(self._memory["operating_mode"])
+        return Mode.POSITION if found is None and switches.unknown_mode == "position" else found
 
+    def _facing(self) -> int:
+        bits = self._model.personality.reversed_by
+        return -1 if bits and self._memory["phase"] >> bits[1] & 1 else 1
 
-def _acceleration(servo: Servo) -> float:
-    """Counts/s²; 0 in the register, or no register, means the greatest."""
-    row, switches = servo.model.control.acceleration, servo.switches
-    return (servo.memory[row] * switches.acceleration_unit if row else 0.0) or switches.full_acceleration
+    def _drive(self) -> int:
+        """-1 when the motor drives the other way (bit 0 of phase on STS and SCS), else 1."""
+        bits = self._model.personality.reversed_by
+        return -1 if bits and self._memory["phase"] >> bits[0] & 1 else 1
 
+    def _fold(self) -> int:
+        if "angular_resolution" not in self._model.table or self._switches.angular_resolution == "ignore":
+            return 1
+        return self._memory["angular_resolution"] or 1
 
-def _duty(servo: Servo) -> float:
-    """Share of the supply in PWM mode, positive towards greater readings."""
-    switches, personality = servo.switches, servo.model.personality
-    wish = switches.positive_duty
-    smaller = personality.smaller if wish == "by_map" else wish == "smaller"
-    row = servo.model.control.duty or switches.hls_duty
-    sense = (-1 if smaller else 1) * _drive(servo) * servo.facing
-    return max(-1.0, min(1.0, servo.memory[row] / 1000)) * sense
+    def _blind(self) -> bool:
+        bit, model = self._model.personality.bridge_bit, self._model
+        shipped = model.defaults.get("phase", model.table["phase"].default) or 0
+        return bit is not None and bool((self._memory["phase"] ^ shipped) >> bit & 1)
 
+    def _limit(self, mode: Mode | None) -> float:
+        """Torque limit, and where there is one the current cap.
 
-def _current(servo: Servo) -> float:
-    """The goal or cap of the current as a share of that at stall."""
-    return servo.memory[servo.model.control.current] * AMPERE / servo.model.drive.stall_current
+        A map without a torque limit has `max_torque` of its EEPROM for it. An HLS with 0 as its goal torque never moves
+        in position and velocity mode (seen on hardware, where the burst of seven bytes that suits an STS had written
+        it).
+        """
+        control = self._model.control
+        share = self._memory[control.limit or "max_torque"] / 1000
+        if control.current and mode in (Mode.POSITION, Mode.VELOCITY):
+            share = min(share, abs(self._current()))
+        return share
 
+    def _limits(self) -> tuple[int, int]:
+        return self._memory["min_position_limit"], self._memory["max_position_limit"]
 
-def _time(servo: Servo) -> float:
-    """s that a way takes when the velocity is 0; 0 where the register is not heeded.
+    def _acceleration(self) -> float:
+        """Counts/s²; 0 in the register, or no register, means the greatest."""
+        row, switches = self._model.control.acceleration, self._switches
+        return (self._memory[row] * switches.acceleration_unit if row else 0.0) or switches.full_acceleration
 
-    The whole word is the time: the sign at bit 10 belongs to the duty alone (SCS memory table).
-    """
-    control, wish = servo.model.control, servo.switches.goal_time
-    heeded = servo.model.personality.heeds_time if wish == "by_map" else wish == "heed"
-    if not heeded or not control.time:
-        return 0.0
-    row = servo.model.table[control.time]
-    word = bytes(servo.memory.live[row.address : row.address + row.size])
-    return int.from_bytes(word, "little" if row.order == "little" else "big") / 1000
+    def _duty(self) -> float:
+        """Share of the supply in PWM mode, positive towards greater counts of the shaft."""
+        wish = self._switches.positive_duty
+        smaller = self._model.personality.smaller if wish == "by_map" else wish == "smaller"
+        row = self._model.control.duty or self._switches.hls_duty
+        return max(-1.0, min(1.0, self._memory[row] / 1000)) * (-1 if smaller else 1) * self._drive()
+
+    def _current(self) -> float:
+        """The goal or cap of the current as a share of that at stall."""
+        return self._memory[self._model.control.current] * AMPERE / self._model.drive.stall_current
+
+    def _time(self) -> float:
+        """s that a way takes when the velocity is 0; 0 where the register is not heeded.
+
+        The whole word is the time: the sign at bit 10 belongs to the duty alone (SCS memory table).
+        """
+        control, wish = self._model.control, self._switches.goal_time
+        heeded = self._model.personality.heeds_time if wish == "by_map" else wish == "heed"
+        if not heeded or not control.time:
+            return 0.0
+        row = self._model.table[control.time]
+        word = bytes(self._memory.live[row.address : row.address + row.size])
+        return int.from_bytes(word, "little" if row.order == "little" else "big") / 1000

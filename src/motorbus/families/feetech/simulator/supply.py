@@ -10,14 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import TYPE_CHECKING
 
 from motorbus.families.feetech.simulator.chance import Chance
-from motorbus.families.feetech.simulator.power import brown_out
+from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.switches import Switches
-
-if TYPE_CHECKING:
-    from motorbus.families.feetech.simulator.servo import Servo
 
 
 class Supply:
@@ -53,7 +49,7 @@ class Supply:
         while weak := self._weak(at):
             servo = max(weak, key=lambda one: one.threshold)
             self._fallen.add(servo)
-            brown_out(servo, at)
+            servo.brown_out(at)
 
     def _weak(self, at: float) -> list[Servo]:
         sag = self.sag(at)
