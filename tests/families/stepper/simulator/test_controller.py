@@ -293,3 +293,11 @@ def test_remarks_do_not_grow_for_ever() -> None:
     for _ in range(1100):
         host.device.remark("again")
     assert len(host.device.log) == 1000
+
+
+def test_what_happened_does_not_grow_for_ever() -> None:
+    host = Host()
+    host.write(written(1, step(1, distance=0, delay=1), repeat=255))
+    host.say(frame(START, 1), 20.0)
+    assert len(host.device.told) == 10_000
+    assert host.device.told[-1].at == pytest.approx(host.now, abs=0.002)

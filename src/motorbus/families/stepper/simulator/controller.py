@@ -21,6 +21,8 @@ _WHICH: Final = frozenset({"project", "step", "port"})
 """Numbers that say of what; of what there is not, nothing can be acknowledged."""
 LOG: Final = 1000
 """Remarks that are kept; the oldest go first."""
+TOLD: Final = 10_000
+"""Happenings that are kept, likewise: an endless project has no end of them."""
 
 
 class Said(NamedTuple):
@@ -54,7 +56,7 @@ class Controller:
     `state`    what it is doing, a value of `execution`
     `store`    what it remembers; `memory` is the same by the names of the rows
     `travel`   where its load is, which it does not know
-    `told`     everything that happened, `log` remarks on what a host should know and is not told
+    `told`     what happened lately, `log` remarks on what a host should know and is not told
     `powered`  whether the supply is there and the cable in
     """
 
@@ -276,6 +278,7 @@ class Controller:
         self.travel.follow(self.state, found.told)
         self.state = found.state
         self.told += found.told
+        del self.told[:-TOLD]
         self._ends += [one.at for one in found.told if one.kind == "completed"]
         return found.told
 
