@@ -192,3 +192,42 @@ def test_a_step_is_written_as_short_as_it_is() -> None:
     project = text.parse(file(STEP)).project
     lines = text.write(Source(project.with_step(2, distance=0, speed=0, start_frequency=0, acceleration=0)))
     assert lines.endswith('acceleration = "100 Hz"\n\n[[step]]\n')
+
+
+# --- anything at all -----------------------------------------------------------------------------------------------
+
+WEIRD = st.sampled_from(
+    (
+        "0 -1 1.5 nan inf true '' 'x' [] [1] {} {a=1} 1979-05-27 07:32:00 1e400 99999999999999999999999 '1mm' '-1turns' "
+        "'none' '0Hz' '1/0mm' 'endless' '1e9s'"
+    ).split()
+)
+KEYS = st.sampled_from([*text.TOP, *text.MOTOR, *text.LOOP, *text.STEP])
+
+
+def parsed_or_refused(source: str) -> None:
+    try:
+        found = text.parse(source)
+    except RequestError:
+        return
+    assert text.parse(text.write(found)).project == found.project
+
+
+@given(
+    st.lists(st.tuples(KEYS, WEIRD), max_size=4),
+    st.sampled_from(["", "[motor]", "[loop]", "[inputs]", "[[step]]"]),
+)
+def test_any_value_of_any_field_is_taken_or_refused(pairs: list[tuple[str, str]], table: str) -> None:
+    lines = "\n".join(f"{key} = {value}" for key, value in dict(pairs).items())
+    parsed_or_refused(file(f"{table}\n{lines}") if table else file(top=lines))
+    for key, value in pairs:
+        source = re.sub(rf"(?m)^{key} = .*$", lambda _, key=key, value=value: f"{key} = {value}", file())  # type: ignore[misc]
+        parsed_or_refused(source)
+
+
+@given(st.data())
+def test_a_file_with_a_slip_of_the_finger_is_read_or_refused(data: st.DataObject) -> None:
+    source = file("[loop]\nfirst = 1\nlast = 1\ncount = 3", top='name = "x"\nrepeat = 3', steps=2)
+    at = data.draw(st.integers(0, len(source)))
+    cut = data.draw(st.integers(0, 3))
+    parsed_or_refused(source[:at] + data.draw(st.text(max_size=3)) + source[at + cut :])
