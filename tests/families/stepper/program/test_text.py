@@ -197,10 +197,31 @@ def test_a_step_is_written_as_short_as_it_is() -> None:
 # --- anything at all -----------------------------------------------------------------------------------------------
 
 WEIRD = st.sampled_from(
-    (
-        "0 -1 1.5 nan inf true '' 'x' [] [1] {} {a=1} 1979-05-27 07:32:00 1e400 99999999999999999999999 '1mm' '-1turns' "
-        "'none' '0Hz' '1/0mm' 'endless' '1e9s'"
-    ).split()
+    [
+        "0",
+        "-1",
+        "1.5",
+        "nan",
+        "inf",
+        "true",
+        "''",
+        "'x'",
+        "[]",
+        "[1]",
+        "{}",
+        "{a=1}",
+        "1979-05-27",
+        "07:32:00",
+        "1e400",
+        "99999999999999999999999",
+        "'1mm'",
+        "'-1turns'",
+        "'none'",
+        "'0Hz'",
+        "'1/0mm'",
+        "'endless'",
+        "'1e9s'",
+    ]
 )
 KEYS = st.sampled_from([*text.TOP, *text.MOTOR, *text.LOOP, *text.STEP])
 
