@@ -6,6 +6,7 @@ import pytest
 
 from motorbus.errors import RequestError
 from tests.families.stepper.simulator.host import (
+    CLEAR,
     DONE,
     FORWARD,
     HOME,
@@ -39,6 +40,19 @@ def test_a_stop_mode_that_is_set_while_it_runs_holds() -> None:
     host.say(frame(START, 1))
     host.write([frame(3, 0x0E, 1)])
     host.wait(5.0)
+    host.say(STOP_PROJECT, 0.01)
+    assert host.device.state.phase.value == "idle"
+
+
+def test_a_project_that_was_cleared_and_written_anew_is_still_its_own() -> None:
+    host = Host()
+    host.say(frame(CLEAR, 1))
+    host.write(written(1, step(1, distance=160_000, start=100, acceleration=1), stop=0)[1:])
+    assert host.dump(1)[6:8] == b"\0\0"  # nothing has been selected since, so it has no steps either
+    host.write(written(1, step(1, distance=160_000, start=100, acceleration=1), stop=0))
+    host.say(frame(START, 1), 3.0)
+    assert host.device.status()["project"] == 1
+    host.write([frame(3, 0x0E, 1)])
     host.say(STOP_PROJECT, 0.01)
     assert host.device.state.phase.value == "idle"
 

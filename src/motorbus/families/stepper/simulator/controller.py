@@ -7,6 +7,7 @@ the bus's affair; here a command has an answer or none, and a project has an end
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Final, NamedTuple, Protocol
 
 from motorbus.errors import RequestError
@@ -190,8 +191,12 @@ class Controller:
     def _wire(self, port: int, active: bool, at: float) -> tuple[Happening, ...]:
         self._inputs = self._inputs | {port} if active else self._inputs - {port}
         chosen = self.store.selected if self.switches.in3_project == "selected" else 1
-        project = self.store.project(chosen)
+        project = self._to_run(chosen)
         return self._take(execution.set_input(self.state, port, active, at, in3_project=project))
+
+    def _to_run(self, number: int) -> Project:
+        """What starting this project runs; one that was cleared and written anew may not know its own number."""
+        return replace(self.store.project(number), number=number)
 
     def obey(self, data: bytes, at: float) -> Said:
         """Carry out a request whose checksum is right."""
@@ -243,7 +248,7 @@ class Controller:
 
     def _start(self, name: str, number: int, at: float) -> Next:
         if name == "start_project":
-            found = execution.start(self.state, self.store.project(number), at)
+            found = execution.start(self.state, self._to_run(number), at)
         elif name in ("jog_forward", "jog_reverse"):
             sign = 1 if name == "jog_forward" else -1
             found = execution.jog(self.state, self.store.project(1), sign, at)
