@@ -30,7 +30,7 @@ def projects() -> list[Project]:
 
 def timed(project: Project, **options: Any) -> Run:
     """How long a simulated device takes, by the moments of its acknowledgement and of its notice."""
-    bus = simulate((3,), **options)
+    bus = simulate((1,), **options)
     bus.controller.put(1, project)
     bus.receive(frame(START, 1), 0.0)
     (acknowledged, _), (ended, _) = bus.advance(1000.0)

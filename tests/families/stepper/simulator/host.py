@@ -60,14 +60,14 @@ class Host:
     """Says frames to a simulated controller, one after the other, and gives what comes back as hexadecimal."""
 
     def __init__(self, **options: object) -> None:
-        self.bus: StepperBus = simulate((3,), **options)
+        self.bus: StepperBus = simulate((1,), **options)
         self.now = 0.0
         self.bus.advance(0.0)
         self.heard: list[tuple[float, str]] = []
 
     @property
     def device(self) -> Controller:
-        return self.bus.nodes[3]
+        return self.bus.nodes[1]
 
     def say(self, data: bytes | str, within: float = 0.2) -> str:
         """Send now and collect what begins within so long, in one string; the clock goes on by that."""

@@ -83,7 +83,7 @@ def play(
 def test_whatever_is_said_it_answers_in_frames_or_not_at_all(
     options: dict[str, Any], project: table.Project, script: list[tuple[float, tuple[str, Any]]]
 ) -> None:
-    bus = simulate((3,), **options)
+    bus = simulate((1,), **options)
     bus.controller.put(1, project)
     said = play(bus, script, 1)
     moments = [at for at, _ in said]
@@ -108,7 +108,7 @@ def test_it_makes_no_difference_how_often_somebody_looks(
 ) -> None:
     runs = []
     for looks in (1, 5):
-        bus = simulate((3,), **options)
+        bus = simulate((1,), **options)
         bus.controller.put(1, project)
         runs.append((play(bus, script, looks), bus.controller.position, bus.controller.store.stored))
     assert runs[0] == runs[1]

@@ -28,7 +28,7 @@ def test_the_client_knows_no_motorbus_and_is_short() -> None:
 
 
 def test_a_foreign_client_writes_reads_saves_starts_and_hears_the_end() -> None:
-    bus = simulate((3,), shipped="empty")
+    bus = simulate((1,), shipped="empty")
     with closing(PtyMaster()) as master, served(Mount(bus, master, pace=9600)):
         ended = subprocess.run(
             [

@@ -22,7 +22,7 @@ def test_every_option_has_a_default_of_its_kind_and_can_be_said_in_text() -> Non
     assert {one.name for one in options_of(Behaviour)} < {one.name for one in OPTIONS}
     assert [one for one in OPTIONS if not one.help or not isinstance(one.default, one.kind)] == []
     said = {one.name: str(one.default) for one in OPTIONS}
-    assert simulate((3,), **said).switches == simulate((3,)).switches == Switches()
+    assert simulate((1,), **said).switches == simulate((1,)).switches == Switches()
 
 
 def test_every_switch_has_a_source() -> None:
@@ -35,7 +35,7 @@ def test_every_choice_of_every_switch_runs_a_project(option: Any) -> None:
     field = Switches.__dataclass_fields__[option.name]
     choices = field.metadata["choices"] or ((True, False) if option.kind is bool else (option.default,))
     for choice in choices:
-        bus = simulate((3,), **{option.name: choice})
+        bus = simulate((1,), **{option.name: choice})
         assert getattr(bus.switches, option.name) == choice
         bus.receive(frame(START, 1), 0.0)
         bus.advance(30.0)
@@ -46,14 +46,14 @@ def test_every_choice_of_every_switch_runs_a_project(option: Any) -> None:
 @pytest.mark.parametrize(
     ("ids", "model", "options", "says"),
     [
-        ((), "", {}, "one id"),
-        ((1, 2), "", {}, "one id"),
-        ((3,), "turbo", {}, "stepper"),
-        ((3,), "", {"ramp": "jerk"}, "time, pulse"),
-        ((3,), "", {"rmap": "time"}, "ramp"),
-        ((3,), "", {"ramp_tick_ms": "0"}, "0.001"),
-        ((3,), "", {"motor": "0x1E"}, "not ending in E"),
-        ((3,), "", {"selected_at_boot": "5"}, "1, 2, 3, 4"),
+        ((), "", {}, "the id 1"),
+        ((1, 2), "", {}, "the id 1"),
+        ((1,), "turbo", {}, "stepper"),
+        ((1,), "", {"ramp": "jerk"}, "time, pulse"),
+        ((1,), "", {"rmap": "time"}, "ramp"),
+        ((1,), "", {"ramp_tick_ms": "0"}, "0.001"),
+        ((1,), "", {"motor": "0x1E"}, "not ending in E"),
+        ((1,), "", {"selected_at_boot": "5"}, "1, 2, 3, 4"),
     ],
 )
 def test_nonsense_is_refused_with_what_would_do(
@@ -65,7 +65,7 @@ def test_nonsense_is_refused_with_what_would_do(
 
 
 def linked(*, pace: bool = False, **options: object) -> MemoryLink:
-    return MemoryLink(simulate((3,), "stepper", **options), rate=9600, pace=pace)
+    return MemoryLink(simulate((1,), "stepper", **options), rate=9600, pace=pace)
 
 
 def received(link: MemoryLink, seconds: float) -> bytes:
@@ -91,7 +91,7 @@ def test_a_project_tells_its_end_in_virtual_time() -> None:
 
 
 def test_a_control_socket_looks_at_it_and_cuts_its_supply() -> None:
-    bus = simulate((3,))
+    bus = simulate((1,))
     assert '"phase": "idle"' in obey(bus, "status")
     assert [obey(bus, order) for order in ("power-cycle", "unplug 3", "plug 3")] == ["ok"] * 3
     assert obey(bus, "unplug 9").startswith("error: there is no node 9")
@@ -110,6 +110,6 @@ def test_a_control_socket_looks_at_it_and_cuts_its_supply() -> None:
     ],
 )
 def test_a_control_socket_presses_its_buttons(order: str, answer: str) -> None:
-    bus = simulate((3,))
+    bus = simulate((1,))
     assert obey(bus, order) == answer
     assert bus.controller.status()["inputs"] == ([2] if order == "set-input 3 2 on" else [])

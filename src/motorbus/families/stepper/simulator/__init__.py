@@ -25,17 +25,17 @@ OPTIONS = switches_of(Switches)
 MODEL = "stepper"
 
 
-def simulate(ids: Iterable[int] = (wire.MOTOR,), model: str = "", /, **options: object) -> StepperBus:
+def simulate(ids: Iterable[int] = (wire.ONLY,), model: str = "", /, **options: object) -> StepperBus:
     """A simulated line with its controller, at rest. There is no address on the line, so there is one of them.
 
-    `ids` is one number, by which `nodes` has it; the options are the fields of `Switches`, also as text. Raises
-    RequestError for more than one id, an unknown model or option, or an impossible value.
+    `ids` is 1, by which `nodes` has it; the options are the fields of `Switches`, also as text. Raises
+    RequestError for another id, an unknown model or option, or an impossible value.
     """
     found = tuple(ids)
-    if len(found) != 1:
+    if found != (wire.ONLY,):
         raise RequestError(
-            f"a stepper line has one controller, not {len(found)}",
-            expected="one id",
+            f"a stepper line has one controller, not {', '.join(map(str, found)) or 'none'}",
+            expected=f"the id {wire.ONLY}",
             cause="its frames carry no address",
             advice="open a line for each of them",
         )
@@ -46,7 +46,7 @@ def simulate(ids: Iterable[int] = (wire.MOTOR,), model: str = "", /, **options: 
         raise RequestError(
             f"option motor: {switches.motor} is not possible", expected="1 to 255, not ending in E in hex"
         )
-    return StepperBus(found[0], switches)
+    return StepperBus(wire.ONLY, switches)
 
 
 __all__ = ["MODEL", "OPTIONS", "Change", "Controller", "StepperBus", "Switches", "parse", "simulate"]

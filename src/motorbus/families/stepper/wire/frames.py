@@ -33,13 +33,15 @@ MOTOR: Final = 3
 """The motor number in every frame of the manual; perhaps the rest of a relative with several motors."""
 MOTORS: Final = frozenset(range(1, 256)) - {number for number in range(256) if number & 0x0F == 0x0E}
 """Numbers that a motor can have and still be told from the other two classes."""
+ONLY: Final = 1
+"""What the controller of a line is called: its frames carry no address, so there is one of them."""
 DUMP: Final = COMMANDS["read_project"]
 HIGHEST_PROJECT: Final = 4
 HIGHEST_PORT: Final = 5
 HIGHEST_STEP: Final = 10
 
 Key: TypeAlias = tuple[int, ...]
-"""What matches a reply to its request: byte 2 of a system command, bytes 2 and 3 of the others."""
+"""What matches a reply to its request: all that can be known beforehand of bytes 2 to 5, see `key_of`."""
 
 
 class Request(NamedTuple):
@@ -118,9 +120,22 @@ def decode_request(data: bytes) -> Request | None:
     return Request(command, values, data[2] if command.kind == MOTOR_CLASS else 0)
 
 
-def key_of(data: bytes) -> Key:
-    """The key of a whole request or reply: two bytes, or one for a system command."""
-    return (data[2],) if data[2] & 0x0F == 0x0E else (data[2], data[3])
+def key_of(reply: bytes) -> Key:
+    """The key of a reply: its bytes 2 to 5, but for what no request can foretell.
+
+    That is the level of an input, and the selected project in the replies to commands 11 and 12.
+    """
+    command = command_of(reply[2], reply[3])
+    if command is None or (command.echo == "project" and command.place("project") is None):
+        return tuple(reply[2:3])
+    return tuple(reply[2:5] if command.echo == "level" else reply[2:REPLY_LENGTH])
+
+
+def key_due(request: bytes) -> Key:
+    """The key of the reply that is due to this request. Raises RequestError when it is none."""
+    asked = decode_request(request)
+    image = bytes(IMAGE_LENGTH) if asked is not None and asked.command is DUMP else b""
+    return key_of(encode_reply(request, image=image))
 
 
 def encode_reply(request: bytes, *, project: int = 0, level: int = 0, image: bytes = b"") -> bytes:

@@ -21,8 +21,8 @@ from motorbus.families.stepper.wire.frames import (
     DUMP,
     DUMP_LENGTH,
     HEADER,
-    MOTOR,
     NOTICE,
+    ONLY,
     REPLY_LENGTH,
     key_of,
     reply_fault,
@@ -43,7 +43,7 @@ class Receiver:
 
     __slots__ = ("_last", "_node", "_rest", "_stray")
 
-    def __init__(self, node: int = MOTOR) -> None:
+    def __init__(self, node: int = ONLY) -> None:
         self._node = node
         self._rest = b""
         self._stray = b""
