@@ -14,6 +14,7 @@ from cyclopts import App, Parameter
 
 from motorbus import families, session
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -28,7 +29,7 @@ from motorbus.simulation.mount import Mount, Place
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.core.family import Family
+    from motorbus.core.family import Family, Simulator
 
 app = App(
     name="simulate",
@@ -41,6 +42,9 @@ status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off, help.
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
 
+The file of --inputs has one change on each line, as "2.5 1 on": input 1
+turns on 2.5 s after power-on.
+
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
 Examples:
@@ -51,11 +55,12 @@ Examples:
     motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
     motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
+    motorbus simulate stepper --link /tmp/stepper --inputs buttons.txt
     motorbus simulate feetech --switches""",
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
-_OWN = ("ids", "model", "link", "tcp", "socketcand", "can", "pace", "baud", "bitrate", "control", "switch")
+_OWN = ("ids", "model", "link", "tcp", "socketcand", "can", "pace", "baud", "bitrate", "control", "inputs", "switch")
 
 
 class Ways(NamedTuple):
@@ -81,6 +86,9 @@ def simulate(
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
     baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
+    inputs: Annotated[
+        Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
+    ] = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
     switch: Annotated[
         tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
@@ -100,6 +108,8 @@ def simulate(
     usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
     rate = asked or usual
     simulator.tune(rate)
+    if inputs is not None:
+        _scripted(simulator, inputs, family)
     if usual != found.link.rate and found.link.kind == "bytes":
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
@@ -116,6 +126,15 @@ def simulate(
         output.text(f"ready: {names}  (simulated: {len(nodes)} {family} devices, ids {ids})")
         mount.serve(stop)
     return Exit.OK
+
+
+def _scripted(simulator: Simulator, path: Path, family: str) -> None:
+    """Let the inputs change as this file says. Raises RequestError for a bad one, or where there are no inputs."""
+    script = getattr(simulator, "script", None)
+    if script is None:
+        raise RequestError(f"--inputs {path}: simulated {family} devices have no inputs")
+    with usable(path, "read"):
+        script(path.read_bytes().decode(errors="replace"))
 
 
 def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[tuple[Place, str]]:

@@ -18,7 +18,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator.controller import Controller, Said
 from motorbus.families.stepper.simulator.ear import Ear
-from motorbus.families.stepper.simulator.inputs import Change
+from motorbus.families.stepper.simulator.inputs import Change, parse
 from motorbus.families.stepper.simulator.line import Line
 from motorbus.families.stepper.simulator.switches import Switches
 from motorbus.families.stepper.table import BLANK, INPUTS, RATE
@@ -112,9 +112,9 @@ class StepperBus:
             moment += 2 * pause
         self._later(moment, partial(self._press, port, active), outside=True)
 
-    def script(self, changes: Iterable[Change]) -> None:
-        """Let inputs change as a script says, see `inputs.parse`."""
-        for change in changes:
+    def script(self, changes: str | Iterable[Change]) -> None:
+        """Let inputs change as a script says, see `inputs.parse`. Raises RequestError, naming the line, for a bad one."""
+        for change in parse(changes) if isinstance(changes, str) else changes:
             self.press(change.port, change.active, change.at)
 
     # -- what the controller asks of its surroundings -----------------------------------------------------------------
