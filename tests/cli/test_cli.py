@@ -20,7 +20,7 @@ from tests.cli.conftest import Run
 
 APP = build()
 COMMANDS = [name for name in APP if not name.startswith("-")]
-OF_ONE_FAMILY = ("feetech", "kst")
+OF_ONE_FAMILY = ("feetech", "kst", "stepper")
 FAMILY_COMMANDS = [
     (family, name) for family in OF_ONE_FAMILY for name in APP[family] if not name.startswith("-")
 ]

@@ -43,7 +43,12 @@ def test_notices_disturb_nothing(reporter: Family) -> None:
         for line.notices in ([], said_unasked(reporter)):
             device = there.device(NODE)
             with sent(there.bus) as frames:
-                values = [device.ping(), device.identify(), device.read(), there.bus.run(reporter.scan(there.ids))]
+                values = [
+                    device.ping(),
+                    device.identify(),
+                    device.read(),
+                    there.bus.run(reporter.scan(there.ids)),
+                ]
             looked.append((values, frames))
         assert line.fired
         assert looked[0] == looked[1]

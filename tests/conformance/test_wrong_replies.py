@@ -20,7 +20,7 @@ from tests.conformance.world import IDS, World, sent, world
 
 NODE, OTHER = IDS[:2]
 HEAD = 6
-"""So much of a reply without a checksum says what it answers; what is behind it, changed alike each time, is a value."""
+"""So much of a reply without a checksum says what it answers; what is behind, changed alike each time, is a value."""
 
 
 class Tampering(PerfectLine):

@@ -60,7 +60,20 @@ Examples:
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
-_OWN = ("ids", "model", "link", "tcp", "socketcand", "can", "pace", "baud", "bitrate", "control", "inputs", "switch")
+_OWN = (
+    "ids",
+    "model",
+    "link",
+    "tcp",
+    "socketcand",
+    "can",
+    "pace",
+    "baud",
+    "bitrate",
+    "control",
+    "inputs",
+    "switch",
+)
 
 
 class Ways(NamedTuple):

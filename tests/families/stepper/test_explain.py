@@ -96,9 +96,9 @@ def test_every_byte_of_a_dump_has_a_name() -> None:
     one = only(DUMP_B)
     assert one.title == "dump of project 2, 3 steps"
     named = {part.name: part.meaning for part in one.parts}
-    assert named["project, microsteps"] == "16"
-    assert named["step 2, distance"] == "56814 units"
-    assert named["step 3, output"] == "8 (all off)"
+    assert named["microsteps"] == "16"
+    assert named["step_2_distance"] == "56814 units"
+    assert named["step_3_output"] == "8 (all off)"
     assert named["step 4"] == "all 0"
     assert [part.start for part in one.parts if part.name == "project, reserved"] == [18, 23]
     assert sum(len(part.data) for part in one.parts) == 226

@@ -66,8 +66,8 @@ def test_a_pause_ends_what_has_begun(pause: float, whole: bool) -> None:
 
 def test_a_pause_between_two_things_is_nothing() -> None:
     receiver = wire.Receiver()
-    assert receiver.feed(wire.NOTICE, 0.0) == [Notice(3, "completed", wire.NOTICE)]
-    assert receiver.feed(wire.NOTICE, 3600.0) == [Notice(3, "completed", wire.NOTICE)]
+    assert receiver.feed(wire.NOTICE, 0.0) == [Notice(1, "completed", wire.NOTICE)]
+    assert receiver.feed(wire.NOTICE, 3600.0) == [Notice(1, "completed", wire.NOTICE)]
 
 
 def test_no_bytes_are_no_sign_of_life() -> None:

@@ -130,7 +130,7 @@ def test_what_a_device_says_is_received_whole_and_byte_by_byte(vector: Vector) -
             for event in receiver.feed(vector.data[at : at + size])
         ]
         if vector in NOTICES:
-            assert events == [Notice(3, "completed", vector.data)]
+            assert events == [Notice(1, "completed", vector.data)]
         else:
             assert events == [Reply(0, wire.key_of(vector.data), vector.data)]
         assert receiver.held == 0

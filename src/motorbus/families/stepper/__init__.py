@@ -34,7 +34,15 @@ from motorbus.core.family import (
 from motorbus.core.operation import Answer, Exchange, Operation, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.stepper import driver, wire
-from motorbus.families.stepper.driver import AsyncController, Controller, Promise, line, presence, stopping
+from motorbus.families.stepper.driver import (
+    AsyncController,
+    Controller,
+    Promise,
+    Sends,
+    line,
+    presence,
+    stopping,
+)
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
 from motorbus.families.stepper.table import RATE, TABLES
@@ -50,6 +58,7 @@ __all__ = [
     "Plan",
     "Program",
     "Promise",
+    "Sends",
     "Stepper",
 ]
 

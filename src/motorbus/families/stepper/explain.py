@@ -242,7 +242,8 @@ def _row(image: bytes, rows: tuple[Entry, ...], number: int, where: str) -> Iter
             yield _reserved(image[at : start + row.address], where)
             at = start + row.address
         raw = row.decode(image[at : at + row.size])
-        yield Field(row.size, f"{where}, {row.name}", _value(row.name, raw))
+        name = f"step_{number}_{row.name}" if number else row.name  # as it is read by
+        yield Field(row.size, name, _value(row.name, raw))
         at += row.size
     yield _reserved(image[at : start + wire.ROW_LENGTH], where)
 

@@ -7,6 +7,7 @@ import pytest
 from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator import Change, simulate
+from motorbus.link.memory import MemoryLink
 from tests.families.stepper.simulator.host import (
     DONE,
     FORWARD,
@@ -30,7 +31,7 @@ def test_requests_wait_for_one_another() -> None:
     host = Host(save_time=0.1)
     times = [at for at, _ in host.timed(frame(SAVE, 1) + STOP, 1.0)]
     assert times[0] == pytest.approx(0.102)
-    assert times[1] >= 0.102 + 6 * 10 / 9600
+    assert times[1] == pytest.approx(0.104)
 
 
 def test_no_more_than_so_many_requests_wait() -> None:
@@ -65,9 +66,12 @@ def test_a_notice_that_is_due_in_a_dump_comes_behind_it() -> None:
     host = Host()
     host.write(written(2, step(1)))
     host.say(frame(START, 2), 0.9)
-    pieces = host.timed(frame(READ, 1), 1.0)
-    assert [len(text.split()) for _, text in pieces] == [226, 2]
-    assert pieces[1][0] == pytest.approx(0.002 + 226 * 10 / 9600)
+    link = MemoryLink(host.bus, rate=9600, pace=True, start=host.now)
+    link.write(frame(READ, 1))
+    heard = [(link.now() - host.now, data) for _ in range(2) for data in link.read(host.now + 2.0)]
+    assert [len(data) for _, data in heard] == [226, 2]
+    assert heard[0][0] == pytest.approx((11 + 226) * 10 / 9600 + 0.002)
+    assert heard[1][0] == pytest.approx((11 + 226 + 2) * 10 / 9600 + 0.002)
 
 
 def test_an_echo_comes_before_the_reply() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.families.stepper.simulator.line import BYTE, Line
+from motorbus.families.stepper.simulator.line import Line
 from motorbus.families.stepper.simulator.switches import Switches
 from tests.families.stepper.vectors import DUMP_B
 
@@ -20,16 +20,12 @@ def faulty(**options: object) -> Line:
     return Line(Switches(**options))  # type: ignore[arg-type]  # switches by name
 
 
-def test_a_byte_takes_as_long_as_at_9600_baud() -> None:
-    assert pytest.approx(0.0010416667) == BYTE
-
-
 def test_what_is_due_while_something_is_said_comes_behind_it() -> None:
     line = faulty()
     line.reply(DUMP_B, 1.0)
     line.notice(1.1)
     assert line.speak(1.0) == [(1.0, DUMP_B)]
-    assert line.due() == pytest.approx(1.0 + 226 * BYTE)
+    assert line.due() == 1.1
     assert said(line) == [NOTICE]
     assert line.due() == float("inf")
 

@@ -93,23 +93,23 @@ def test_a_project_tells_its_end_in_virtual_time() -> None:
 def test_a_control_socket_looks_at_it_and_cuts_its_supply() -> None:
     bus = simulate((1,))
     assert '"phase": "idle"' in obey(bus, "status")
-    assert [obey(bus, order) for order in ("power-cycle", "unplug 3", "plug 3")] == ["ok"] * 3
+    assert [obey(bus, order) for order in ("power-cycle", "unplug 1", "plug 1")] == ["ok"] * 3
     assert obey(bus, "unplug 9").startswith("error: there is no node 9")
 
 
 @pytest.mark.parametrize(
     ("order", "answer"),
     [
-        ("set-input 3 2 on", "ok"),
-        ("set-input 3 2 off", "ok"),
-        ("set-input 3 9 on", "error: there is no input 9"),
-        ("set-input 4 2 on", "error: there is no node 4; there are: 3"),
-        ("set-input 3 two on", "error: the order is: set-input ID INPUT on|off"),
-        ("set-input 3 2 up", "error: the order is: set-input ID INPUT on|off"),
-        ("set-input 3 2", "error: the order is: set-input ID INPUT on|off"),
+        ("set-input 1 2 on", "ok"),
+        ("set-input 1 2 off", "ok"),
+        ("set-input 1 9 on", "error: there is no input 9"),
+        ("set-input 4 2 on", "error: there is no node 4; there are: 1"),
+        ("set-input 1 two on", "error: the order is: set-input ID INPUT on|off"),
+        ("set-input 1 2 up", "error: the order is: set-input ID INPUT on|off"),
+        ("set-input 1 2", "error: the order is: set-input ID INPUT on|off"),
     ],
 )
 def test_a_control_socket_presses_its_buttons(order: str, answer: str) -> None:
     bus = simulate((1,))
     assert obey(bus, order) == answer
-    assert bus.controller.status()["inputs"] == ([2] if order == "set-input 3 2 on" else [])
+    assert bus.controller.status()["inputs"] == ([2] if order == "set-input 1 2 on" else [])

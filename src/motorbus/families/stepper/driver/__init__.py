@@ -10,8 +10,16 @@ from __future__ import annotations
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
 from motorbus.families.stepper.driver.node import Node, checked_motor
 from motorbus.families.stepper.driver.presence import identify, ping
-from motorbus.families.stepper.driver.reading import dump, dump_once, read, read_input, read_project, read_raw, vote
-from motorbus.families.stepper.driver.scanning import scan
+from motorbus.families.stepper.driver.reading import (
+    dump,
+    dump_once,
+    read,
+    read_input,
+    read_project,
+    read_raw,
+    vote,
+)
+from motorbus.families.stepper.driver.scanning import Sends, scan
 from motorbus.families.stepper.driver.stopping import Promise, stop
 
 __all__ = [
@@ -19,6 +27,7 @@ __all__ = [
     "Controller",
     "Node",
     "Promise",
+    "Sends",
     "checked_motor",
     "dump",
     "dump_once",

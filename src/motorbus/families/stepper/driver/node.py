@@ -13,6 +13,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import TABLE
 
+
 class Node:
     """The controller of a line. `motor` is the number that motor commands name. Raises RequestError for another id."""
 

@@ -87,7 +87,10 @@ def read_project(node: Node, project: int = 1) -> Operation[Program]:
 
 
 def read(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, Value]]:
-    """Parameters of a project in API units by name, all when none is named. Raises as `dump`, and RequestError for a name."""
+    """Parameters of a project in API units by name, all when none is named.
+
+    Raises as `dump`, and RequestError for an unknown name.
+    """
     raws = yield from read_raw(node, *names, project=project)
     return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
 

@@ -6,11 +6,12 @@ It says what it sends before it sends it. Other lines are never looked at, and n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
 from motorbus.core.operation import (
     Alone,
+    Data,
     Operation,
     Progress,
     Report,
@@ -27,12 +28,19 @@ from motorbus.families.stepper.driver.reading import dump_once
 PASSES: Final = 2
 
 
+class Sends(NamedTuple):
+    """An event: this request, and nothing else, is about to be sent at this rate (bit/s) to find out who is there."""
+
+    request: Data
+    rate: int
+
+
 def scan(
     ids: Sequence[int] = (), rates: Sequence[int] = (), motor: int = wire.MOTOR
 ) -> Operation[list[Found]]:
     """The controller of this line, if it answers; `rates` () is the present one, which is set again in the end.
 
-    Reports `Progress`, with the frame that is about to be sent, and `Found`. Raises RequestError for an id that no
+    Reports `Sends`, `Progress` and `Found`. Raises RequestError for an id that no
     controller has. Writes nothing.
     """
     for node in ids:
@@ -55,8 +63,8 @@ def _at(rate: int, motor: int) -> Operation[list[Found]]:
     node = Node(motor=motor)
     for number in range(PASSES):
         asked = dump_once(node, 1, timeout=Timeout.SCAN)
-        shown = wire.encode("read_project", project=1).hex(" ").upper()
-        yield from Report(Progress(number, PASSES, f"sending {shown} (read project 1) at {rate} bit/s"))
+        yield from Report(Sends(asked.request, rate))
+        yield from Report(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
         try:
             yield from asked
         except (NoReply, WireError):

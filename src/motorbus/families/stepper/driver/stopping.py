@@ -34,8 +34,8 @@ class Promise(Enum):
 def stop(node: Node) -> Operation[Promise]:
     """End the project, then any other motion. Returns what was promised.
 
-    Each is said up to three times, the second also when the first was not accepted. Raises NoReply or WireError when
-    one of them never was.
+    Each is said up to three times, the second also when the first was not accepted. Raises OutcomeUnknown
+    when one of them never was, for it may have been heard all the same.
     """
     failures = []
     for name in STOPS:

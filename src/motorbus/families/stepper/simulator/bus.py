@@ -113,7 +113,7 @@ class StepperBus:
         self._later(moment, partial(self._press, port, active), outside=True)
 
     def script(self, changes: str | Iterable[Change]) -> None:
-        """Let inputs change as a script says, see `inputs.parse`. Raises RequestError, naming the line, for a bad one."""
+        """Let inputs change as a script says, see `inputs.parse`. Raises RequestError, naming the line."""
         for change in parse(changes) if isinstance(changes, str) else changes:
             self.press(change.port, change.active, change.at)
 

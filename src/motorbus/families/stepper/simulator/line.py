@@ -1,7 +1,8 @@
 """What leaves the device, one thing after the other, and what faults make of it.
 
-A serial line has one sender at this end: a notice that is due while a dump is on its way comes behind it. Faults are
-not by chance. The so-many-th reply is hit, always in the same way, so a test that fails fails again.
+A serial line has one sender at this end: a notice that is due while a dump is on its way comes behind it. How long a
+byte takes is the affair of the link or the port, as of every simulated device: on one without pace it takes no time.
+Faults are not by chance. The so-many-th reply is hit, always in the same way, so a test that fails fails again.
 """
 
 from __future__ import annotations
@@ -12,10 +13,7 @@ from typing import Final
 
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.simulator.switches import Switches
-from motorbus.families.stepper.table import RATE
 
-BYTE: Final = 10 / RATE
-"""s on the wire for one byte: start, eight of data, stop."""
 NOISE: Final = b"\x00\x55\xff"
 """What comes before a reply with reply_fault=noise; its end might begin a header."""
 OTHER: Final = bytes.fromhex("FFAA030D0000")
@@ -29,22 +27,19 @@ class Line:
         self._switches = switches
         self._voices: list[tuple[float, int, bytes]] = []
         self._order = count()
-        self._free = float("-inf")
         self._replies = 0
         self._held = 0
 
     def due(self) -> float:
         """When the next thing begins; infinity when there is none."""
-        return max(self._voices[0][0], self._free) if self._voices else float("inf")
+        return self._voices[0][0] if self._voices else float("inf")
 
     def speak(self, to: float) -> list[tuple[float, bytes]]:
         """Everything that begins up to this moment, with its own."""
         said = []
         while self.due() <= to:
             begin = self.due()
-            data = heappop(self._voices)[2]
-            self._free = begin + len(data) * BYTE
-            said.append((begin, data))
+            said.append((begin, heappop(self._voices)[2]))
         return said
 
     def hush(self) -> None:
