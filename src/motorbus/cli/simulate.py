@@ -60,6 +60,12 @@ Examples:
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
+Inputs = Annotated[
+    Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
+]
+Switched = Annotated[
+    tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
+]
 _OWN = (
     "ids",
     "model",
@@ -99,13 +105,9 @@ def simulate(
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
     baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
-    inputs: Annotated[
-        Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
-    ] = None,
+    inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
-    switch: Annotated[
-        tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
-    ] = (),
+    switch: Switched = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **flags: Annotated[str, Parameter(help="A switch of the family, as --NAME VALUE.")],
@@ -121,8 +123,7 @@ def simulate(
     usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
     rate = asked or usual
     simulator.tune(rate)
-    if inputs is not None:
-        _scripted(simulator, inputs, family)
+    _scripted(simulator, inputs, family)
     if usual != found.link.rate and found.link.kind == "bytes":
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
@@ -141,8 +142,10 @@ def simulate(
     return Exit.OK
 
 
-def _scripted(simulator: Simulator, path: Path, family: str) -> None:
+def _scripted(simulator: Simulator, path: Path | None, family: str) -> None:
     """Let the inputs change as this file says. Raises RequestError for a bad one, or where there are no inputs."""
+    if path is None:
+        return
     script = getattr(simulator, "script", None)
     if script is None:
         raise RequestError(f"--inputs {path}: simulated {family} devices have no inputs")

@@ -24,7 +24,7 @@ Examples:
 
     motorbus stepper convert backup/project1.bin > project1.toml
     motorbus stepper convert examples/pick_and_place.toml --to frames
-    motorbus stepper convert examples/pick_and_place.toml --to dump --output pick.bin""",
+    motorbus stepper convert pick.toml --to dump --output pick.bin""",
 )
 def convert(file: File, *, to: str = "toml", output_: Path | None = None, output: Silent) -> Exit:
     """Turn a program into another form.

@@ -112,6 +112,15 @@ def test_a_script_of_inputs_begins_with_the_supply() -> None:
     assert levels == [0, 1, 0]
 
 
+def test_a_script_is_no_reason_to_begin_at_another_moment_than_told() -> None:
+    bus = simulate()
+    bus.script("0.0 2 on  # at once\n3600 1 on")
+    assert bus.due() is None
+    bus.advance(1000.0)
+    assert bus.nodes[1].status()["inputs"] == [2]
+    assert bus.due() == 4600.0
+
+
 def test_a_hand_on_a_button_needs_no_supply() -> None:
     host = Host()
     host.bus.press(1, True, host.now + 1.0)

@@ -94,8 +94,8 @@ class StepperBus:
         return said if self._hears else []
 
     def due(self) -> float | None:
-        """When something happens next by itself, or None."""
-        moment = self._next()
+        """When something happens next by itself, or None; before its first moment nobody knows when that will be."""
+        moment = self._next() if self._awake else inf
         return None if moment == inf else moment
 
     def press(self, port: int, active: bool, at: float) -> None:

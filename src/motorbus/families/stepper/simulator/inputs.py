@@ -5,7 +5,7 @@
     2.7   1  off
     3.3   2  on
 
-Seconds count from the first moment the controller is spoken to, which is when its supply comes.
+Seconds count from the first moment of the simulation, which is when the supply of the controller comes.
 """
 
 from __future__ import annotations
