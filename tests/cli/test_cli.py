@@ -37,7 +37,7 @@ def examples(words: tuple[str, ...]) -> list[str]:
 
 
 EXAMPLES = sorted({line for words in ALL for line in examples(words)})
-SIMULATED = [line for line in EXAMPLES if re.search(r"(feetech|kst):sim", line) and " > " not in line]
+SIMULATED = [line for line in EXAMPLES if re.search(r"(feetech|kst|stepper):sim", line) and " > " not in line]
 
 
 def arguments(line: str) -> list[str]:
