@@ -35,7 +35,7 @@ def test_its_inputs_follow_a_file(tmp_path: Path) -> None:
 
 def test_a_project_runs_to_its_end_over_a_socket() -> None:
     with (
-        Simulated("stepper", tcp="0", **{"ramp-tick-ms": "0.5"}) as simulated,
+        Simulated("stepper", tcp="0", ramp_tick_ms="0.5") as simulated,
         socket.create_connection(("127.0.0.1", int(simulated.bus.rpartition(":")[2])), timeout=30) as client,
     ):
         client.sendall(START)
