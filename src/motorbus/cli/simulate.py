@@ -29,7 +29,7 @@ from motorbus.simulation.mount import Mount, Place
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.core.family import Family, Simulator
+    from motorbus.core.family import Family
 
 app = App(
     name="simulate",
@@ -142,7 +142,7 @@ def simulate(
     return Exit.OK
 
 
-def _scripted(simulator: Simulator, path: Path | None, family: str) -> None:
+def _scripted(simulator: object, path: Path | None, family: str) -> None:
     """Let the inputs change as this file says. Raises RequestError for a bad one, or where there are no inputs."""
     if path is None:
         return
