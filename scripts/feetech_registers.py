@@ -31,7 +31,8 @@ DATABASE: Final = PAGE.with_suffix(".json")
 HEAD: Final = """# FEETECH registers
 
 FEETECH servos have six register maps, and the model does not tell which: firmware and byte order do. This page has
-every row of each map with its source, and a note where sources disagree and on what was chosen. It is made by
+every row of each map with its source. Where sources disagree, or none confirms it, the column "in doubt" says who says
+what, and what was chosen; in the database that is `conflict`, which is empty elsewhere. The page is made by
 `python -m scripts.feetech_registers` from the rows that the program itself uses; the same rows are there
 [as JSON](feetech-registers.json), and in the shell, with `--json` too:
 
@@ -40,9 +41,9 @@ $ motorbus feetech registers --map hls
 $ motorbus feetech models
 ```
 
-What motorbus does with them: servos of all six maps are found, identified and read by name. Those of the STS map are
-also written and moved. The others refuse to be written and moved until their driver exists, for the same address means
-another thing in each map: 48 is the torque limit here and the lock there. The simulator knows the STS map only.
+What motorbus does with them: servos of all six maps are found, identified, read, written, moved and simulated. Which
+map it is matters, for the same address means another thing in each: 48 is the torque limit here and the lock there. A
+servo with other firmware is read by what all maps share, and never written, but for torque off.
 
 A word has its low byte first (little-endian), on SCS its high byte. A negative number is the magnitude with the sign
 bit set; never two's complement. The range bounds the raw number; times the unit it is a value. `effect` is the worst
@@ -81,7 +82,7 @@ def _map(table: Table) -> Iterator[str]:
     yield f"## {table.name}\n"
     yield f"{table.title[0].upper()}{table.title[1:]}. {len(table)} registers.\n"
     columns = ("address", "register", "bytes", "in", "access", "sign", "range", "default", "unit", "effect")
-    yield from _table((*columns, "meaning", "source", "note"), map(_row, table.values()))
+    yield from _table((*columns, "meaning", "source", "in doubt", "note"), map(_row, table.values()))
 
 
 def _row(row: Entry) -> list[object]:
@@ -92,7 +93,7 @@ def _row(row: Entry) -> list[object]:
         "" if row.default is None else row.default,
         f"{row.scale:.6g} {row.unit}" if row.unit else "",
         row.effect.name.lower() if row.writable else "",
-        *("<br>".join(meanings(row)), row.source, row.note),
+        *("<br>".join(meanings(row)), row.source, row.conflict, row.note),
     ]
 
 

@@ -13,9 +13,9 @@ import pytest
 
 import motorbus
 from motorbus import journal, session
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, Journal
+from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, Journal
 from motorbus.errors import LinkError, RequestError
-from motorbus.journal import REACHED, BusJournal
+from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path, state_folder
 
 BUS = "feetech:/dev/ttyACM7"
@@ -150,7 +150,6 @@ def test_a_file_of_a_later_version_is_refused_with_what_to_do(path: Path, conten
     kept = BusJournal(BUS, path)
     works: list[Callable[[], object]] = [
         kept.unfinished,
-        journal.everywhere,
         lambda: kept(record(ASKED)),
         lambda: kept(record(INTENT)),
     ]
@@ -158,6 +157,9 @@ def test_a_file_of_a_later_version_is_refused_with_what_to_do(path: Path, conten
         with pytest.raises(RequestError, match="does not know") as caught:
             work()
     assert "version that wrote it" in caught.value.advice
+    (told,) = journal.everywhere()
+    assert isinstance(told, RequestError)
+    assert "does not know" in told.summary
     assert "does not know" in kept.warning()
     assert path.read_bytes() == content
 
@@ -196,12 +198,75 @@ def test_every_unfinished_change_of_this_user_is_listed(path: Path) -> None:
     done = BusJournal("feetech:COM8", journal_path("COM8"))
     done(record(INTENT))
     done(record(OUTCOME, outcome="old"))
-    assert {change.bus for change in journal.everywhere()} == {BUS, "feetech:COM7"}
+    journal_path("COM9").write_text('{"format": 2}')
+    listed = [change.bus for change in journal.everywhere() if isinstance(change, journal.Change)]
+    assert sorted(listed) == [BUS, "feetech:COM7"], "one that cannot be read hides no other"
 
 
 def test_the_journal_lies_beside_the_lock_of_its_port(path: Path) -> None:
     assert path.parent == state_folder()
     assert journal_path("socket://LOCALHOST:4000") == journal_path("socket://127.0.0.1:4000/")
+
+
+def test_a_record_whose_facts_are_others_belongs_to_another_change(path: Path) -> None:
+    """Two changes of one program: the second must not end the first, whatever has come in between."""
+    kept = begun(path)
+    for facts in ({"node": 4}, {"new": 8}, {"node": 3, "new": 8}):
+        with pytest.raises(RequestError, match="unfinished"):
+            kept(record(OUTCOME, outcome="old", **facts))
+    assert kept.unfinished() is not None
+    kept(record(OUTCOME, outcome="old", node=3, new=7, something="else"))
+    assert kept.unfinished() is None
+
+
+@pytest.mark.parametrize(
+    "line", [b"[1]", b'"x"', b'{"state": "x", "facts": [1]}', b'{"state": "x", "facts": {"node": "3"}}', b"[" * 9999]
+)
+def test_a_journal_with_odd_contents_is_borne_told_and_forgotten(path: Path, line: bytes) -> None:
+    head = b'{"format": 1, "bus": "feetech:/dev/ttyACM7"}\n'
+    path.write_bytes(head + line + b"\n")
+    kept = BusJournal(BUS, path)
+    change = kept.unfinished()
+    assert bool(kept.warning()) is (change is not None)
+    if change is not None:
+        assert journal.everywhere() == [change]
+        with pytest.raises(RequestError, match="does not say which device") as caught:
+            _ = change.node
+        assert "--forget" in caught.value.advice
+    kept.forget()
+    assert kept.unfinished() is None
+    kept(record(INTENT))
+
+
+def test_a_first_record_says_which_device_it_is_about(path: Path) -> None:
+    """Nobody could end a change that begins with the word that somebody goes on."""
+    kept = BusJournal(BUS, path)
+    with pytest.raises(RequestError, match="nothing is known of its beginning"):
+        kept(Journal("set_id", "recovering", {}))
+    assert not path.exists()
+
+
+def test_what_was_reached_elsewhere_goes_along(path: Path) -> None:
+    kept = BusJournal(BUS, path)
+    kept(record("recovering", **FACTS, reached=[INTENT, "writing 7"]))
+    change = kept.unfinished()
+    assert change is not None
+    assert change.facts[REACHED] == [INTENT, "writing 7", "recovering"]
+    kept(record("recovering", **FACTS, reached=["of something else"]))
+    after = kept.unfinished()
+    assert after is not None
+    assert after.facts[REACHED] == [INTENT, "writing 7", "recovering", "recovering"]
+
+
+def test_a_file_is_found_by_the_name_that_the_bus_had(path: Path) -> None:
+    begun(path)
+    assert journal.told_by(lambda bus: bus == BUS) == [path]
+    assert journal.told_by(lambda bus: bus == "feetech:COM7") == []
+    other = journal_path("COM7")
+    other.write_bytes(b'{"format": 2}\n')
+    assert journal.told_by(lambda _: True) == [path], "what cannot be read is none, and hinders nobody"
+    BusJournal(BUS, path)(record(OUTCOME, outcome="old"))
+    assert journal.told_by(lambda _: True) == []
 
 
 # -- at open ------------------------------------------------------------------------------------------------------
@@ -246,4 +311,4 @@ def test_records_go_to_the_journal_whoever_listens() -> None:
         assert isinstance(bus.journal, BusJournal)
         assert b'"outcome": "new"' in bus.journal._content()
     states = [event.state for event in heard if isinstance(event, Journal)]
-    assert states == [ASKED, INTENT, "writing 7", "written 7", OUTCOME]
+    assert states == [ASKED, ASKED, INTENT, "writing 7", "written 7", OUTCOME]

@@ -11,17 +11,16 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, Journal
+from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, Journal
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.link.lock import journals
 
 FORMAT: Final = 1
-REACHED: Final = "reached"
-"""Among the facts of a change: the states it has been recorded in, in order."""
 
 
 class Change(NamedTuple):
@@ -37,8 +36,15 @@ class Change(NamedTuple):
 
     @property
     def node(self) -> int:
-        """The id that the device had when it began."""
-        return int(self.facts["node"])
+        """The id that the device had when it began. Raises RequestError for a record that does not say."""
+        node = self.facts.get("node")
+        if isinstance(node, bool) or not isinstance(node, int):
+            raise RequestError(
+                f"the journal of {self.bus} does not say which device was to change",
+                cause="something else wrote it, or it was damaged",
+                advice=_FORGET.format(self.bus),
+            )
+        return node
 
 
 class BusJournal:
@@ -55,16 +61,23 @@ class BusJournal:
     def __call__(self, event: object) -> None:
         """Record it; it is on disk when this returns.
 
-        Raises RequestError while another change is unfinished, and for a file that a later version wrote; LinkError
-        when the file cannot be written.
+        Raises RequestError while another change is unfinished (one by another verb, or whose facts are others), for
+        a first record that does not say which device it is about, which nobody could recover, and for a file that a
+        later version wrote; LinkError when the file cannot be written.
         """
         assert isinstance(event, Journal)
         open_change = self.unfinished()
         begins = event.state in (ASKED, INTENT)
-        if open_change is not None and (begins or event.change != open_change.verb):
+        if open_change is not None and (begins or not _belongs(event, open_change)):
             raise _unfinished(open_change)
         if event.state == ASKED or (event.state == OUTCOME and open_change is None):
             return
+        if open_change is None and "node" not in event.facts:
+            raise RequestError(
+                f"{event.change}() has reached {event.state!r} and nothing is known of its beginning",
+                cause="its journal has been closed in the meantime, by `motorbus recover` or another task",
+                advice="look where the device is before it is changed again",
+            )
         record = {"change": event.change, "state": event.state, "at": _now(), "facts": event.facts}
         if open_change is None:
             head = {"format": FORMAT, "what": "changes of devices on this bus", "bus": self.bus}
@@ -75,6 +88,10 @@ class BusJournal:
     def unfinished(self) -> Change | None:
         """The change that has begun and has no outcome yet. Raises RequestError for a file of a later version."""
         return _read(self._content(), self.path)
+
+    def forget(self) -> None:
+        """Leave nothing unfinished, whatever the file holds. Raises LinkError when it cannot be written."""
+        self._replace(b"")
 
     def warning(self) -> str:
         """What the user of this bus ought to know about it; "" when nothing is unfinished."""
@@ -122,10 +139,32 @@ class BusJournal:
             raise _unusable(self.path, "written", error) from error
 
 
-def everywhere() -> list[Change]:
-    """Every unfinished change on any bus of this user. Raises RequestError for a file that a later version wrote."""
-    found = (_read(path.read_bytes(), path) for path in journals())
-    return [change for change in found if change is not None]
+def everywhere() -> list[Change | MotorbusError]:
+    """Every unfinished change on any bus of this user; for a file that cannot be read, why: it hides no other."""
+    found: list[Change | MotorbusError] = []
+    for path in journals():
+        try:
+            change = BusJournal("", path).unfinished()
+        except MotorbusError as error:
+            found.append(error)
+        else:
+            found += [change] if change is not None else []
+    return found
+
+
+def told_by(name: Callable[[str], bool]) -> list[Path]:
+    """The files of unfinished changes on buses whose address, as it was said then, is one that `name` knows.
+
+    A port may have lost the name by which its user knows it, as a link to an adapter that is gone. A file that cannot
+    be read is none of them.
+    """
+    found = []
+    for path in journals():
+        with contextlib.suppress(MotorbusError, OSError):
+            change = _read(path.read_bytes(), path)
+            if change is not None and name(change.bus):
+                found.append(path)
+    return found
 
 
 def _read(content: bytes, path: Path | None) -> Change | None:
@@ -138,12 +177,14 @@ def _read(content: bytes, path: Path | None) -> Change | None:
     for record in map(_parsed, rest):
         if record is None:
             continue
-        state, facts = str(record.get("state")), record.get("facts") or {}
+        state, facts = str(record.get("state")), _plain(record.get("facts"))
         if state == OUTCOME:
             change = None
         elif change is None:
+            before = facts.get(REACHED)
+            reached = [*map(str, before if isinstance(before, list) else ()), state]
             change = Change(
-                bus, str(record.get("change")), {**facts, REACHED: [state]}, str(record.get("at"))
+                bus, str(record.get("change")), {**facts, REACHED: reached}, str(record.get("at"))
             )
         else:
             change.facts[REACHED].append(state)
@@ -158,15 +199,19 @@ def _bus(head: dict[str, Any] | None, path: Path | None) -> str:
             expected=f"format {FORMAT}",
             cause="a later version wrote it, or something else did",
             advice="finish what it holds with the version that wrote it, or, if every device of this bus has its id and"
-            " rate, remove the file",
+            " rate, `motorbus recover BUS --forget` or remove the file",
         )
     return str(head.get("bus"))
+
+
+def _plain(facts: object) -> dict[str, Any]:
+    return facts if isinstance(facts, dict) else {}
 
 
 def _parsed(line: bytes) -> dict[str, Any] | None:
     try:
         record = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return record if isinstance(record, dict) else None
 
@@ -199,7 +244,17 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
+def _belongs(event: Journal, change: Change) -> bool:
+    """Is this a record of that change? It has the same verb, and no fact of it is another."""
+    return event.change == change.verb and all(
+        change.facts.get(name, fact) == fact for name, fact in event.facts.items() if name != REACHED
+    )
+
+
 _ADVICE: Final = "`motorbus recover {}` finishes it or takes it back"
+_FORGET: Final = (
+    "when every device of that bus has its id and rate, `motorbus recover {} --forget` gives it up"
+)
 
 
 def _described(change: Change) -> str:

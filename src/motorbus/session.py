@@ -24,7 +24,7 @@ from motorbus.core import units
 from motorbus.core.family import Family
 from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.journal import BusJournal, Change
+from motorbus.journal import BusJournal, Change, told_by
 from motorbus.link.base import Link
 from motorbus.link.lock import journal_path, socket_path
 from motorbus.link.memory import MemoryLink
@@ -237,7 +237,19 @@ def journal_of(address: str) -> BusJournal | None:
     """The journal of a real port, open or not; None where none is kept. Raises RequestError for a bad address."""
     name = lock_name(address, {})
     simulated = name == "sim" or name.startswith("sim:")
-    return BusJournal(address, journal_path(name)) if name and not simulated else None
+    return _journal_on(address, name) if name and not simulated else None
+
+
+def _journal_on(address: str, port: str) -> BusJournal:
+    """The journal of this port; when nothing is unfinished there, that of a port which had this address when a change
+    was cut off: the address may be a link, to an adapter that has come back under another name or not at all."""
+    kept = BusJournal(address, journal_path(port))
+    if kept.warning():
+        return kept
+    spot = parse_address(address)
+    for path in told_by(lambda bus: parse_address(bus)[:2] == spot[:2]):
+        return BusJournal(address, path)
+    return kept
 
 
 def simulate(
@@ -294,7 +306,7 @@ def _journal(spot: Address, options: Mapping[str, object], opening: Opening, lin
     if opening.port == "sim":
         return BusJournal(address)
     name: str = getattr(link, "lock_name", opening.port)
-    return BusJournal(address, journal_path(name)) if name else None
+    return _journal_on(address, name) if name else None
 
 
 def _warn(bus: BusFace, journal: BusJournal | None) -> None:

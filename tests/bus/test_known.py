@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.known import FRESH, Known
+from motorbus.bus.known import FRESH, Known, withdraws
 from motorbus.core.operation import Answer, CanFrame, Effect, Exchange, Rank, Reply
 from tests.bus.lanes import RATE, Lanes, move, read, said
 
@@ -67,3 +67,25 @@ def test_reading_keeping_and_stopping_move_nobody(known: Known) -> None:
 def test_frames_made_beforehand_tell_no_position(known: Known) -> None:
     known.hear(1, seen(1, 5.0), RATE)
     assert [exchange.effect for exchange in known.frames.exchanges] == [Effect.NONE]
+
+
+def test_how_often_each_was_stopped_is_counted(known: Known) -> None:
+    assert (known.stops(1), known.stops(2)) == (0, 0)
+    known.order(move(1, 5, rank=Rank.STOP), RATE)
+    known.order(move(1, 5), RATE)
+    assert (known.stops(1), known.stops(2)) == (1, 0)
+    known.order(Exchange(CanFrame(0x600, bytes(8)), effect=Effect.TORQUE, rank=Rank.STOP), RATE)
+    assert (known.stops(1), known.stops(2)) == (2, 1)
+
+
+def test_a_stop_withdraws_what_would_move_its_node_and_nothing_else() -> None:
+    stop = move(1, 5, rank=Rank.STOP)
+    everybody: Exchange[Answer] = Exchange(CanFrame(0x600, bytes(8)), effect=Effect.TORQUE, rank=Rank.STOP)
+    anybody: Exchange[Answer] = Exchange(CanFrame(0x600, bytes(8)), effect=Effect.TORQUE)
+    assert withdraws(stop, move(1, 9))
+    assert withdraws(stop, anybody)
+    assert withdraws(everybody, move(2, 9))
+    assert not withdraws(stop, move(2, 9))
+    assert not withdraws(stop, stop)
+    assert not withdraws(stop, read(1))
+    assert not withdraws(read(1), move(1, 9))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+import motorbus
 from motorbus.families.feetech.table import STS
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
@@ -40,6 +43,28 @@ def test_a_table_for_eyes(run: Run, arm: Simulation) -> None:
     assert "STS3215 (simulated)" in ran.out
     assert lines["present_position"].split()[1:5] == ["56", "3.1416", "rad", "(180.0°)"]
     assert "position" in lines["operating_mode"]
+
+
+@pytest.mark.parametrize("model", ["sts3215", "scs0009", "sm85blhv", "sm60-360m", "hls3925", "scs215-2"])
+def test_an_open_lock_is_seen_and_how_to_close_it(model: str, run: Run) -> None:
+    with motorbus.simulate("feetech", ids="1", model=model) as simulation:
+        device = f"{simulation.url}#1"
+        ran = run("info", device, "--json")
+        assert (ran.document["lock"], ran.err) == ("closed", "")
+        simulation[1].memory["lock"] = 0
+        ran = run("info", device)
+        assert [line.split()[1] for line in ran.out.splitlines() if line.startswith("lock")] == ["open"]
+        assert "every write to EEPROM is for good: `motorbus write BUS#ID lock=1` closes it" in ran.err
+        assert run("info", device, "--registers", "--json").document["lock"] == "open"
+        assert run("write", device, "lock=1").code == 0
+        assert simulation[1].memory["lock"] == 1
+        assert run("info", device).err == ""
+
+
+def test_who_has_no_lock_tells_of_none(run: Run) -> None:
+    assert "lock" not in run("info", "kst:sim#1", "--json").document
+    with motorbus.simulate("feetech", ids="1", firmware="9.1") as simulation:
+        assert "lock" not in run("info", f"{simulation.url}#1", "--json").document
 
 
 def test_one_device_at_a_time(run: Run, arm: Simulation) -> None:

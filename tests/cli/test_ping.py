@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import motorbus
+from motorbus.simulation.faults import ScriptedLine
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -43,5 +44,26 @@ def test_everyone_at_once_where_the_answers_do_not_collide(run: Run) -> None:
     assert [one["id"] for one in found] == [1, 4]
 
 
-def test_answers_that_collide_are_no_answer(run: Run, arm: Simulation) -> None:
-    assert run("ping", arm.url, "--broadcast").code == 5
+def test_answers_that_collide_are_told_from_silence(run: Run, arm: Simulation) -> None:
+    ran = run("ping", arm.url, "--broadcast")
+    assert (ran.code, ran.out) == (5, "")
+    assert "something answers, and not one answer came whole" in ran.err
+    assert "several devices answered at once" in ran.err
+    assert f"`motorbus scan {arm.url}`" in ran.err
+    assert "no power" not in ran.err
+    for servo in (1, 2, 3):
+        arm[servo].unplug()
+    ran = run("ping", arm.url, "--broadcast")
+    assert (ran.code, ran.out) == (5, "")
+    assert "no device answers" in ran.err
+    assert "several" not in ran.err
+
+
+def test_some_of_the_answers_to_a_broadcast_are_garbled(run: Run) -> None:
+    with motorbus.simulate("feetech", ids="1+4", broadcast_ping="in_turn") as arm:
+        arm.line = ScriptedLine("exchange 2 byte 11: corrupt 01")  # the last byte of the second answer
+        ran = run("ping", arm.url, "--broadcast", "--json")
+    assert ran.code == 6
+    assert [one["id"] for one in ran.records[0]["devices"]] == [1]
+    assert "part of what came was garbled" in ran.err + ran.out
+    assert "`motorbus scan" in ran.err + ran.out

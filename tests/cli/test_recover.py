@@ -68,7 +68,7 @@ def test_kill_9_in_the_middle_of_a_rate(run: Run, served: Simulated) -> None:
     assert "motorbus recover" in run("recover").out
     ran = run("recover", served.bus, "--yes")
     assert ran.code == 0, ran.err
-    assert ran.out == "finished: the change of #3 to 500000 bit/s\n"
+    assert ran.out == f"finished: the change of #3 to 500000 bit/s; it is {served.bus},baud=500000#3 now\n"
     assert run("ping", f"{served.bus},baud=500000#3").code == 0
 
 
@@ -137,10 +137,13 @@ def test_a_port_that_has_another_name_since(run: Run, served: Simulated, tmp_pat
     killed("written 7", "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
     (path,) = (tmp_path / "state" / "motorbus").glob("*.journal")
     gone = "feetech:/dev/ttyACM42"
+    path.write_text(path.read_text().replace(served.bus, gone))
     path.rename(journal_path("/dev/ttyACM42"))
     assert run("recover", served.bus).out == f"nothing is unfinished on {served.bus}\n"
     ran = run("recover", served.bus, "--of", gone, "--yes")
-    assert (ran.code, ran.out) == (0, "finished: the change of #3 to #7\n"), ran.err
+    assert (ran.code, ran.out) == (0, f"finished: the change of #3 to #7; it is {served.bus}#7 now\n"), (
+        ran.err
+    )
     assert run("recover").out == "nothing is unfinished\n"
 
 
@@ -152,6 +155,67 @@ def test_a_change_on_a_port_that_is_gone_is_given_up_without_it(run: Run, state_
     ran = run("recover", "feetech:/dev/ttyACM42", "--forget", "--yes")
     assert (ran.code, ran.out) == (0, "forgotten: the change of #3 to #7\n")
     assert kept.unfinished() is None
+
+
+@pytest.fixture
+def link(served: Simulated, tmp_path: Path) -> Path:
+    """The port by a name of its user's, a link; the id of servo 3 was half changed by that name."""
+    link = tmp_path / "arm"
+    link.symlink_to(served.bus.partition(":")[2])
+    killed("written 7", "set-id", f"feetech:{link}#3", "7", "--yes", "--among", "1-9")
+    return link
+
+
+def test_a_link_that_is_gone_names_its_journal_all_the_same(run: Run, link: Path) -> None:
+    link.unlink()
+    assert f"motorbus recover feetech:{link}" in run("recover").out
+    ran = run("recover", f"feetech:{link}", "--yes")
+    assert ran.code == 3, "without a port nothing can be done, and nobody says that nothing is to be done"
+    ran = run("recover", f"feetech:{link}", "--forget", "--yes")
+    assert (ran.code, ran.out) == (0, "forgotten: the change of #3 to #7\n"), ran.err
+    assert run("recover").out == "nothing is unfinished\n"
+
+
+def test_a_link_that_leads_elsewhere_since_names_its_journal_all_the_same(
+    run: Run, served: Simulated, link: Path, tmp_path: Path
+) -> None:
+    """The adapter was plugged in again, and the system has given it another number."""
+    (path,) = (tmp_path / "state" / "motorbus").glob("*.journal")
+    path.rename(journal_path("/dev/ttyACM42"))
+    told = run("ping", f"feetech:{link}#1")
+    assert (told.code, f"motorbus recover feetech:{link}" in told.err) == (0, True)
+    assert run("set-id", f"feetech:{link}#1", "8", "--yes").code == 2
+    ran = run("recover", f"feetech:{link}", "--yes")
+    assert (ran.code, ran.out) == (0, f"finished: the change of #3 to #7; it is feetech:{link}#7 now\n"), (
+        ran.err
+    )
+    assert run("recover").out == "nothing is unfinished\n"
+
+
+def test_giving_up_opens_no_port(
+    run: Run, served: Simulated, link: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nobody_may(*_: object, **__: object) -> None:
+        raise AssertionError("the port was opened")
+
+    monkeypatch.setattr(session, "open", nobody_may)
+    ran = run("recover", f"feetech:{link}", "--forget", "--yes")
+    assert (ran.code, ran.out) == (0, "forgotten: the change of #3 to #7\n"), ran.err
+
+
+def test_a_family_that_keeps_no_journal_says_what_to_do_instead(run: Run) -> None:
+    with motorbus.simulate("kst", ids="37") as simulation:
+        for more in ([], ["--forget", "--yes"], ["--dry-run"]):
+            ran = run("recover", simulation.url, *more)
+            assert ran.code == 2
+            assert "kst buses keep no journal" in ran.err
+            assert "say what was cut off again, `motorbus set-id`" in ran.err
+    assert run("recover", "kst:can://slcan/dev/ttyACM42").code == 2, "before a port is opened"
+
+
+def test_programs_are_told_how_it_is_addressed_now(run: Run, half: Simulation) -> None:
+    document = run("recover", half.url, "--yes", "--json").document
+    assert (document["outcome"], "address" in document) == ("old", False)
 
 
 def test_nothing_to_do(run: Run, arm: Simulation, state_folder: Path) -> None:

@@ -44,6 +44,16 @@ def test_a_raw_value_that_moves_needs_an_expert(words: list[str], run: Run, arm:
     assert held(run, arm, "goal_position") == 2100
 
 
+@pytest.mark.parametrize("words", [["phase=0"], ["phase=0", "--yes"], ["homing_offset=0raw"]], ids=" ".join)
+def test_nobody_is_told_to_be_an_expert_for_what_is_never_written(
+    words: list[str], run: Run, arm: Simulation
+) -> None:
+    ran = run("write", f"{arm.url}#1", *words)
+    assert ran.code == 2
+    assert "belongs to one servo alone" in ran.err
+    assert "--expert" not in ran.err
+
+
 @pytest.mark.parametrize("choice", ["velocity", "VELOCITY"])
 def test_a_choice_by_its_name_is_no_raw_number(choice: str, run: Run, arm: Simulation) -> None:
     assert "EEPROM" in run("write", f"{arm.url}#1", f"operating_mode={choice}").err
@@ -112,8 +122,8 @@ def test_a_dry_run_shows_the_frames_and_sends_none(run: Run, arm: Simulation) ->
     assert [
         next(word for word in ("torque_enable", "lock", "max_t", "torque_l") if word in m) for m in meanings
     ] == [
-        "torque_enable",
         "lock",
+        "torque_enable",
         "max_t",
         "lock",
         "torque_l",

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from math import inf, nan
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table, changed
+from motorbus.core.entry import Access, Coding, Entry, Storage, Table, changed, is_number, shown
 from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 
+HUGE = pytest.param(10**400, id="huge"), pytest.param(-(10**5000), id="beyond printing")
 PLAIN = Entry(
     name="plain",
     address=5,
@@ -126,3 +128,19 @@ def test_a_later_model_is_an_earlier_table_plus_differences() -> None:
 def test_two_rows_at_one_address_are_refused() -> None:
     with pytest.raises(ValueError, match="share an address"):
         Table("t", [PLAIN, changed(SIGNED, address=5)])
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, *HUGE, None, "1", 1j, [1.0], object()])
+@pytest.mark.parametrize("row", [PLAIN, SIGNED])
+def test_what_cannot_be_reckoned_with_is_a_bad_request(row: Entry, value: Any) -> None:
+    with pytest.raises(RequestError, match=r"not a finite number|out of range") as caught:
+        row.encode(row.to_raw(value))
+    assert len(caught.value.summary) < 400
+
+
+def test_a_number_is_finite_and_no_flag() -> None:
+    assert [is_number(value) for value in (1, -1.5, 10**300)] == [True] * 3
+    assert not any(is_number(value) for value in (True, 10**400, inf, nan, None, "1", 1j))
+    assert shown(1.5) == "1.5"
+    assert shown("x" * 60) == "'" + "x" * 39 + "…"
+    assert shown(10**5000) == "an integer of thousands of digits"

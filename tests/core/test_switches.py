@@ -53,7 +53,9 @@ def test_what_is_impossible_is_refused_by_name(name: str, value: str, says: str,
     assert expected in caught.value.expected
 
 
-def test_every_switch_is_an_option_with_its_choices() -> None:
+def test_every_switch_is_an_option_with_its_choices_and_its_source() -> None:
     found = options(Doubts)
-    assert found[0] == Option("reply", str, "new", "which id answers (new, old)")
+    assert found[0] == Option("reply", str, "new", "which id answers", ("new", "old"), "not documented")
+    assert [option.choices for option in found] == [("new", "old"), (), (250, 500), (), (), ()]
+    assert all(option.source for option in found)
     assert [option.kind for option in found] == [str, bool, int, int, float, str]

@@ -1,4 +1,4 @@
-"""Whom an emergency stop must reach, and where each of them was last seen.
+"""Whom an emergency stop must reach, where each of them was last seen, and how often each was stopped.
 
 A node is known once it has answered or has been ordered to move. Where it was seen counts only while that is fresh
 and nothing has set it moving since: holding a device at a place it has left would be an order to go back.
@@ -6,6 +6,7 @@ and nothing has set it moving since: holding a device at a place it has left wou
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from motorbus.core.family import Family
@@ -27,6 +28,7 @@ class Known(dict[int, Answer | None]):
         self.family = family
         self.rate = rate
         self.frames = family.stop({})
+        self._stops: Counter[int | None] = Counter()  # those for everybody under None
 
     def hear(self, node: int, position: Answer | None, rate: int) -> None:
         """This node has answered, or has been ordered to move (None)."""
@@ -41,10 +43,12 @@ class Known(dict[int, Answer | None]):
         """An exchange leaves that may set something moving: whom it orders is known, and is not where it was."""
         for goal in exchange.goals:
             self.hear(goal.node, None, rate)
-        if exchange.effect not in MOVING or exchange.rank is Rank.STOP:
+        if exchange.effect not in MOVING:
             return
-        dues = () if exchange.replies is ANY else exchange.replies
-        nodes = {due.node for due in dues} | {goal.node for goal in exchange.goals}
+        nodes = named(exchange)
+        if exchange.rank is Rank.STOP:
+            self._stops.update(nodes or (None,))
+            return
         for node in nodes & set(self) if nodes else list(self):  # one that names nobody may move everybody
             self[node] = None
 
@@ -54,3 +58,24 @@ class Known(dict[int, Answer | None]):
             node: answer if answer is not None and now - answer.at < FRESH else None
             for node, answer in self.items()
         }
+
+    def stops(self, node: int) -> int:
+        """How many stops have left for this node, those for everybody included."""
+        return self._stops[node] + self._stops[None]
+
+
+def named(exchange: Exchange[Any]) -> set[int]:
+    """Who answers this exchange, or is ordered something by it; empty where it may be for everybody."""
+    dues = () if exchange.replies is ANY else exchange.replies
+    return {due.node for due in dues} | {goal.node for goal in exchange.goals}
+
+
+def withdraws(stop: Exchange[Any], exchange: Exchange[Any]) -> bool:
+    """This stop is for a node that the exchange, which was asked for before it, would move or give torque.
+
+    One that names nobody is for everybody.
+    """
+    if stop.effect not in MOVING or exchange.effect not in MOVING or exchange.rank is Rank.STOP:
+        return False
+    stopped, ordered = named(stop), named(exchange)
+    return not stopped or not ordered or bool(stopped & ordered)

@@ -19,6 +19,7 @@ from typing import Any
 
 from motorbus.bus import verdict
 from motorbus.bus.air import Air
+from motorbus.bus.known import withdraws
 from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
@@ -49,7 +50,8 @@ class Turns(Air):
         listen_only: bool = False,
         admit: Admit | None = None,
     ) -> None:
-        super().__init__(family, rate=rate, latency=latency, pace=_pace(paced))
+        pace = None if paced is False else Pace(certain=bool(paced))
+        super().__init__(family, rate=rate, latency=latency, pace=pace)
         self.listen_only = self.listening = listen_only
         self.admit = admit
         self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
@@ -74,6 +76,8 @@ class Turns(Air):
             if self.latched and ticket.exchange.effect in GATED and ticket.rank is not Rank.STOP:
                 self._settle(ticket, error=verdict.latched())
                 return
+            if ticket.rank is Rank.STOP:
+                self._withdraw(ticket.exchange)
             self._queues[ticket.rank].append(ticket)
         elif isinstance(ticket, Retune):
             self._queues[Rank.CONFIGURATION].append(ticket)
@@ -95,6 +99,13 @@ class Turns(Air):
         if isinstance(ticket, Flight):
             ticket.abandoned = True
         self._settle(ticket, error=verdict.cancelled())
+
+    def _withdraw(self, stop: Exchange[Any]) -> None:
+        """Whatever would move whom this stop is for ends here: nothing of it may be sent, or sent again, after it."""
+        for ticket in [*self._flying.values(), *(one for queue in self._queues for one in queue)]:
+            if isinstance(ticket, Flight) and withdraws(stop, ticket.exchange):
+                self._settle(ticket, error=verdict.withdrawn())
+                self.abandon(ticket)
 
     def release(self, owner: object) -> None:
         """One `Alone` of this owner has ended."""
@@ -240,6 +251,8 @@ class Turns(Air):
                 cause="the bus was built by hand, without the gate that open() puts in",
                 advice="use motorbus.open(), or give the bus an `admit`; nothing was sent",
             )
+        if exchange.refusal is not None and (error := exchange.refusal(self.known.stops)):
+            raise error
         self.admit(exchange)
 
     def _doubtful(self, flight: Flight) -> list[int]:
@@ -385,7 +398,3 @@ class Turns(Air):
         self._claims.clear()
         for ticket in waiting:
             self._settle(ticket, error=error)
-
-
-def _pace(paced: bool | None) -> Pace | None:
-    return None if paced is False else Pace(certain=bool(paced))

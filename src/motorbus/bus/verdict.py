@@ -118,6 +118,15 @@ def latched() -> Interrupted:
     )
 
 
+def withdrawn() -> Interrupted:
+    """The error for an order that was still on its way when its device was told to let go."""
+    return Interrupted(
+        "the order was withdrawn: its device was told to stop, or to let go, before the order was through",
+        cause="a torque-off, or another stop, that was asked for later overtook it and ends it",
+        advice="it may have been carried out before the stop, but not after it; give it again if it is still wanted",
+    )
+
+
 def listening(exchange: Exchange[Any]) -> RequestError:
     """The error for an exchange while the link only listens."""
     return RequestError(

@@ -209,10 +209,28 @@ def parse(app: App, words: Sequence[str]) -> tuple[Any, BoundArguments, Mapping[
 
     Raises CycloptsError for words that mean none.
     """
-    told = [_positional(word) for word in words]
+    told = _told(words, _numbers(app, words))
     command, bound, ignored = app.parse_args(told, exit_on_error=False, print_error=False)
     bound.arguments.update({name: _as_said(value) for name, value in bound.arguments.items()})
     return command, bound, ignored
+
+
+def _numbers(app: App, words: Sequence[str]) -> set[str]:
+    """The options of the command meant that take a whole number."""
+    command = app.parse_commands(words)[1][-1].default_command
+    named = signature(command).parameters.values() if command is not None else ()
+    return {f"--{one.name.replace('_', '-')}" for one in named if one.annotation in (int, "int")}
+
+
+def _told(words: Sequence[str], numbers: set[str]) -> list[str]:
+    """The words as the parser takes them; what follows an option that wants a number is that number."""
+    told: list[str] = []
+    for word in words:
+        if told and told[-1] in numbers and _NEGATIVE.fullmatch(word):
+            told[-1] += f"={word}"
+        else:
+            told.append(_positional(word))
+    return told
 
 
 def _positional(word: str) -> str:

@@ -50,9 +50,14 @@ def consent_to(what: str, output: Output, *, yes: bool, rehearse: Callable[[], o
     if yes:
         return
     if rehearse is not None:
-        with suppress(Unforeseeable):  # so far it would not have been refused
-            rehearse()
+        refused_anyway(rehearse)
     output.consent(what, yes=False)
+
+
+def refused_anyway(rehearse: Callable[[], object]) -> None:
+    """Raise what the work itself would be refused for, as far as a rehearsal finds out."""
+    with suppress(Unforeseeable):  # so far it would not have been refused
+        rehearse()
 
 
 def goals_among(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[tuple[Any, float]]:

@@ -11,6 +11,8 @@ A family's face is the module (or package) of its name in this folder. Apart fro
     say(event)                                                 what an event of its operations says, "" if nothing
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
     bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
+    CUT_OFF                                                    what to do about a change that was cut off, where no
+                                                               journal is kept
     COMMANDS                                                   what errors call -> the command that does the same
 
 A family that lacks one of them is served by the common verbs, or the command says that it cannot be done.

@@ -11,6 +11,7 @@ from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.target import face, rate_word, takes
 from motorbus.core import units
 from motorbus.core.operation import Progress
+from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -18,6 +19,16 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Family
+
+
+def id_said(text: str) -> int:
+    """An id as it was typed, decimal or 0x. Raises RequestError when it is no whole number."""
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise RequestError(
+            f"{text!r} is not an id", expected="a whole number", advice="nothing was sent"
+        ) from None
 
 
 def said_of_others(among: str, patience: str) -> dict[str, object]:

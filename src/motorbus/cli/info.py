@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
@@ -14,10 +14,15 @@ from motorbus.cli.target import device, face, id_shown, opened, table_of
 from motorbus.core.entry import Storage
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from motorbus.core.entry import Entry, Table
     from motorbus.core.family import Family, Identity
+
+_OPEN: Final = (
+    "note: its EEPROM lock is open, so every write to EEPROM is for good: "
+    "`motorbus write BUS#ID lock=1` closes it"
+)
 
 app = App(
     name="info",
@@ -40,7 +45,7 @@ def info(
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
-    """Say what a device is: model, firmware, limits, registers.
+    """Say what a device is: model, firmware, limits, registers, and whether its EEPROM lock is open.
 
     Parameters
     ----------
@@ -55,10 +60,13 @@ def info(
     with opened(bus, options, output) as opening:
         one = face(opening, node)
         identity: Identity = one.identify()
-        entries = _entries(table_of(one), everything=registers)
-        values = one.read(*(entry.name for entry in entries))
+        table = table_of(one)
+        entries = _entries(table, everything=registers)
+        lock = [table["lock"]] if "lock" in table else []
+        values = one.read(*dict.fromkeys(entry.name for entry in (*entries, *lock)))
         told = alarms.in_words(one)
-    _show(identity, family, table_rows.facts(one, entries, values), registers, output, told)
+    locked = {entry.name: _word(entry, int(values[entry.name])) for entry in lock}
+    _show(identity, family, table_rows.facts(one, entries, values), registers, output, told, locked)
     return Exit.OK
 
 
@@ -72,6 +80,11 @@ def _bounds(entry: Entry) -> bool:
     return entry.storage is Storage.EEPROM and bool({"min", "max", "limit"} & set(entry.name.split("_")))
 
 
+def _word(entry: Entry, raw: int) -> str:
+    """What this value is called, without what it comes to."""
+    return entry.choices.get(raw, str(raw)).partition(":")[0]
+
+
 def _show(
     identity: Identity,
     family: Family,
@@ -79,9 +92,10 @@ def _show(
     registers: bool,
     output: Output,
     told: Sequence[str] = (),
+    locked: Mapping[str, str] | None = None,
 ) -> None:
     known = {"id": identity.node, "model": identity.model, "firmware": identity.firmware}
-    named = {**known, "table": identity.table, **identity.details}
+    named = {**known, "table": identity.table, **identity.details, **(locked or {})}
     title = "registers" if registers else "limits"
     output.document("motorbus.info/1", {**named, title: rows, "alarms": list(told)})
     table = identity.table or "unknown firmware: read only"
@@ -90,3 +104,5 @@ def _show(
     if rows:
         output.text("")
         table_rows.show(title.capitalize(), rows, output, full=registers)
+    if "open" in (locked or {}).values():
+        output.note(_OPEN)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import App, Parameter
 
@@ -15,12 +15,15 @@ from motorbus.errors import NoReply, RequestError
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
 
+_COLLIDED: Final = "several devices answered at once, as they do to a broadcast, or the line is noisy"
+
 app = App(
     name="ping",
     usage="Usage: motorbus ping BUS#ID... [OPTIONS]",
     help_epilogue="""Ends with exit code 0 when all answer, 6 when some do, 5 when none does.
 --broadcast asks everyone on BUS at once, where the family can; the answers may
-collide, so who does not answer may be there all the same.
+collide, so who does not answer may be there all the same. When some did, that
+is told, and it ends with 6, or with 5 when no answer was left whole.
 
 Examples:
 
@@ -50,15 +53,22 @@ def ping(
         Any option of the bus string, as a flag.
     """
     answers: list[dict[str, object]] = []
+    garbled: list[str] = []
     for bus, nodes in _wanted(devices, broadcast).items():
         with opened(bus, options, output) as opening:
             if broadcast:
-                answers += _shout(opening, bus)
+                answers += _shout(opening, bus, garbled)
             else:
                 answers += [_ask(opening, bus, node) for node in nodes]
     output.document("motorbus.ping/1", {"devices": answers})
     rows = [(a["id"], "yes" if a["answers"] else "NO", a["milliseconds"]) for a in answers]
     output.table("", [">id", "answers", ">ms"], rows)
+    if garbled:
+        raise Partial(
+            f"{', '.join(garbled)}: several answered at once, and part of what came was garbled",
+            cause=_COLLIDED,
+            advice=_scanned(garbled[0]),
+        )
     return _verdict(answers, devices)
 
 
@@ -71,14 +81,34 @@ def _wanted(devices: tuple[str, ...], broadcast: bool) -> dict[str, tuple[int, .
     return found
 
 
-def _shout(opening: Bus, bus: str) -> list[dict[str, object]]:
+def _shout(opening: Bus, bus: str, garbled: list[str]) -> list[dict[str, object]]:
+    """Who answers a question to everyone; `garbled` gets this bus where more came than whole answers."""
     ping_everyone = faces.offer(opening.family.name, "ping_everyone")
     if ping_everyone is None:
         raise RequestError(f"{opening.family.name} buses have no broadcast ping", advice="nothing was sent")
+    before = _wrong(opening)
     found = ping_everyone(opening)
+    harmed = _wrong(opening) > before
     if not found:
-        raise nobody(bus)
+        raise _nothing_whole(bus) if harmed else nobody(bus)
+    garbled += [bus] * harmed
     return [{"bus": bus, "id": node, "answers": True, "milliseconds": None} for node in found]
+
+
+def _wrong(opening: Bus) -> int:
+    """How often bytes came that are no frame, or one with a wrong checksum."""
+    counts = opening.statistics.other
+    return counts["checksum"] + counts["framing"]
+
+
+def _nothing_whole(bus: str) -> NoReply:
+    return NoReply(
+        f"{bus}: something answers, and not one answer came whole", cause=_COLLIDED, advice=_scanned(bus)
+    )
+
+
+def _scanned(bus: str) -> str:
+    return f"`motorbus scan {bus}` asks one id after the other, where nothing collides"
 
 
 def _ask(opening: Bus, bus: str, node: int) -> dict[str, object]:

@@ -7,21 +7,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import dry
+from motorbus.cli import dry, faces
 from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit, Unforeseeable
-from motorbus.cli.identity import carried_out
+from motorbus.cli.identity import address, carried_out
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import face, offers, opened, takes, target
 from motorbus.core.operation import OUTCOME, Journal
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.journal import Change
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
-    from motorbus.journal import BusJournal, Change
+    from motorbus.core.family import Family
+    from motorbus.journal import BusJournal
 
 app = App(
     name="recover",
@@ -78,13 +80,14 @@ def recover(
     """
     if not bus:
         return _listed(output, more=bool(alone or forget or of or dry_run or options))
+    bus, family, _ = target(bus)
+    _keeps_journals(family)
     if forget:
         return _given_up(of or bus, options, output, yes=yes)
-    with _journal_elsewhere(of) as kept, opened(target(bus).bus, options, output) as opening:
+    with _journal_elsewhere(of) as kept, opened(bus, options, output) as opening:
         change = _unfinished(opening, kept)
         if change is None:
             return _nothing(of or bus, output)
-        offers(opening.family, "recover")
         extra = {"alone": True} if alone else {}
         takes(face(opening, change.node), "recover", extra)
         if dry_run:
@@ -94,22 +97,36 @@ def recover(
         outcome = carried_out(
             opening, change.node, "recover", change.verb, change.facts, output=output, **extra
         )
-        if kept is not None:
-            kept(Journal(change.verb, OUTCOME, {"outcome": outcome}))
-    return _told(bus, change, outcome, output)
+        _closed(kept, change, outcome)
+    return _told(bus, change, outcome, output, family)
+
+
+def _keeps_journals(family: Family) -> None:
+    """Raises RequestError for a family whose changes need none: what was cut off is said again."""
+    try:
+        offers(family, "recover")
+    except RequestError as lack:
+        raise RequestError(
+            f"{family.name} buses keep no journal, so there is nothing to recover",
+            advice=faces.offer(family.name, "CUT_OFF") or lack.advice,
+        ) from None
 
 
 @contextmanager
 def _journal_elsewhere(of: str) -> Iterator[BusJournal | None]:
-    """The journal of a port by the name it had, while nobody else uses that name."""
+    """The journal of a port by the name it had, while nobody else uses that port."""
     from motorbus import session
     from motorbus.link.lock import PortLock
 
     kept = session.journal_of(of) if of else None
-    if kept is None:
+    if kept is None or kept.path is None:
         yield None
         return
-    with PortLock(session.lock_name(of, {})):
+    lock = PortLock(session.lock_name(of, {}))
+    lock.path = kept.path.with_suffix(
+        lock.path.suffix
+    )  # it may lie where this name was a link to another port
+    with lock:
         yield kept
 
 
@@ -119,30 +136,48 @@ def _unfinished(bus: Bus, kept: BusJournal | None) -> Change | None:
     return session.unfinished(bus) if kept is None else kept.unfinished()
 
 
+def _closed(kept: BusJournal | None, change: Change, outcome: str) -> None:
+    """End a change in the journal by its former name; its own the bus has closed already."""
+    if kept is not None:
+        kept(Journal(change.verb, OUTCOME, {"outcome": outcome}))
+
+
 def _nothing(bus: str, output: Output) -> Exit:
     output.document(SCHEMA, {"bus": bus, "outcome": None})
     output.text(f"nothing is unfinished on {bus}")
     return Exit.OK
 
 
-def _told(bus: str, change: Change, outcome: str, output: Output) -> Exit:
+def _told(bus: str, change: Change, outcome: str, output: Output, family: Family | None = None) -> Exit:
+    """What has become of it; with its family, how the device is addressed now, if that has changed."""
     told = {"new": "finished", "old": "taken back"}.get(outcome, outcome)
-    output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome})
-    output.text(f"{told}: {_called(change)}")
+    there = {"address": _address(bus, change, family)} if family and outcome == "new" else {}
+    output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome, **there})
+    output.text(f"{told}: {_called(change)}" + "".join(f"; it is {one} now" for one in there.values()))
     return Exit.OK
+
+
+def _address(bus: str, change: Change, family: Family) -> str:
+    return address(bus, family, node=change.facts.get("new"), rate=change.facts.get("new_rate") or 0)
 
 
 def _given_up(bus: str, options: Mapping[str, str], output: Output, *, yes: bool) -> Exit:
     """Close the journal as it is; the port need not be there any more."""
     with ExitStack() as stack:
         kept: Any = stack.enter_context(_journal_elsewhere(bus))
-        if kept is None:
+        if kept is None:  # nothing is sent: it is simulated, or belongs to nobody
             kept = stack.enter_context(opened(bus, options, output)).journal
-        change = kept.unfinished()
+        if kept is None:
+            return _nothing(bus, output)
+        try:
+            change = kept.unfinished()
+        except MotorbusError as error:  # nobody can end what cannot be read
+            change = Change(bus, "?", {}, "?")
+            output.note(f"note: {error.summary}")
         if change is None:
             return _nothing(bus, output)
         consent_to(f"forget {_called(change)}", output, yes=yes)
-        kept(Journal(change.verb, OUTCOME, {"outcome": "forgotten"}))
+        kept.forget()
     return _told(bus, change, "forgotten", output)
 
 
@@ -151,13 +186,17 @@ def _listed(output: Output, *, more: bool) -> Exit:
 
     if more:
         raise RequestError("which bus?", expected="BUS, as feetech:/dev/ttyACM0")
-    found = journal.everywhere()
+    told = journal.everywhere()
+    found = [one for one in told if isinstance(one, Change)]
+    unread = [one for one in told if isinstance(one, MotorbusError)]
     output.document("motorbus.recover.list/1", {"changes": [_facts(one) for one in found]})
     rows = [(one.bus, _called(one), one.begun, f"motorbus recover {one.bus}") for one in found]
     if rows:
         output.table("", ["bus", "unfinished", "begun", "to end it"], rows)
-    else:
+    elif not unread:
         output.text("nothing is unfinished")
+    for error in unread:  # the readable ones have been told
+        raise error
     return Exit.OK
 
 
@@ -165,13 +204,15 @@ def _facts(change: Change) -> dict[str, object]:
     known: dict[str, object] = {
         name: change.facts[name] for name in ("new", "rate", "new_rate") if name in change.facts
     }
-    return {"bus": change.bus, "change": change.verb, "id": change.node, **known, "begun": change.begun}
+    node = change.facts.get("node")
+    return {"bus": change.bus, "change": change.verb, "id": node, **known, "begun": change.begun}
 
 
 def _called(change: Change) -> str:
     facts = change.facts
     to = f"{facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
-    return f"the change of #{change.node} to {to}"
+    node = change.facts.get("node")
+    return "a change of which nothing is known" if node is None else f"the change of #{node} to {to}"
 
 
 def _rehearsed(bus: Bus, change: Change, output: Output, **extra: object) -> None:

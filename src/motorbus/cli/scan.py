@@ -133,13 +133,21 @@ def rates(text: str, family: Family) -> tuple[int, ...]:
         return family.link.rates
     words = text.replace("+", ",").split(",") if text else []
     try:
-        return tuple(map(units.rate, words))
+        said = tuple(map(units.rate, words))
     except RequestError:
         raise RequestError(
             f"--{rate_word(family)} {text}: not a list of rates",
             expected="as 1000000,500k or all",
             advice="nothing was sent",
         ) from None
+    for rate in said:
+        if rate not in family.link.rates:
+            raise RequestError(
+                f"--{rate_word(family)} {text}: {rate} bit/s is no rate of {family.name} devices",
+                expected=", ".join(map(str, family.link.rates)),
+                advice="nothing was sent",
+            )
+    return said
 
 
 def _heard(

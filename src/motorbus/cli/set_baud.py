@@ -81,7 +81,7 @@ def set_baud(
             who = ", ".join(f"#{node}" for node in nodes)
             what = f"let {who} speak at {wanted} bit/s for good"
             agreed(opening, nodes[0], "set_baud", wanted, extra, what, output)
-        done, errors = _each(opening, nodes, wanted, extra, output)
+        done, errors = _each(opening, nodes, wanted, extra, output, bus)
     return _told(bus, opening, done, errors, wanted, output)
 
 
@@ -94,19 +94,32 @@ def _among(bus: Bus, nodes: tuple[int, ...]) -> dict[str, object]:
 
 
 def _each(
-    bus: Bus, nodes: tuple[int, ...], rate: int, extra: dict[str, object], output: Output
+    bus: Bus, nodes: tuple[int, ...], rate: int, extra: dict[str, object], output: Output, name: str
 ) -> tuple[list[Any], list[MotorbusError]]:
     done: list[Any] = []
     errors: list[MotorbusError] = []
     for node in nodes:
         try:
             done.append(carried_out(bus, node, "set_baud", rate, output=output, **extra))
-        except LinkError:
-            raise
         except MotorbusError as error:
+            if isinstance(error, LinkError):
+                _cut_off(name, bus, done, rate, output)
+                raise
             in_words_of_the_shell(error, bus.family)
             errors.append(error)
+        except BaseException:
+            _cut_off(name, bus, done, rate, output)
+            raise
     return done, errors
+
+
+def _cut_off(name: str, bus: Bus, done: list[Any], rate: int, output: Output) -> None:
+    """Say who has the new rate already: nobody who asks at the old one finds them."""
+    if done:
+        ids = "+".join(str(one.node) for one in done)
+        output.note(
+            f"note: done before that: {address(name, bus.family, rate=rate)}#{ids}; nobody behind them"
+        )
 
 
 def _told(

@@ -7,10 +7,9 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.identity import address, agreed, carried_out, rehearsed, said_of_others
+from motorbus.cli.identity import address, agreed, carried_out, id_said, rehearsed, said_of_others
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import device, face, id_shown, offers, opened, takes
-from motorbus.errors import RequestError
 
 app = App(
     name="set-id",
@@ -61,7 +60,7 @@ def set_id(
     """
     bus, family, (node,) = device(device_)
     offers(family, "set_id")
-    wanted = _id(new)
+    wanted = id_said(new)
     family.devices.blocking(None, wanted)  # raises when it is no id
     extra = said_of_others(among, patience)
     with opened(bus, options, output) as opening:
@@ -77,12 +76,3 @@ def set_id(
     output.document("motorbus.set-id/1", {"id": node, "new": found.node, "address": there})
     output.text(f"#{id_shown(node, family)} is #{id_shown(found.node, family)} now: {there}")
     return Exit.OK
-
-
-def _id(text: str) -> int:
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise RequestError(
-            f"{text!r} is not an id", expected="a whole number", advice="nothing was sent"
-        ) from None

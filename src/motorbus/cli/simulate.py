@@ -8,7 +8,7 @@ import signal
 import time
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from cyclopts import App, Parameter
 
@@ -29,7 +29,7 @@ from motorbus.simulation.mount import Mount, Place
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.core.family import Family
+    from motorbus.core.family import Family, Option
 
 app = App(
     name="simulate",
@@ -252,11 +252,42 @@ def _unknown(name: str, family: str, known: Iterable[str]) -> RequestError:
 def _list(family: Family, output: Output) -> Exit:
     known = {option.name: option for option in family.link.options}
     known |= {option.name: option for option in family.link.settings if option.name not in known}
-    options = [(option.name, str(option.default), option.help) for option in known.values()]
-    facts = [dict(zip(("name", "default", "help"), option, strict=True)) for option in options]
+    facts = [_facts(option) for option in known.values()]
     output.document("motorbus.switches/1", {"switches": facts})
-    output.table(f"Switches of {family.name}", ["switch", "default", "what it does"], options)
+    output.table(f"Switches of {family.name}", *_shown(facts, folded=output.live))
     return Exit.OK
+
+
+def _facts(option: Option) -> dict[str, Any]:
+    """An option as it is said on a command line."""
+    truth = ("no", "yes")
+    choices = truth if option.kind is bool else tuple(map(str, option.choices))
+    default = truth[bool(option.default)] if option.kind is bool else str(option.default)
+    return {
+        "name": option.name,
+        "default": default,
+        "choices": list(choices),
+        "help": option.help,
+        "source": option.source,
+    }
+
+
+def _shown(facts: Sequence[Mapping[str, Any]], *, folded: bool) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows. A row is one long line for programs that look for lines, and several short ones for eyes."""
+    rows = [
+        [one["name"], one["default"], one["help"], ", ".join(one["choices"]), one["source"]] for one in facts
+    ]
+    if not folded:
+        return ["switch", "default", "what it does", "choices", "source"], rows
+    return ["switch", "what it does"], [
+        [f"{name}\n= {default}\n ", "\n".join((text, *_lines(choices, source)))]
+        for name, default, text, choices, source in rows
+    ]
+
+
+def _lines(choices: str, source: str) -> list[str]:
+    said = [f"one of {choices}"] if choices else []
+    return [*said, *([f"source: {source}"] if source else []), " "]
 
 
 @contextmanager

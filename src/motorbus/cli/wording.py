@@ -27,7 +27,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "recover(alone=True)": "`motorbus recover BUS --alone`",
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
-_CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b")
+_CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 

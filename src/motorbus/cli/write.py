@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, quantity, registers
-from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
+from motorbus.cli.consent import consent_to, consent_to_ways, goals_among, refused_anyway
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
@@ -156,6 +156,7 @@ def _permit(
 ) -> None:
     moving = [order.entry.name for order in orders if order.raw and order.entry.effect is Effect.MOTION]
     if moving and not expert:
+        refused_anyway(rehearse)
         raise NeedsConsent(
             f"{', '.join(moving)}: a raw value that moves the device",
             advice="give the value in its unit, or say --expert; nothing was sent",

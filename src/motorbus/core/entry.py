@@ -11,12 +11,31 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from enum import Enum
-from typing import TypeAlias
+from typing import TypeAlias, TypeGuard
 
 from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 
 Value: TypeAlias = int | float
+
+_SHOWN = 40  # characters of what somebody gave for a number
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """A finite number that can be reckoned with: not True, no text, and no int beyond what a float can be."""
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def shown(value: object) -> str:
+    """What somebody gave for a number, for reading eyes, however long it is."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to print an int of more than 4300 digits
+        return "an integer of thousands of digits"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
 class Access(Enum):
@@ -50,7 +69,8 @@ class Entry:
     `address` is the register number (or the CANopen index, then with `subindex`); `size` is in bytes; `low` and
     `high` bound the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single
     values, `bits` names single bits. `default` is the shipped raw value, where known. `source` says where each
-    fact comes from and `note` where sources conflict.
+    fact comes from; `conflict` who says what where sources disagree or none confirms it, and what was chosen (empty
+    where nothing is in doubt); `note` what else there is to know.
     """
 
     name: str
@@ -72,6 +92,7 @@ class Entry:
     bits: Mapping[int, str] = field(default_factory=dict)
     effect: Effect = Effect.NONE
     protected: bool = False
+    conflict: str = ""
     note: str = ""
 
     @property
@@ -86,7 +107,7 @@ class Entry:
         """Raw value -> bytes. Raises RequestError when it is outside the row's range or does not fit its coding."""
         if not self.low <= raw <= self.high:
             raise RequestError(
-                f"{self.name}: raw value {raw} is out of range {self.low}..{self.high}",
+                f"{self.name}: raw value {shown(raw)} is out of range {self.low}..{self.high}",
                 expected=f"{self._shown(self.low)} to {self._shown(self.high)}",
                 advice="give a value inside the range; nothing was sent",
             )
@@ -115,13 +136,15 @@ class Entry:
 
     def to_raw(self, value: Value) -> int:
         """Value in the row's unit -> nearest raw value. Raises RequestError when it is not a finite number."""
-        if not math.isfinite(value):
+        if not (isinstance(value, bool) or is_number(value)) or not math.isfinite(value / self.scale):
             raise RequestError(
-                f"{self.name}: {value} is not a finite number", advice="give a number; nothing was sent"
+                f"{self.name}: {shown(value)} is not a finite number",
+                expected=f"{self._shown(self.low)} to {self._shown(self.high)}",
+                advice="give a number; nothing was sent",
             )
         if not self.unit and value != int(value):
             raise RequestError(
-                f"{self.name}: {value} is not a whole number",
+                f"{self.name}: {shown(value)} is not a whole number",
                 expected=f"{self.low} to {self.high}",
                 advice="this register has no unit; give its raw value",
             )

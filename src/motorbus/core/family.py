@@ -17,12 +17,17 @@ from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Ru
 
 
 class Option(NamedTuple):
-    """One option that a bus string or a flag may carry for this family: `name=value`."""
+    """One option that a bus string or a flag may carry for this family: `name=value`.
+
+    `choices` are all values it takes, () when that is not said; `source` is who says so, where somebody has to.
+    """
 
     name: str
     kind: type
     default: object
     help: str
+    choices: tuple[object, ...] = ()
+    source: str = ""
 
 
 class LinkNeeds(NamedTuple):
@@ -175,12 +180,13 @@ class Device(Protocol):
     `read(*names)` gives values by name, `write(**values)` takes them. What moves also has `position`, `telemetry`
     (a `State`), `enable_torque`, `disable_torque`, `stop` and `move(to, *, wait=True)`; `move` may take `velocity` and
     `acceleration`. What has modes also has `mode()` and `set_mode(mode)`, and of `set_velocity`, `set_duty`,
-    `set_current` and `step` those that some model of the family heeds. What can be given a zero has `calibrate(to=None)`
-    (rad; None: the middle) and `zero()`, and both give a named tuple whose floats are angles and whose whole numbers are
-    raw; `alarms()`, where it is there, gives each alarm that is set in words. Persistent rows are written through a
-    guarded sequence; where that opens a lock, the lock is a row named `lock` with a choice called "closed", and it is
-    closed again whatever happens. `table` is its register map once that is known (None before), `value(row, raw)` and
-    `raw(row, value)` convert with the factors of this very device. Reading has rank POLL and effect NONE, so a dry run can tell it from what changes something.
+    `set_current` and `step` those that some model of the family heeds. What can be given a zero has
+    `calibrate(to=None)` (rad; None: the middle) and `zero()`, and both give a named tuple whose floats are angles and
+    whose whole numbers are raw; `alarms()`, where it is there, gives each alarm that is set in words. Persistent rows
+    are written through a guarded sequence; where that opens a lock, the lock is a row named `lock` with a choice called
+    "closed", and it is closed again whatever happens. `table` is its register map once that is known (None before),
+    `value(row, raw)` and `raw(row, value)` convert with the factors of this very device. Reading has rank POLL and
+    effect NONE, so a dry run can tell it from what changes something.
     """
 
     @property

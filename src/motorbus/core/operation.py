@@ -102,8 +102,8 @@ Its replies are `ANY`; it takes each reply that nobody else awaits, whatever lan
 class Goal(NamedTuple):
     """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
 
-    `quantity` is position (rad), velocity (rad/s), load (fraction), current (A) or relative (rad). A limit that is not known
-    is None, and the gate refuses what it cannot judge.
+    `quantity` is position (rad), velocity (rad/s), load (fraction), current (A) or relative (rad). A limit that is
+    not known is None, and the gate refuses what it cannot judge.
     """
 
     node: int
@@ -152,6 +152,12 @@ class Answer(NamedTuple):
     at: float
 
 
+Stops: TypeAlias = Callable[[int], int]
+"""How many stops have left for a node by now, those for everybody included."""
+Refusal: TypeAlias = Callable[[Stops], MotorbusError | None]
+"""Why an exchange must not leave after all, None when it may."""
+
+
 class Exchange(Generic[T_co]):
     """One request and the replies, or the silence, it calls for. A value: never changed after it is made.
 
@@ -166,6 +172,10 @@ class Exchange(Generic[T_co]):
     `timeout`     how long the device may think
     `repeatable`  sending it twice does no more than sending it once
     `tells_position`  the replies begin with the present position, so stop can hold it
+    `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
+                  must not, None when it may. It is told how to ask how many stops have left for a node by now. So an
+                  order that was made under other settings, or that carries out what was asked for before a stop, does
+                  not leave the queue
     `other`       makes an exchange that says the same and has replies of another length. Where replies carry no
                   number, sending the two in turn keeps a second copy of the last reply from being taken for the next
     """
@@ -177,6 +187,7 @@ class Exchange(Generic[T_co]):
         "other",
         "rank",
         "read",
+        "refusal",
         "repeatable",
         "replies",
         "request",
@@ -197,6 +208,7 @@ class Exchange(Generic[T_co]):
         timeout: Timeout = Timeout.REPLY,
         repeatable: bool = False,
         tells_position: bool = False,
+        refusal: Refusal | None = None,
         other: Callable[[], Exchange[T_co]] | None = None,
     ) -> None:
         self.request: Final = request
@@ -209,6 +221,7 @@ class Exchange(Generic[T_co]):
         self.timeout: Final = timeout
         self.repeatable: Final = repeatable
         self.tells_position: Final = tells_position
+        self.refusal: Final = refusal
         self.other: Final = other
 
     def __iter__(self) -> Generator[Step, Any, T_co]:
@@ -321,6 +334,8 @@ class Journal(NamedTuple):
 ASKED: Final = "asked"
 INTENT: Final = "intent"
 OUTCOME: Final = "outcome"
+REACHED: Final = "reached"
+"""Among the facts of a change that is taken up again: the states it has been recorded in, in order."""
 
 
 class Report:

@@ -34,12 +34,12 @@ def switch(
 
 def options(kind: type[Any]) -> tuple[Option, ...]:
     """Every switch of this dataclass as an option that a bus string may carry."""
-    return tuple(Option(one.name, type(one.default), one.default, _help(one)) for one in fields(kind))
+    return tuple(_option(one) for one in fields(kind))
 
 
-def _help(one: Field[Any]) -> str:
-    choices = ", ".join(map(str, one.metadata["choices"]))
-    return f"{one.metadata['help']}{f' ({choices})' if choices else ''}"
+def _option(one: Field[Any]) -> Option:
+    told = one.metadata
+    return Option(one.name, type(one.default), one.default, told["help"], told["choices"], told["source"])
 
 
 def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:

@@ -27,7 +27,16 @@ def test_two(run: Run) -> None:
 
 
 def test_what_is_no_request(run: Run, arm: Simulation) -> None:
-    assert run("feetech", "duplicates", f"{arm.url}#3", "--polls", "0").code == 2
+    for polls in ("0", "-3"):
+        ran = run("feetech", "duplicates", f"{arm.url}#3", "--polls", polls)
+        assert ran.code == 2
+        assert f"error: {polls} polls: at least 1 is needed" in ran.err
     assert run("feetech", "duplicates", arm.url).code == 2
     assert run("feetech", "duplicates", "kst:sim,ids=37#37").code == 2
-    assert run("feetech", "duplicates", f"{arm.url}#9").code == 5
+
+
+def test_nobody_at_all_is_silence_with_cause_and_advice(run: Run, arm: Simulation) -> None:
+    ran = run("feetech", "duplicates", f"{arm.url}#9")
+    assert (ran.code, ran.out) == (5, "")
+    assert "likely cause: no such id on this bus" in ran.err
+    assert "`motorbus scan BUS` lists who answers" in ran.err

@@ -74,7 +74,10 @@ def test_what_a_servo_has_not_is_refused(name: str, words: str, code: int, run: 
 def test_an_scs_becomes_a_motor_and_a_servo_again(run: Run) -> None:
     with motorbus.simulate("feetech", ids="3", model="scs0009") as servo:
         assert put(run, servo, "pwm").document["mode"] == "pwm"
-        assert run("feetech", "mode", f"{servo.url}#3", "position", "--yes").code == 2
+        ran = run("feetech", "mode", f"{servo.url}#3", "position", "--yes")
+        assert ran.code == 2
+        assert "expected: --low and --high, in rad; shipped are 0.1023 to 5.129" in ran.err
+        assert "limits=" not in ran.err
         words = ["position", "--low", "20deg", "--high", "280deg", "--yes", "--json"]
         assert run("feetech", "mode", f"{servo.url}#3", *words).document["mode"] == "position"
         assert servo[3].memory["min_position_limit"] == 68

@@ -6,6 +6,7 @@ import pytest
 
 from motorbus.families.feetech.table import MODELS, TABLES
 from tests.cli.conftest import Run
+from tests.families.feetech.typed_rows import IN_DOUBT
 
 
 def test_one_map_is_shown_with_the_source_of_each_row(run: Run) -> None:
@@ -49,12 +50,22 @@ def test_the_database_holds_every_field_of_every_row(run: Run) -> None:
             assert (row["low"], row["high"], row["default"]) == (entry.low, entry.high, entry.default)
             assert (row["unit"], row["scale"], row["source"]) == (entry.unit, entry.scale, entry.source)
             assert (row["note"], row["protected"]) == (entry.note, entry.protected)
+            assert row["conflict"] == entry.conflict
             assert {int(value): word for value, word in row["choices"].items()} == entry.choices
             assert {int(bit): word for bit, word in row["bits"].items()} == entry.bits
             assert row["access"] == entry.access.value
             assert row["storage"] == entry.storage.value
             assert row["coding"] == entry.coding.value
             assert row["effect"] == entry.effect.name.lower()
+
+
+def test_what_is_in_doubt_is_marked_in_the_table_and_told_below(run: Run) -> None:
+    lines = run("feetech", "registers", "--map", "sts").out.splitlines()
+    marked = {int(line.split()[0]) for line in lines if line.endswith("in doubt")}
+    assert marked == set(IN_DOUBT["sts"])
+    told = {int(line.split()[0]) for line in lines if ", in doubt: " in line}
+    assert told == marked
+    assert "28 protection_current, in doubt: FD: 0 to 1023; V3.6: 0 to 511. Chosen: 0 to 1023" in lines
 
 
 def test_one_map_for_programs_is_that_map_alone(run: Run) -> None:

@@ -60,7 +60,7 @@ def test_moving_together_takes_a_packet_for_each_layout_and_switches_torque_on()
         trace = bus.trace.subscribe()
         feetech.move_together(bus, {1: 2.5, 2: 2.0, 3: 3.0}, velocity=3.0)
         sent = [one.data for one in trace if one.direction == "tx" and isinstance(one.data, bytes)]
-        assert [data[5] for data in sent if data[4] == 0x83] == [41, 42, 40]
+        assert [data[5] for data in sent if data[4] == 0x83] == [41, 40]
         assert [motorbus.feetech.Servo(bus, node).position() for node in (1, 2, 3)] == [
             pytest.approx(2.5, abs=0.06),
             pytest.approx(2.0, abs=0.06),

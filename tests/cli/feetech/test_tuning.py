@@ -102,7 +102,7 @@ def test_dry_runs_show_the_guarded_sequence(run: Run, arm: Simulation) -> None:
     for words in (["gains", "p=16"], ["protection", "torque=30%"], ["torque-limit", "50%", "--keep"]):
         ran = run("feetech", words[0], f"{arm.url}#3", *words[1:], "--dry-run", "--json")
         meanings = [one["meaning"] for one in ran.document["withheld"]]
-        assert "torque_enable 0 (off)" in meanings[0]
-        assert "lock 0" in meanings[1]
+        assert "lock 0" in meanings[0]
+        assert "torque_enable 0 (off)" in meanings[1]
         assert any("lock 1" in one for one in meanings)
     assert arm[3].memory["position_p"] == 32

@@ -112,9 +112,9 @@ class World:
 
     verb: str
     options: dict[str, Any]
+    journal: BusJournal = field(default_factory=lambda: BusJournal("feetech:sim"))
     devices: FeetechBus = field(init=False)
     servo: Servo = field(init=False)
-    journal: BusJournal = field(init=False)
     now: float = 0.0
     notes: list[str] = field(default_factory=list)
     link: Doomed = field(init=False)
@@ -123,7 +123,6 @@ class World:
         options = dict(self.options)
         self.devices = simulate((OLD, STRANGER), options.pop("model", ""), **options)
         self.servo = self.devices.servos[0]
-        self.journal = BusJournal("feetech:sim")
         self.rate = self.servo.baud_rate or 0
         self.other_rate = 500_000 if self.rate != 500_000 else 250_000
 
@@ -196,8 +195,10 @@ class World:
             found.append("its lock is open")
         if self.journal.unfinished() is not None:
             found.append("the journal is open")
+        found += self._astray()
         self.devices.advance(self.now)
         self.servo.power_cycle()
+        found += self._astray()
         if self.place != place:
             found.append(f"after a power cycle it is at {self.place}, not at {place}")
         if outcome is not None and {"old": self.old, "new": self.new}.get(str(outcome)) != place:
@@ -205,6 +206,11 @@ class World:
         if len({servo.id for servo in self.devices.servos}) < len(self.devices.servos):
             found.append("two servos have one id")
         return found
+
+    def _astray(self) -> list[str]:
+        """The second id of an HLS servo has not come along: it would obey whoever is told something there."""
+        second = self.servo.second_id
+        return [] if second in (None, self.servo.id) else [f"its second id is {second}"]
 
 
 def cuts(world: Callable[[], World], work: Callable[[World], Callable[[Bus], Any]]) -> Iterator[Cut]:

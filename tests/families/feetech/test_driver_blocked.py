@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -78,6 +79,47 @@ def test_both_limits_0_are_many_turns_or_a_motor_and_no_trap() -> None:
 
 def test_several_are_told_together() -> None:
     assert len(found("hls", torque=0, goal=(0, 0, 0, 0, 0, 0), max_torque=0, unload_mask=4, error=4)) == 5
+
+
+HELD: dict[str, Callable[[Any], object]] = {
+    "enable_torque()": lambda servo: servo.enable_torque(),
+    "move()": lambda servo: servo.move(3.0),
+    "set_velocity()": lambda servo: servo.set_velocity(0.5),
+    "set_current()": lambda servo: servo.set_current(0.65),
+    "write(goal_torque=…)": lambda servo: servo.write(goal_torque=0.65),
+    "write(protection_current=…)": lambda servo: servo.write(protection_current=0.65),
+}
+"""What is said to end a goal torque of 0, done."""
+
+
+@pytest.mark.parametrize(
+    ("mode", "protection", "said"),
+    [
+        ("position", 500, ["enable_torque()", "move()", "write(goal_torque=…)"]),
+        ("velocity", 500, ["enable_torque()", "set_velocity()", "write(goal_torque=…)"]),
+        ("position", 0, ["write(goal_torque=…)"]),
+        ("velocity", 0, ["write(goal_torque=…)"]),
+        ("current", 500, ["set_current()"]),
+    ],
+)
+def test_what_is_said_to_end_a_goal_torque_of_0_ends_it(mode: str, protection: int, said: list[str]) -> None:
+    for way in said:
+        with simulated("hls") as (memory, servo):
+            servo.set_mode(mode)
+            servo.enable_torque()
+            memory.memory["goal_torque"], memory.memory["protection_current"] = 0, protection
+            servo.forget_settings()
+            (told,) = [told for told in servo.blockers() if told.startswith("goal_torque")]
+            assert [call for call in HELD if call in told] == said + ["write(protection_current=…)"][protection:]
+            HELD[way](servo)
+            assert memory.memory["goal_torque"] == (500 if "write" not in way and mode != "current" else 100)
+            assert not [told for told in servo.blockers() if told.startswith("goal_torque")]
+
+
+def test_a_goal_torque_of_0_in_a_mode_that_nobody_explains_is_not_judged() -> None:
+    (told,) = found("hls", goal=(0, 0, 0, 0, *FULL), operating_mode=4)
+    assert "set_mode('position')" in told
+    assert found("hls", goal=(0, 0, 0, 0, *FULL), operating_mode=3) == ()
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -27,7 +27,9 @@ from tests.families.feetech.maps import eeprom, met, prepares_as, simulated
 
 COUNT = math.tau / 4096
 OFF, OPEN, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
-MIDDLE, DONE, GIVEN_UP = writes(3, 40, 128), (reads(3, 55, 0), LOCK, LOCKED), (LOCK, LOCKED)
+IDLE = reads(3, 64, 0)
+STILL = reads(3, 55, 0)
+MIDDLE, DONE, GIVEN_UP = writes(3, 40, 128), (STILL, LOCK, LOCKED), (OFF, LOCK, LOCKED)
 
 
 def pose(position: int, offset: int, sign: int = 0x800) -> tuple[Line, Line]:
@@ -43,8 +45,8 @@ def offset_written(offset: int, sign: int = 0x800) -> tuple[Line, Line]:
 
 def by_offset(before: tuple[int, int], offset: int, reads_then: int) -> tuple[Line, ...]:
     return (
-        *(prepares_as("sts"), *pose(*before), OFF, OPEN, *pose(*before)),
-        *(*offset_written(offset), *pose(reads_then, offset), *DONE),
+        *(prepares_as("sts"), *pose(*before), OPEN, OFF, IDLE, *pose(*before)),
+        *(STILL, *offset_written(offset), *pose(reads_then, offset), *DONE),
     )
 
 
@@ -53,8 +55,8 @@ def by_offset(before: tuple[int, int], offset: int, reads_then: int) -> tuple[Li
 
 def test_the_middle_by_the_torque_switch() -> None:
     script = (
-        *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-        *(MIDDLE, OFF, *pose(2048, -1448), *DONE),
+        *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(600, 0)),
+        *(STILL, MIDDLE, OFF, *pose(2048, -1448), *DONE),
     )
     played = watch(calibrate(Node(3)), *script)
     assert played.alone == 1
@@ -99,8 +101,8 @@ def test_at_that_pose_the_servo_is_not_left_to_reckon_the_middle() -> None:
 def test_where_the_register_is_wider_it_fits() -> None:
     told = play(
         calibrate(Node(3), 2047 * COUNT, "offset"),
-        *(prepares_as("hls"), *pose(4095, 0, 0x8000), OFF, OPEN, *pose(4095, 0, 0x8000)),
-        *(*offset_written(-2048, 0x8000), *pose(2047, -2048, 0x8000), *DONE),
+        *(prepares_as("hls"), *pose(4095, 0, 0x8000), OPEN, OFF, IDLE, *pose(4095, 0, 0x8000)),
+        *(STILL, *offset_written(-2048, 0x8000), *pose(2047, -2048, 0x8000), *DONE),
     )
     assert told.note == ""
 
@@ -108,8 +110,8 @@ def test_where_the_register_is_wider_it_fits() -> None:
 def test_hls_are_told_the_position_by_an_instruction() -> None:
     told = play(
         calibrate(Node(3), 1024 * COUNT),
-        *(prepares_as("hls"), *pose(600, 0, 0x8000), OFF, OPEN, *pose(600, 0, 0x8000)),
-        Line(packet(3, 0x0B, 0, 4), packet(3, 0)),
+        *(prepares_as("hls"), *pose(600, 0, 0x8000), OPEN, OFF, IDLE, *pose(600, 0, 0x8000)),
+        *(STILL, Line(packet(3, 0x0B, 0, 4), packet(3, 0))),
         *(*pose(1024, -424, 0x8000), *DONE),
     )
     assert told.how == "instruction"
@@ -119,7 +121,7 @@ def test_old_sms_have_the_offset_at_33_and_the_lock_at_48() -> None:
     before = (reads(3, 33, 0, 0), reads(3, 56, *low_high(2000)))
     told = play(
         calibrate(Node(3)),
-        *(prepares_as("smcl"), *before, OFF, writes(3, 48, 0), *before, MIDDLE, OFF),
+        *(prepares_as("smcl"), *before, writes(3, 48, 0), OFF, IDLE, *before, reads(3, 48, 0), MIDDLE, OFF),
         *(reads(3, 33, 48, 8), reads(3, 56, *low_high(2048)), reads(3, 48, 0)),
         *(writes(3, 48, 1), reads(3, 48, 1)),
     )
@@ -130,7 +132,7 @@ def test_scs2_have_one_byte_for_it_and_the_high_byte_first() -> None:
     before = (reads(3, 34, 0), reads(3, 56, 2, 100))
     told = play(
         calibrate(Node(3)),
-        *(prepares_as("scs2"), *before, OFF, writes(3, 48, 0), *before),
+        *(prepares_as("scs2"), *before, writes(3, 48, 0), OFF, IDLE, *before, reads(3, 48, 0)),
         *(writes(3, 34, 100), reads(3, 34, 100), reads(3, 34, 100), reads(3, 56, 2, 0)),
         *(reads(3, 48, 0), writes(3, 48, 1), reads(3, 48, 1)),
     )
@@ -139,7 +141,7 @@ def test_scs2_have_one_byte_for_it_and_the_high_byte_first() -> None:
     below = (reads(3, 34, 100), reads(3, 56, 1, 0x9C))
     play(
         calibrate(Node(3)),
-        *(prepares_as("scs2"), *below, OFF, writes(3, 48, 0), *below),
+        *(prepares_as("scs2"), *below, writes(3, 48, 0), OFF, IDLE, *below, reads(3, 48, 0)),
         *(writes(3, 34, 0), reads(3, 34, 0), reads(3, 34, 0), reads(3, 56, 2, 0)),
         *(reads(3, 48, 0), writes(3, 48, 1), reads(3, 48, 1)),
     )
@@ -149,8 +151,8 @@ def test_a_servo_that_acknowledges_nothing_is_judged_by_its_readings() -> None:
     level_0 = prepares_as("sts", status_return_level=0)
     play(
         calibrate(Node(3)),
-        *(level_0, *pose(600, 0), unheard(OFF), reads(3, 40, 0), unheard(OPEN), reads(3, 55, 0)),
-        *(*pose(600, 0), unheard(MIDDLE), unheard(OFF), reads(3, 40, 0), *pose(2048, -1448)),
+        *(level_0, *pose(600, 0), unheard(OPEN), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
+        *(*pose(600, 0), STILL, unheard(MIDDLE), unheard(OFF), reads(3, 40, 0), *pose(2048, -1448)),
         *(reads(3, 55, 0), unheard(LOCK), LOCKED, LOCKED),
     )
 
@@ -158,24 +160,24 @@ def test_a_servo_that_acknowledges_nothing_is_judged_by_its_readings() -> None:
 def test_a_lost_acknowledgement_is_no_failure() -> None:
     play(
         calibrate(Node(3)),
-        *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-        *(unheard(MIDDLE), OFF, *pose(2048, -1448), *DONE),
+        *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(600, 0)),
+        *(STILL, unheard(MIDDLE), OFF, *pose(2048, -1448), *DONE),
     )
 
 
 def test_a_shaft_that_gives_way_when_it_goes_limp_is_reckoned_anew() -> None:
     play(
         calibrate(Node(3), 100 * COUNT),
-        *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(590, 0)),
-        *(*offset_written(490), *pose(98, 490), *DONE),
+        *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(590, 0)),
+        *(STILL, *offset_written(490), *pose(98, 490), *DONE),
     )
 
 
 def test_one_that_ignores_the_order_is_told_and_locked() -> None:
     played = Played(
         [
-            *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-            *(unheard(MIDDLE), OFF, *pose(600, 0), *GIVEN_UP),
+            *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(600, 0)),
+            *(STILL, unheard(MIDDLE), OFF, *pose(600, 0), *GIVEN_UP),
         ]
     )
     with pytest.raises(DeviceError, match="did not change its homing offset") as caught:
@@ -186,8 +188,8 @@ def test_one_that_ignores_the_order_is_told_and_locked() -> None:
 
 def test_a_reading_that_is_wrong_afterwards_is_told_with_both() -> None:
     script = [
-        *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-        *(MIDDLE, OFF, *pose(2048, -1000), *GIVEN_UP),
+        *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(600, 0)),
+        *(STILL, MIDDLE, OFF, *pose(2048, -1000), *GIVEN_UP),
     ]
     played = Played(script)
     with pytest.raises(VerificationFailed, match="does not read as it must") as caught:
@@ -197,14 +199,15 @@ def test_a_reading_that_is_wrong_afterwards_is_told_with_both() -> None:
 
 
 WHOLE = [
-    *(prepares_as("sts"), *pose(600, 0), OFF, OPEN, *pose(600, 0)),
-    *(MIDDLE, OFF, *pose(2048, -1448), *DONE),
+    *(prepares_as("sts"), *pose(600, 0), OPEN, OFF, IDLE, *pose(600, 0)),
+    *(STILL, MIDDLE, OFF, *pose(2048, -1448), *DONE),
 ]
 
 
 @pytest.mark.parametrize("step", range(3, len(WHOLE)))
 def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
-    played = Played([*WHOLE[:step], LOCK, LOCKED], interrupt_at=step)
+    done = step >= WHOLE.index(LOCK)
+    played = Played([*WHOLE[:step], *GIVEN_UP[done:]], interrupt_at=step)
     with pytest.raises(KeyboardInterrupt):
         played.run(calibrate(Node(3)))
     assert played.script == []
@@ -269,7 +272,19 @@ def test_turns_that_were_counted_are_to_be_forgotten_first() -> None:
     assert "set_many_turns(False)" in caught.value.advice
     play(
         calibrate(Node(3)),
-        *(counting, *pose(600, 0), OFF, OPEN, *pose(600, 0), MIDDLE, OFF, *pose(2048, -1448), *DONE),
+        *(
+            counting,
+            *pose(600, 0),
+            OPEN,
+            OFF,
+            IDLE,
+            *pose(600, 0),
+            STILL,
+            MIDDLE,
+            OFF,
+            *pose(2048, -1448),
+            *DONE,
+        ),
     )
 
 

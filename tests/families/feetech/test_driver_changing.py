@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from motorbus.core.operation import Data
-from motorbus.errors import LinkLost, NoReply
+from motorbus.core.operation import INTENT, Data, Journal
+from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver.placing import called
+from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
 from tests.families.feetech.cuts import NEVER, VERBS, Cut, Doomed, World
 
@@ -92,3 +95,57 @@ def test_nothing_is_done_when_the_intent_cannot_be_recorded() -> None:
     assert isinstance(error, LinkLost)
     assert world.link.sent == []
     assert world.place == world.old
+
+
+def refused(world: World, error: MotorbusError, *, kept: bool, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The change, when its intent is refused by this error; the packets that left."""
+    record = BusJournal.__call__
+
+    def refuse(journal: BusJournal, event: object) -> None:
+        if isinstance(event, Journal) and event.state == INTENT:
+            if kept:
+                record(journal, event)
+            raise error
+        record(journal, event)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(BusJournal, "__call__", refuse)
+        assert world.run(world.change) is error
+    return world.link.sent
+
+
+def test_an_intent_that_a_full_disk_refuses_has_begun_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World("set_id", {})
+    assert refused(world, LinkError("the disk is full"), kept=False, monkeypatch=monkeypatch) == []
+    assert world.faults(None) == []
+    assert world.servo.memory.wear.total() == 0
+
+
+def test_an_intent_that_is_on_the_disk_although_its_folder_was_not_synced_is_closed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world = World("set_id", {})
+    assert refused(world, LinkError("the folder cannot be synced"), kept=True, monkeypatch=monkeypatch) == []
+    assert world.faults(None) == []
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_the_journal_of_another_change_stays_open(interrupted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two that one program begins at the same time, the first was cut off."""
+    world = World("set_id", {})
+    world.journal(Journal("set_id", INTENT, {"node": 9, "new": 8}))
+    if interrupted:
+        error: BaseException = KeyboardInterrupt()
+        monkeypatch.setattr("motorbus.journal._unfinished", lambda change: error)
+        with pytest.raises(KeyboardInterrupt):
+            world.run(world.change)
+    else:
+        error = world.run(world.change)
+        assert isinstance(error, RequestError)
+        assert world.link.sent == []
+        assert not hasattr(error, "__notes__")
+    change = world.journal.unfinished()
+    assert change is not None
+    assert change.facts["node"] == 9
+    assert world.place == world.old
+    assert world.servo.memory.wear.total() == 0

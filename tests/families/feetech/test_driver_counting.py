@@ -27,6 +27,10 @@ COUNT = math.tau / 4096
 FAR = 30719 * COUNT
 MAPS = [name for name in TABLES if CONTROL[name].many_turns]
 OFF, OPEN, CLOSED = writes(3, 40, 0), writes(3, 55, 0), (writes(3, 55, 1), reads(3, 55, 1))
+IDLE = reads(3, 64, 0)
+STILL = reads(3, 55, 0)
+"""Before every write that would move a servo with torque."""
+GIVEN_UP = (OFF, *CLOSED)
 STILL_OPEN = 2 * (reads(3, 55, 0),)
 """Before what was done counts as done, and before the lock is closed."""
 ZEROES = {"min_position_limit": 0, "max_position_limit": 0}
@@ -48,8 +52,8 @@ def stored(address: int, *data: int) -> tuple[Line, Line]:
 def turned_on(name: str, phase: int) -> list[Line]:
     """All that is said to a servo as shipped but for its phase register, of which only bit 4 may change."""
     return [
-        *(prepares_as(name, phase=phase), at(808), OFF, OPEN, again(name, phase=phase)),
-        *(*stored(18, phase | 16), *stored(9, 0, 0, 0, 0), *STILL_OPEN, *CLOSED),
+        *(prepares_as(name, phase=phase), at(808), OPEN, OFF, IDLE, again(name, phase=phase)),
+        *(STILL, *stored(18, phase | 16), STILL, *stored(9, 0, 0, 0, 0), *STILL_OPEN, *CLOSED),
         *(prepares_as(name, phase=phase | 16, **ZEROES), at(808)),
     ]
 
@@ -72,8 +76,15 @@ def test_limits_become_0_and_one_bit_is_set(name: str, phase: int) -> None:
 
 def test_off_limits_come_before_the_bit_is_cleared() -> None:
     script = [
-        *(prepares_as("sts", phase=28, **ZEROES), at(9000), OFF, OPEN, again("sts", phase=28, **ZEROES)),
-        *(*stored(9, 100, 0, 0xB8, 0x0B), *stored(18, 12), *STILL_OPEN, *CLOSED),
+        *(
+            prepares_as("sts", phase=28, **ZEROES),
+            at(9000),
+            OPEN,
+            OFF,
+            IDLE,
+            again("sts", phase=28, **ZEROES),
+        ),
+        *(STILL, *stored(9, 100, 0, 0xB8, 0x0B), STILL, *stored(18, 12), *STILL_OPEN, *CLOSED),
         *(prepares_as("sts", phase=12, min_position_limit=100, max_position_limit=3000), at(808)),
     ]
     told = play(set_many_turns(Node(3), False, (100 * COUNT, 3000 * COUNT)), *script)
@@ -85,8 +96,8 @@ def test_off_limits_come_before_the_bit_is_cleared() -> None:
 def test_off_keeps_limits_that_there_are() -> None:
     """As found: limits of one turn, and a position over many (lerobot#3373)."""
     script = [
-        *(prepares_as("sts", phase=28), at(6015), OFF, OPEN, again("sts", phase=28)),
-        *(*stored(9, 0, 0, 0xFF, 0x0F), *stored(18, 12), *STILL_OPEN, *CLOSED),
+        *(prepares_as("sts", phase=28), at(6015), OPEN, OFF, IDLE, again("sts", phase=28)),
+        *(STILL, *stored(9, 0, 0, 0xFF, 0x0F), STILL, *stored(18, 12), *STILL_OPEN, *CLOSED),
         *(prepares_as("sts"), at(1919)),
     ]
     assert play(set_many_turns(Node(3), False), *script).after.off
@@ -96,8 +107,8 @@ def test_limits_count_as_goals_do() -> None:
     """With an angular resolution of 2 a count is twice as far."""
     found = {"phase": 28, "angular_resolution": 2, **ZEROES}
     script = [
-        *(prepares_as("sts", **found), at(0), OFF, OPEN, again("sts", **found)),
-        *(*stored(9, 10, 0, 0xD0, 0x07), *stored(18, 12), *STILL_OPEN, *CLOSED),
+        *(prepares_as("sts", **found), at(0), OPEN, OFF, IDLE, again("sts", **found)),
+        *(STILL, *stored(9, 10, 0, 0xD0, 0x07), STILL, *stored(18, 12), *STILL_OPEN, *CLOSED),
         *(prepares_as("sts", angular_resolution=2, min_position_limit=10, max_position_limit=2000), at(0)),
     ]
     told = play(set_many_turns(Node(3), False, (20 * COUNT, 4000 * COUNT)), *script)
@@ -172,9 +183,9 @@ def test_where_nobody_knows_what_ships_the_widest_limits_are_named() -> None:
 
 # --- what goes wrong ----------------------------------------------------------------------------------------
 
-BEGIN = (prepares_as("sts"), at(808), OFF, OPEN, again("sts"))
-BACK_18 = (OPEN, *stored(18, 12))
-BACK_9 = (OPEN, *stored(9, 0, 0, 0xFF, 0x0F))
+BEGIN = (prepares_as("sts"), at(808), OPEN, OFF, IDLE, again("sts"))
+BACK_18 = (OPEN, OFF, *stored(18, 12))
+BACK_9 = (OPEN, OFF, *stored(9, 0, 0, 0xFF, 0x0F))
 
 
 def failing(error: type[MotorbusError], *lines: Line) -> MotorbusError:
@@ -185,42 +196,43 @@ def failing(error: type[MotorbusError], *lines: Line) -> MotorbusError:
 
 def test_a_register_that_reads_different_twice_is_not_written() -> None:
     with pytest.raises(VerificationFailed, match="different the second time"):
-        watch(set_many_turns(Node(3), True), *BEGIN[:-1], again("sts", phase=44), *CLOSED)
+        watch(set_many_turns(Node(3), True), *BEGIN[:-1], again("sts", phase=44), *GIVEN_UP)
 
 
 @pytest.mark.parametrize("found", [12, 29, 0xFF, 24])
 def test_a_phase_that_is_not_what_was_written_is_put_back(found: int) -> None:
-    wrong = (writes(3, 18, 28), reads(3, 18, found))
-    error = failing(VerificationFailed, *wrong, *BACK_18, *CLOSED)
+    wrong = (STILL, writes(3, 18, 28), reads(3, 18, found))
+    error = failing(VerificationFailed, *wrong, *BACK_18, *GIVEN_UP)
     assert "as they were" in error.__notes__[0]
 
 
 def test_limits_that_are_not_taken_put_the_phase_back_too() -> None:
-    wrong = (*stored(18, 28), writes(3, 9, 0, 0, 0, 0), reads(3, 9, 0, 0, 0xFF, 0x0F))
-    error = failing(VerificationFailed, *wrong, *BACK_9, *BACK_18, *CLOSED)
+    wrong = (STILL, *stored(18, 28), STILL, writes(3, 9, 0, 0, 0, 0), reads(3, 9, 0, 0, 0xFF, 0x0F))
+    error = failing(VerificationFailed, *wrong, *BACK_9, *BACK_18, *GIVEN_UP)
     assert "as they were" in error.__notes__[0]
 
 
 def test_a_servo_that_lost_its_supply_is_put_back_with_its_lock_open() -> None:
-    written = (*stored(18, 28), *stored(9, 0, 0, 0, 0))
-    error = failing(OutcomeUnknown, *written, reads(3, 55, 1), *BACK_9, *BACK_18, *CLOSED)
+    written = (STILL, *stored(18, 28), STILL, *stored(9, 0, 0, 0, 0))
+    error = failing(OutcomeUnknown, *written, reads(3, 55, 1), *BACK_9, *BACK_18, *GIVEN_UP)
     assert "closed its EEPROM lock by itself" in error.summary
 
 
 def test_what_cannot_be_put_back_is_told() -> None:
-    silent = [unheard(writes(3, 18, 28)), unheard(reads(3, 18, 28))]
-    gone = [unheard(one) for one in (OPEN, reads(3, 55, 0), *2 * (CLOSED[0], CLOSED[1]))]
+    silent = [STILL, unheard(writes(3, 18, 28)), unheard(reads(3, 18, 28))]
+    limp = (OFF, OFF, OFF, reads(3, 40, 0))
+    gone = [unheard(one) for one in (OPEN, STILL, *limp, *2 * CLOSED)]
     error = failing(OutcomeUnknown, *silent, *gone)
     assert "could not be put back as it was: 0c from register 18 on" in error.__notes__[0]
     assert "lock of node 3 may still be open" in error.__notes__[1]
 
 
-@pytest.mark.parametrize("count", range(4, 13))
+@pytest.mark.parametrize("count", range(2, 16))
 def test_an_interruption_at_any_exchange_leaves_all_or_nothing(count: int) -> None:
     """At the exchange of this number; what was begun until then is put back, and the lock is closed."""
     lines = turned_on("sts", 12)
-    begun: Sequence[Line] = (*BACK_9, *BACK_18) if 7 <= count <= 9 else BACK_18 if 5 <= count <= 9 else ()
-    script = [*lines[:count], *begun, *CLOSED]
+    begun: Sequence[Line] = (*BACK_9, *BACK_18) if 10 <= count <= 12 else BACK_18 if 7 <= count <= 9 else ()
+    script = [*lines[:count], *begun, *(GIVEN_UP if count < 14 else CLOSED)]
     played = Played(script, interrupt_at=count)
     with pytest.raises(KeyboardInterrupt):
         played.run(set_many_turns(Node(3), True))

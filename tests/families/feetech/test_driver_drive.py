@@ -23,7 +23,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
-from tests.families.feetech.maps import met
+from tests.families.feetech.maps import met, prepares_as
 
 COUNT = tau / 4096
 SCS_COUNT = radians(300) / 1024
@@ -45,7 +45,8 @@ MOTOR = {"at_11": 0, "at_12": 0}
 def test_a_velocity_has_the_unit_and_the_sign_of_its_servo(
     name: str, changes: dict[str, int], velocity: int, data: tuple[int, int]
 ) -> None:
-    (exchange,) = watch(set_velocity(met(name, **changes), velocity * COUNT), writes(3, 46, *data)).exchanges
+    wish = set_velocity(met(name), velocity * COUNT)
+    _, exchange = watch(wish, prepares_as(name, **changes), writes(3, 46, *data)).exchanges
     (goal,) = exchange.goals
     assert goal.quantity == "velocity"
     assert goal.value == pytest.approx(velocity * COUNT)
@@ -53,28 +54,28 @@ def test_a_velocity_has_the_unit_and_the_sign_of_its_servo(
 
 
 def test_hls_velocities_bring_no_bound_as_long_as_there_is_one() -> None:
-    node = met("hls", at_33=1)
-    play(set_velocity(node, -1000 * COUNT), reads(3, 44, 0x2C, 1), writes(3, 46, 20, 0x80))
-    play(set_velocity(node, 1000 * COUNT), writes(3, 46, 20, 0))
-    play(set_velocity(node, 1000 * COUNT, current=1.3), writes(3, 44, 200, 0, 20, 0))
+    node, asked = met("hls"), prepares_as("hls", at_33=1)
+    play(set_velocity(node, -1000 * COUNT), asked, reads(3, 44, 0x2C, 1), writes(3, 46, 20, 0x80))
+    play(set_velocity(node, 1000 * COUNT), asked, writes(3, 46, 20, 0))
+    play(set_velocity(node, 1000 * COUNT, current=1.3), asked, writes(3, 44, 200, 0, 20, 0))
 
 
 def test_hls_without_a_bound_gets_one_and_it_is_told() -> None:
-    played = Played([reads(3, 44, 0, 0), writes(3, 44, 0xF4, 1, 20, 0)])
-    played.run(set_velocity(met("hls", at_33=1), 1000 * COUNT))
+    played = Played([prepares_as("hls", at_33=1), reads(3, 44, 0, 0), writes(3, 44, 0xF4, 1, 20, 0)])
+    played.run(set_velocity(Node(3), 1000 * COUNT))
     assert played.events == [Powerless(3, 500 * HLS["goal_torque"].scale)]
 
 
 def test_an_acceleration_goes_first_and_stays() -> None:
     play(
-        set_velocity(met("sts", at_33=1), 1000 * COUNT, acceleration=5000 * COUNT),
-        *(writes(3, 41, 50), writes(3, 46, 0xE8, 3)),
+        set_velocity(Node(3), 1000 * COUNT, acceleration=5000 * COUNT),
+        *(prepares(at_33=1), writes(3, 41, 50), writes(3, 46, 0xE8, 3)),
     )
 
 
 def test_smcl_is_given_no_negative_velocity() -> None:
     with pytest.raises(RequestError, match="out of range 0"):
-        play(set_velocity(met("smcl", at_35=1), -1000 * COUNT))
+        play(set_velocity(Node(3), -1000 * COUNT), prepares_as("smcl", at_35=1))
 
 
 # -- duty and current ----------------------------------------------------------------------------------------
@@ -93,24 +94,26 @@ def test_smcl_is_given_no_negative_velocity() -> None:
 def test_a_duty_is_written_with_its_sign_at_bit_10(
     name: str, changes: dict[str, int], data: tuple[int, int]
 ) -> None:
-    (exchange,) = watch(set_duty(met(name, **changes), -0.5), writes(3, 44, *data)).exchanges
+    wish = set_duty(met(name), -0.5)
+    _, exchange = watch(wish, prepares_as(name, **changes), writes(3, 44, *data)).exchanges
     assert exchange.goals == (Goal(3, "load", -0.5, -1.0, 1.0),)
 
 
 def test_hls_has_no_register_for_a_duty_that_is_published() -> None:
     with pytest.raises(RequestError, match="nobody has published which register takes the duty") as caught:
-        play(set_duty(met("hls", at_33=3), 0.5))
+        play(set_duty(Node(3), 0.5), prepares_as("hls", at_33=3))
     assert "memory table" in caught.value.cause
 
 
 def test_a_current_is_a_goal_in_current_mode() -> None:
-    (exchange,) = watch(set_current(met("hls", at_33=2), -1.3), writes(3, 44, 200, 0x80)).exchanges
+    asked = prepares_as("hls", at_33=2)
+    _, exchange = watch(set_current(met("hls"), -1.3), asked, writes(3, 44, 200, 0x80)).exchanges
     (goal,) = exchange.goals
     assert goal.quantity == "current"
     assert goal.value == pytest.approx(-1.3)
-    play(set_current(met("hls", at_33=2), 0.0), writes(3, 44, 0, 0))
+    play(set_current(Node(3), 0.0), asked, writes(3, 44, 0, 0))
     with pytest.raises(LimitExceeded, match="more than it can be told"):
-        play(set_current(met("hls", at_33=2), 14.0))
+        play(set_current(Node(3), 14.0), asked)
 
 
 # -- steps ---------------------------------------------------------------------------------------------------
@@ -123,10 +126,8 @@ def sample(raw: int, moving: int = 1) -> Line:
 
 
 def test_a_step_is_one_packet_that_is_never_repeated() -> None:
-    wish = step(
-        met("sts", **STEPS), -1000 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False
-    )
-    (exchange,) = watch(wish, writes(3, 41, 2, 0xE8, 0x83, 0, 0, 0xF4, 1)).exchanges
+    wish = step(Node(3), -1000 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False)
+    _, exchange = watch(wish, prepares(**STEPS), writes(3, 41, 2, 0xE8, 0x83, 0, 0, 0xF4, 1)).exchanges
     (goal,) = exchange.goals
     assert goal.quantity == "relative"
     assert goal.value == pytest.approx(-1000 * COUNT)
@@ -136,7 +137,8 @@ def test_a_step_is_one_packet_that_is_never_repeated() -> None:
 def test_a_step_that_was_not_acknowledged_is_not_sent_again() -> None:
     with pytest.raises(OutcomeUnknown):
         play(
-            step(met("sts", **STEPS), 1000 * COUNT, wait=False),
+            step(Node(3), 1000 * COUNT, wait=False),
+            prepares(**STEPS),
             unheard(writes(3, 41, 0, 0xE8, 3, 0, 0, 0, 0)),
         )
 
@@ -144,8 +146,8 @@ def test_a_step_that_was_not_acknowledged_is_not_sent_again() -> None:
 def test_the_way_of_a_step_is_followed_over_the_end_of_a_turn() -> None:
     samples = [sample(raw % 4096) for raw in range(4000, 8600, 600)]
     play(
-        step(met("sts", **STEPS), 4596 * COUNT),
-        *(reads(3, 56, *low_high(4000)), writes(3, 41, 0, *low_high(4596), 0, 0, 0, 0)),
+        step(Node(3), 4596 * COUNT),
+        *(prepares(**STEPS), reads(3, 56, *low_high(4000)), writes(3, 41, 0, *low_high(4596), 0, 0, 0, 0)),
         *(*samples, sample(8596 - 8192, 0)),
     )
 
@@ -153,24 +155,24 @@ def test_the_way_of_a_step_is_followed_over_the_end_of_a_turn() -> None:
 def test_a_step_of_a_whole_turn_is_not_over_before_it_began() -> None:
     with pytest.raises(Stalled, match="6.283 rad off its goal"):
         play(
-            step(met("sts", **STEPS), 4096 * COUNT),
-            *(reads(3, 56, 0, 4), writes(3, 41, 0, 0, 0x10, 0, 0, 0, 0)),
+            step(Node(3), 4096 * COUNT),
+            *(prepares(**STEPS), reads(3, 56, 0, 4), writes(3, 41, 0, 0, 0x10, 0, 0, 0, 0)),
             *[sample(1024, 0)] * 25,
             unheard(prepares()),  # what may be in the way
         )
 
 
 def test_a_step_is_measured_by_what_the_offset_leaves() -> None:
-    node = met("sts", **STEPS, at_31=100)
     play(
-        step(node, 1000 * COUNT),
+        step(Node(3), 1000 * COUNT),
+        prepares(**STEPS, at_31=100),
         *(reads(3, 56, 50, 0), writes(3, 41, 0, 0xE8, 3, 0, 0, 0, 0), sample(1050, 0)),
     )
 
 
 def test_a_step_too_far_for_the_register_is_refused() -> None:
     with pytest.raises(LimitExceeded, match="too far for one step"):
-        play(step(met("sts", **STEPS), 30720 * COUNT))
+        play(step(Node(3), 30720 * COUNT), prepares(**STEPS))
 
 
 # -- refusals ------------------------------------------------------------------------------------------------
@@ -188,11 +190,27 @@ ORDERS: dict[Mode, Callable[[Node], Runnable[Any]]] = {
 def test_an_order_for_another_mode_is_refused_and_the_way_out_is_named(name: str, wanted: Mode) -> None:
     node = met(name)
     with pytest.raises(RequestError) as caught:
-        play(ORDERS[wanted](node))
+        play(ORDERS[wanted](node), prepares_as(name))
     if wanted in node.control.has and (name, wanted) != ("hls", Mode.PWM):
         assert f"set_mode({wanted.value!r})" in caught.value.advice
     elif name != "hls":
         assert "mode only" in caught.value.advice
+
+
+@pytest.mark.parametrize(
+    ("wanted", "name", "code"), [(Mode.VELOCITY, "sts", 1), (Mode.PWM, "sts", 2), (Mode.STEP, "sts", 3)]
+)
+def test_an_order_for_the_mode_that_it_was_in_is_refused(wanted: Mode, name: str, code: int) -> None:
+    """Another program has put it into position mode since."""
+    with pytest.raises(RequestError, match="in operating mode position"):
+        play(ORDERS[wanted](met(name, at_33=code)), prepares_as(name))
+
+
+@pytest.mark.parametrize("wanted", ORDERS)
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_in_a_mode_that_nobody_explains_nothing_is_ordered(name: str, wanted: Mode) -> None:
+    with pytest.raises(RequestError):
+        play(ORDERS[wanted](Node(3)), prepares_as(name, at_33=9))
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])

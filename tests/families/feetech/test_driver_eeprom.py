@@ -1,16 +1,21 @@
-"""The guarded write: torque off, unlock, write, read back, lock; and the lock is closed whatever happens."""
+"""The guarded write: unlock, torque off, write, read back, lock; and the lock is closed whatever happens."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
-from motorbus.core.operation import Effect, Rank, Timeout
+from motorbus.core.operation import Effect, Pause, Rank, Timeout
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
 from motorbus.families.feetech.table import TABLES, Mode
 from tests.families.feetech.driver_script import (
+    REG_WRITE,
     Line,
     Played,
+    packet,
     play,
     prepared,
     prepares,
@@ -22,31 +27,35 @@ from tests.families.feetech.driver_script import (
 from tests.families.feetech.maps import simulated
 
 OFF, UNLOCK, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
+IDLE = reads(3, 64, 0)
 STILL_OPEN = reads(3, 55, 0)
 WRITES = (writes(3, 20, 5, 33), reads(3, 20, 5, 33))
-WHOLE = (OFF, UNLOCK, *WRITES, STILL_OPEN, LOCK, LOCKED)
+GIVEN_UP = (OFF, LOCK, LOCKED)
+WHOLE = (UNLOCK, OFF, IDLE, *WRITES, STILL_OPEN, LOCK, LOCKED)
 
 
 def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
     played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
     assert played.alone == 1
-    assert [exchange.timeout for exchange in played.exchanges[1:]] == [Timeout.STORE] * 6
+    stores = [one for one in played.exchanges if one.timeout is Timeout.STORE]
+    assert stores == [played.exchanges[0], *played.exchanges[2:]]
     assert [exchange.effect for exchange in played.exchanges] == [
-        Effect.TORQUE,
         Effect.PERSISTENT,
+        Effect.TORQUE,
+        Effect.NONE,
         Effect.PERSISTENT,
         Effect.NONE,
         Effect.NONE,
         Effect.PERSISTENT,
         Effect.NONE,
     ]
-    assert played.exchanges[0].rank is Rank.STOP
+    assert played.exchanges[1].rank is Rank.STOP
 
 
 def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
     play(
         write(prepared(), position_p=33, max_temperature=65, torque_limit=0.5),
-        *(OFF, UNLOCK, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
+        *(UNLOCK, OFF, IDLE, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
         *(STILL_OPEN, LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
     )
 
@@ -54,22 +63,24 @@ def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() ->
 def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
     played = watch(
         write(prepared(), operating_mode=1),
-        *(OFF, UNLOCK, writes(3, 33, 1), reads(3, 33, 1), STILL_OPEN, LOCK, LOCKED),
+        *(UNLOCK, OFF, IDLE, STILL_OPEN, writes(3, 33, 1), reads(3, 33, 1), STILL_OPEN, LOCK, LOCKED),
     )
     assert max(exchange.effect for exchange in played.exchanges) is Effect.TORQUE
+
+
+def test_a_reg_write_that_waits_is_replaced_by_one_that_moves_nothing() -> None:
+    harmless = Line(packet(3, REG_WRITE, 40, 0), packet(3, 0))
+    played = watch(
+        write(prepared(), position_p=33, led_mask=5), *(*WHOLE[:2], reads(3, 64, 1), harmless, *WHOLE[3:])
+    )
+    assert played.exchanges[3].effect is Effect.NONE
 
 
 def test_settings_are_read_again_afterwards() -> None:
     node = prepared()
     play(
         write(node, operating_mode=1),
-        OFF,
-        UNLOCK,
-        writes(3, 33, 1),
-        reads(3, 33, 1),
-        STILL_OPEN,
-        LOCK,
-        LOCKED,
+        *(UNLOCK, OFF, IDLE, STILL_OPEN, writes(3, 33, 1), reads(3, 33, 1), STILL_OPEN, LOCK, LOCKED),
     )
     assert node.settings is None
     play(write(node, torque_enable=0), prepares(at_33=1), OFF)
@@ -77,7 +88,7 @@ def test_settings_are_read_again_afterwards() -> None:
 
 
 def test_reading_back_different_is_an_error_and_the_lock_is_closed() -> None:
-    played = Played([OFF, UNLOCK, WRITES[0], reads(3, 20, 5, 32), LOCK, LOCKED])
+    played = Played([UNLOCK, OFF, IDLE, WRITES[0], reads(3, 20, 5, 32), *GIVEN_UP])
     with pytest.raises(VerificationFailed, match="register 20 to 21"):
         played.run(write(prepared(), position_p=33, led_mask=5))
     assert played.script == []
@@ -97,7 +108,7 @@ def test_a_lock_that_stays_open_for_good_is_an_error() -> None:
 
 @pytest.mark.parametrize("step", range(len(WHOLE)))
 def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
-    played = Played([*WHOLE[:step], LOCK, LOCKED], interrupt_at=step)
+    played = Played([*WHOLE[:step], *given_up(step)], interrupt_at=step)
     with pytest.raises(KeyboardInterrupt):
         played.run(write(prepared(), position_p=33, led_mask=5))
     assert played.script == []
@@ -107,13 +118,18 @@ def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
 @pytest.mark.parametrize("step", range(len(WHOLE)))
 @pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
 def test_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
-    played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in failing(step)), LOCK, LOCKED])
-    if step < 5:
+    played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in failing(step)), *given_up(step)])
+    if step <= WHOLE.index(STILL_OPEN):
         with pytest.raises(type(failure)):
             played.run(write(prepared(), position_p=33, led_mask=5))
     else:  # everything is written, and the second attempt closes the lock
         played.run(write(prepared(), position_p=33, led_mask=5))
     assert played.script == []
+
+
+def given_up(step: int) -> tuple[Line, ...]:
+    """How it ends when this step fails: until all is done, with torque off once more."""
+    return GIVEN_UP if step <= WHOLE.index(STILL_OPEN) else GIVEN_UP[1:]
 
 
 def failing(step: int) -> list[Line]:
@@ -128,7 +144,8 @@ def failing(step: int) -> list[Line]:
 @pytest.mark.parametrize("step", range(len(WHOLE)))
 def test_a_second_interruption_does_not_leave_the_lock_open(step: int) -> None:
     first = Line(WHOLE[step].sent, KeyboardInterrupt())
-    played = Played([*WHOLE[:step], first, Line(LOCK.sent, KeyboardInterrupt()), LOCK, LOCKED])
+    again = given_up(step)
+    played = Played([*WHOLE[:step], first, Line(again[0].sent, KeyboardInterrupt()), *again])
     with pytest.raises(KeyboardInterrupt):
         played.run(write(prepared(), position_p=33, led_mask=5))
     assert played.script == []
@@ -139,7 +156,7 @@ def test_a_lock_that_cannot_be_closed_is_told_with_the_error() -> None:
     with pytest.raises(VerificationFailed, match="register 20 to 21") as caught:
         play(
             write(prepared(), position_p=33, led_mask=5),
-            *(OFF, UNLOCK, WRITES[0], reads(3, 20, 0, 0), *silent),
+            *(UNLOCK, OFF, IDLE, WRITES[0], reads(3, 20, 0, 0), OFF, *silent),
         )
     assert "EEPROM lock of node 3 may still be open" in caught.value.__notes__[0]
 
@@ -147,7 +164,7 @@ def test_a_lock_that_cannot_be_closed_is_told_with_the_error() -> None:
 def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
     play(
         write(prepared(at_8=0), led_mask=5),
-        *(unheard(OFF), reads(3, 40, 0), unheard(UNLOCK), reads(3, 55, 0)),
+        *(unheard(UNLOCK), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
         *(unheard(writes(3, 20, 5)), reads(3, 20, 5), reads(3, 20, 5)),
         *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
@@ -156,7 +173,7 @@ def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
 def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
     play(
         write(prepared(), status_return_level=0),
-        *(OFF, UNLOCK, unheard(writes(3, 8, 0)), reads(3, 8, 0), reads(3, 8, 0)),
+        *(UNLOCK, OFF, IDLE, unheard(writes(3, 8, 0)), reads(3, 8, 0), reads(3, 8, 0)),
         *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
 
@@ -174,3 +191,42 @@ def test_a_servo_that_lost_its_supply_in_the_middle_is_not_taken_for_done(name: 
         servo.write(led_mask=5)
         real.power_cycle()
         assert real.memory["led_mask"] == 5
+
+
+CHANGES: dict[str, Callable[[Any], object]] = {
+    "a mode": lambda servo: servo.set_mode("velocity"),
+    "limits": lambda servo: servo.write(min_position_limit=1.0),
+    "a zero": lambda servo: servo.calibrate(),
+    "many turns": lambda servo: servo.set_many_turns(True),
+}
+
+
+@pytest.mark.parametrize("at", range(14))
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_servo_that_restarts_with_its_torque_on_is_not_moved_by_a_setting(change: str, at: int) -> None:
+    """Whichever packet its supply fails in front of: it is made limp again, and it stands where it stood."""
+    with simulated("sts", torque_at_power_up="yes") as (real, servo):
+        servo.prepare()
+        line, write, packets = servo.bus.link, servo.bus.link.write, []
+
+        def wrote(data: bytes) -> None:
+            packets.append(data)
+            if len(packets) == at + 1:
+                real.power_cycle()
+            write(data)
+
+        line.write = wrote
+        stood = real.motion.position(real._now())
+        failure: MotorbusError | None = None
+        try:
+            CHANGES[change](servo)
+        except MotorbusError as error:
+            failure = error
+        line.write = write
+        opened = next(n for n, data in enumerate(packets) if data[4:7] == bytes((3, 55, 0)))
+        closed = next(n for n, data in enumerate(packets) if data[4:7] == bytes((3, 55, 1)))
+        if opened < at < closed - 1:
+            assert failure is not None
+            assert real.memory["torque_enable"] == 0
+        servo.bus.run(iter(Pause(2.0)))
+        assert real.motion.position(real._now()) == pytest.approx(stood, abs=1)

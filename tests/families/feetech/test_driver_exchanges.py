@@ -10,13 +10,25 @@ from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.exchanges import (
     Block,
     acknowledged,
+    changed_since,
     confirmed,
     read_block,
     unanswered,
     verified,
     write_block,
 )
-from tests.families.feetech.driver_script import Line, packet, play, prepared, reads, unheard, watch, writes
+from motorbus.families.feetech.driver.identity import learn
+from tests.families.feetech.driver_script import (
+    Line,
+    image,
+    packet,
+    play,
+    prepared,
+    reads,
+    unheard,
+    watch,
+    writes,
+)
 
 BLOCK = Block(41, b"\x05\x06", Effect.TORQUE)
 
@@ -122,3 +134,24 @@ def test_reading_back_may_take_as_long_as_the_write() -> None:
 def test_one_register_that_differs_is_named_alone() -> None:
     with pytest.raises(VerificationFailed, match="register 21 reads back different"):
         play(verified(Node(3), Block(21, b"\1")), reads(3, 21, 2))
+
+
+def test_an_order_is_refused_once_the_settings_it_was_made_under_are_others() -> None:
+    node = prepared()
+    order = Block(42, b"\0\0", Effect.MOTION)
+    at_once, kept = write_block(node, order), write_block(node, order._replace(under=node.settings))
+    both = changed_since([(node, None), (prepared(4), None)])
+    asked = [at_once.refusal, kept.refusal, both]
+    assert all(refusal is not None and refusal(lambda _: 9) is None for refusal in asked)
+    learn(node, image())  # read again, and the same
+    assert all(refusal is not None and refusal(lambda _: 0) is None for refusal in asked)
+    for change in (node.forget_settings, lambda: learn(node, image(at_33=1))):
+        change()
+        for refusal in asked:
+            assert refusal is not None
+            error = refusal(lambda _: 0)
+            assert error is not None
+            assert "before the settings of node 3 were changed" in error.summary
+    assert kept.refusal is not None
+    learn(node, image())
+    assert kept.refusal(lambda _: 0) is None

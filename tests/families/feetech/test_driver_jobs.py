@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT, OUTCOME, Effect, Journal
+from motorbus.core.operation import INTENT, OUTCOME, Effect, Journal, Report
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.jobs import (
     SET_BAUD,
@@ -81,7 +81,7 @@ def test_its_course_is_recorded_and_the_facts_once() -> None:
     assert played == [
         Journal(SET_ID, INTENT, ID.facts()),
         Journal(SET_ID, "writing 7", {}),
-        Journal(SET_ID, OUTCOME, {"outcome": "new"}),
+        Journal(SET_ID, OUTCOME, {"outcome": "new", "node": 3, "new": 7, "new_rate": 1_000_000}),
     ]
     assert course.reached == [INTENT, "writing 7", OUTCOME]
 
@@ -114,3 +114,47 @@ def test_other_places_are_all_but_the_two() -> None:
         Place(3, 500_000),
         Place(1, 500_000),
     ]
+
+
+HLS = Job(
+    SET_ID, Place(3, 1_000_000), Place(7, 1_000_000), image(3, at_0=3, at_1=43, at_3=10, at_4=12, at_7=3)
+)
+
+
+def test_a_second_id_that_is_the_old_one_goes_along() -> None:
+    assert HLS.table.name == "hls"
+    assert HLS.second == 7
+    assert HLS._replace(image=HLS.image[:7] + b"\x14" + HLS.image[8:]).second is None
+    assert HLS._replace(verb=SET_BAUD, new=Place(3, 500_000)).second is None
+    assert ID.second is None
+
+
+@pytest.mark.parametrize("second", [3, 7, 255])
+def test_it_is_known_again_and_seen_whatever_its_second_id_is_by_now(second: int) -> None:
+    there = bytes((*HLS.expected(HLS.new)[:7], second, *HLS.image[8:]))
+    assert HLS.is_it(there)
+    assert HLS.is_at(HLS.new, there)
+    assert not HLS.is_at(HLS.old, there)
+    assert not HLS.is_at(HLS.new, there[:13] + b"\x3c" + there[14:])
+
+
+def test_where_nothing_goes_along_every_register_counts() -> None:
+    assert ID.is_at(ID.new, image(7))
+    assert not ID.is_at(ID.new, image(7, at_7=3))
+    assert not ID.is_at(ID.new, b"")
+    assert not ID.is_it(image(7, at_7=3))
+
+
+def test_a_state_counts_as_reached_before_it_is_recorded() -> None:
+    """Whoever is interrupted by the recording itself must find that something has begun."""
+    course = Course(ID)
+    step = next(course.reach(INTENT))
+    assert isinstance(step, Report)
+    assert course.reached == [INTENT]
+    next(course.end("old"))
+    assert course.reached == [INTENT, OUTCOME]
+
+
+def test_a_second_id_may_have_been_written() -> None:
+    assert not Course(HLS, [INTENT, "writing 7"]).following
+    assert Course(HLS, [INTENT, "writing 7", "written 7", "second 7"]).following

@@ -6,23 +6,26 @@ from math import radians
 
 import pytest
 
+import motorbus
 from motorbus.core.operation import Effect
 from motorbus.errors import DeviceError, RequestError
-from motorbus.families.feetech.driver import Node, mode, set_mode
+from motorbus.families.feetech.driver import Node, Servo, mode, set_mode
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
 from tests.families.feetech.driver_script import Line, play, reads, watch, writes
 from tests.families.feetech.maps import HEADS, eeprom, met
 
+ZERO_VELOCITY = "its goal velocity is 0: set_velocity() gives one"
 SCS_COUNT = radians(300) / 1024
 MODE_AT = {"sts": 33, "smbl": 33, "smcl": 35, "hls": 33}
 LOCK_AT = {"sts": 55, "smbl": 55, "smcl": 48, "hls": 55, "scs": 48, "scs2": 48}
 
 
 def guarded(name: str, address: int, *data: int) -> list[Line]:
-    """Torque off, unlock, write, read back, lock, and see that it is locked."""
+    """Unlock, torque off, see that it has not restarted, write, read back, the same once more, lock, see it locked."""
     lock = LOCK_AT[name]
     return [
-        *(writes(3, 40, 0), writes(3, lock, 0), writes(3, address, *data), reads(3, address, *data)),
+        *(writes(3, lock, 0), writes(3, 40, 0), reads(3, 64, 0), reads(3, lock, 0)),
+        *(writes(3, address, *data), reads(3, address, *data)),
         *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
     ]
 
@@ -120,10 +123,46 @@ def test_pwm_of_hls_and_limits_of_others_and_words_that_are_no_modes_are_refused
 
 
 def test_a_current_that_was_a_goal_is_no_bound_of_the_next_mode() -> None:
-    node = met("hls", at_33=2)
     play(
-        set_mode(node, Mode.POSITION),
-        *(asked("hls", at_33=2), *guarded("hls", 33, 0), asked("hls")),
+        set_mode(met("hls", at_33=2), Mode.POSITION),
+        *(asked("hls", at_33=2), writes(3, 55, 0), writes(3, 40, 0), reads(3, 64, 0)),
+        # The supply may go behind any line: 0 is always noticed.
+        *(reads(3, 55, 0), writes(3, 44, 0, 0), reads(3, 44, 0, 0)),
+        *(reads(3, 55, 0), writes(3, 33, 0), reads(3, 33, 0)),
+        *(reads(3, 55, 0), writes(3, 44, 0xF4, 1), reads(3, 44, 0xF4, 1)),
+        *(reads(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1), asked("hls")),
     )
-    assert node.bound == 500
     assert TABLES["hls"]["protection_current"].to_value(500) == pytest.approx(3.25)
+
+
+@pytest.mark.parametrize("by_name", [False, True], ids=["set_mode", "write"])
+@pytest.mark.parametrize("wanted", [Mode.POSITION, Mode.VELOCITY])
+def test_a_program_that_comes_later_has_a_servo_with_its_full_force(wanted: Mode, by_name: bool) -> None:
+    with motorbus.simulate("feetech", ids="3", model="hls3925") as simulation:
+        with motorbus.open(simulation.url) as bus:
+            servo = Servo(bus, 3)
+            servo.set_mode("current")
+            servo.enable_torque()
+            servo.set_current(0.1)
+            if by_name:
+                servo.write(operating_mode=0 if wanted is Mode.POSITION else 1)
+            else:
+                servo.set_mode(wanted)
+        assert simulation[3].memory["goal_torque"] == simulation[3].memory["protection_current"] == 500
+        with motorbus.open(simulation.url) as bus:
+            servo = Servo(bus, 3)
+            servo.enable_torque()
+            if wanted is Mode.POSITION:
+                servo.move(2.5)
+                assert servo.position() == pytest.approx(2.5, abs=0.05)
+            assert servo.blockers() == (() if wanted is Mode.POSITION else (ZERO_VELOCITY,))
+        assert simulation[3].memory["goal_torque"] == 500
+
+
+def test_a_bound_that_was_set_stays_from_mode_to_mode_where_it_was_no_goal() -> None:
+    with motorbus.simulate("feetech", ids="3", model="hls3925") as simulation:
+        simulation[3].memory["goal_torque"] = 100
+        with motorbus.open(simulation.url) as bus:
+            Servo(bus, 3).set_mode("velocity")
+            Servo(bus, 3).set_mode("position")
+        assert simulation[3].memory["goal_torque"] == 100

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import inf, nan, radians, tau
+from typing import Any
 
 import pytest
 
 from motorbus.core.operation import Effect, Goal, Rank
-from motorbus.errors import DeviceError, LimitExceeded, OutcomeUnknown, RequestError
-from motorbus.families.feetech.driver import Node, Promise, enable_torque, move, stop
+from motorbus.errors import DeviceError, LimitExceeded, MotionError, OutcomeUnknown, RequestError
+from motorbus.families.feetech.driver import Node, enable_torque, move
 from motorbus.families.feetech.driver.motion import move_block, way
 from motorbus.families.feetech.table import CONTROL, STS, TABLES
 from tests.families.feetech.driver_script import (
@@ -22,14 +23,21 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
-from tests.families.feetech.maps import met
+from tests.families.feetech.maps import met, prepares_as
 
 COUNT = tau / 4096
-ON = writes(3, 40, 1)
+IS_ON = reads(3, 40, 1)
+BEFORE = reads(3, 40, 0, 7, 0, 9, 1, 2, 3, 4)
+"""Registers 40 to 47 of a limp servo, with an acceleration and an old goal."""
 
 
 def stands(raw: int) -> Line:
     return reads(3, 56, *low_high(raw))
+
+
+def on(*order: int) -> tuple[Line, Line]:
+    """The switch with what was found in register 41 and this order behind it; and what it says then."""
+    return writes(3, 40, 1, 7, *order), IS_ON
 
 
 def goes(raw: int, *, acceleration: int = 0, velocity: int = 0) -> Line:
@@ -39,24 +47,36 @@ def goes(raw: int, *, acceleration: int = 0, velocity: int = 0) -> Line:
 # -- torque on -----------------------------------------------------------------------------------------------
 
 
-def test_the_goal_becomes_the_present_position_before_torque_goes_on() -> None:
-    played = watch(enable_torque(Node(3)), prepares(), stands(1304), writes(3, 42, *low_high(1304)), ON)
-    goal, switch = played.exchanges[2:]
-    assert goal.effect is Effect.MOTION
-    assert goal.goals == (Goal(3, "position", 1304 * COUNT, 1304 * COUNT, 1304 * COUNT),)
-    assert (switch.effect, switch.goals) == (Effect.TORQUE, ())
+def test_the_goal_becomes_the_present_position_in_the_packet_that_switches_torque_on() -> None:
+    played = watch(enable_torque(Node(3)), prepares(), BEFORE, stands(1304), *on(*low_high(1304)))
+    order = played.exchanges[3]
+    assert order.effect is Effect.MOTION
+    assert order.goals == (Goal(3, "position", 1304 * COUNT, 1304 * COUNT, 1304 * COUNT),)
 
 
 def test_limits_and_mode_are_read_anew_each_time() -> None:
-    play(enable_torque(prepared(at_33=1)), prepares(), stands(5), writes(3, 42, 5, 0), ON)
+    play(enable_torque(prepared(at_33=1)), prepares(), BEFORE, stands(5), *on(5, 0))
+
+
+def test_torque_that_is_off_again_at_once_is_told() -> None:
+    order, _ = on(5, 0)
+    with pytest.raises(MotionError, match="its torque is off") as caught:
+        play(enable_torque(Node(3)), prepares(), BEFORE, stands(5), order, reads(3, 40, 0))
+    assert "lost its supply for a moment" in caught.value.cause
+
+
+@pytest.mark.parametrize("jump", [nan, inf, -0.1, True, "1", None])
+def test_a_jump_that_bounds_nothing_costs_no_packet(jump: Any) -> None:
+    with pytest.raises(RequestError, match="is no way that it may jump"):
+        play(enable_torque(Node(3), jump=jump))
 
 
 @pytest.mark.parametrize(
     ("mode", "lines"),
     [
-        (1, [writes(3, 46, 0, 0), ON]),
-        (2, [writes(3, 44, 0, 0), ON]),
-        (3, [ON]),
+        (1, [BEFORE, *on(0, 9, 1, 2, 0, 0)]),
+        (2, [BEFORE, *on(0, 9, 0, 0)]),
+        (3, [writes(3, 40, 1), IS_ON]),
     ],
 )
 def test_other_modes_start_at_rest(mode: int, lines: list[Line]) -> None:
@@ -72,21 +92,22 @@ def test_an_undocumented_mode_is_refused() -> None:
 def test_beyond_its_limits_a_servo_would_jump_so_torque_stays_off(raw: int, limit: int) -> None:
     narrow = prepares(at_9=100, at_11=0xB8, at_12=0x0B)
     with pytest.raises(LimitExceeded, match="it would jump to") as caught:
-        play(enable_torque(Node(3)), narrow, stands(raw))
+        play(enable_torque(Node(3)), narrow, BEFORE, stands(raw))
     assert f"{limit * COUNT:.4g}" in caught.value.summary
-    play(enable_torque(Node(3), jump=10 * COUNT), narrow, stands(raw), writes(3, 42, *low_high(limit)), ON)
+    play(enable_torque(Node(3), jump=10 * COUNT), narrow, BEFORE, stands(raw), *on(*low_high(limit)))
 
 
 def test_many_turns_have_room_for_every_position() -> None:
     turns = prepares(at_11=0, at_12=0)
-    play(enable_torque(Node(3)), turns, stands(-6015), writes(3, 42, *low_high(-6015)), ON)
+    play(enable_torque(Node(3)), turns, BEFORE, stands(-6015), *on(*low_high(-6015)))
 
 
-def test_when_the_goal_is_in_doubt_torque_is_not_switched_on() -> None:
+def test_when_the_goal_is_in_doubt_so_is_the_torque() -> None:
+    order, _ = on(*low_high(1304))
     with pytest.raises(OutcomeUnknown):
         play(
             enable_torque(Node(3)),
-            *(prepares(), stands(1304), unheard(writes(3, 42, *low_high(1304))), unheard(reads(3, 42, 0, 0))),
+            *(prepares(), BEFORE, stands(1304), unheard(order), unheard(reads(3, 40, 0, 0, 0, 0))),
         )
 
 
@@ -95,51 +116,12 @@ def test_a_stranger_is_not_switched_on() -> None:
         play(enable_torque(Node(3)), prepares(at_0=9))
 
 
-# -- stop ----------------------------------------------------------------------------------------------------
-
-
-def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
-    wish = stop(prepared())
-    played = watch(wish, stands(777), writes(3, 42, *low_high(777)))
-    assert played.exchanges[1].rank is Rank.CONTROL
-    assert play(stop(prepared()), stands(777), writes(3, 42, *low_high(777))) is Promise.HOLD_ACCEPTED
-    assert "not verified" in Promise.HOLD_ACCEPTED.value
-
-
-def test_stop_is_never_refused_for_standing_outside_the_limits() -> None:
-    played = watch(stop(prepared(at_12=0)), stands(900), writes(3, 42, *low_high(900)))
-    (goal,) = played.exchanges[1].goals
-    assert goal.low == goal.value == goal.high
-
-
-@pytest.mark.parametrize(
-    ("mode", "line", "promise"),
-    [
-        (1, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
-        (2, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
-    ],
-)
-def test_stop_in_other_modes_says_what_it_promises(mode: int, line: Line, promise: Promise) -> None:
-    assert play(stop(prepared(at_33=mode)), line) is promise
-
-
-@pytest.mark.parametrize(("mode", "message"), [(3, "step mode"), (9, "operating mode 9")])
-def test_stop_where_nothing_is_known_to_stop_it_names_the_way_out(mode: int, message: str) -> None:
-    with pytest.raises(RequestError, match=message) as caught:
-        play(stop(prepared(at_33=mode)))
-    assert "disable_torque()" in caught.value.advice
-
-
-def test_stop_of_a_new_servo_asks_it_first() -> None:
-    play(stop(Node(3)), prepares(), stands(0), writes(3, 42, 0, 0))
-
-
 # -- move ----------------------------------------------------------------------------------------------------
 
 
 def test_a_move_is_one_packet() -> None:
     wish = move(prepared(), 2048 * COUNT, velocity=1000 * COUNT, acceleration=5000 * COUNT, wait=False)
-    (exchange,) = watch(wish, goes(2048, acceleration=50, velocity=1000)).exchanges
+    _, exchange = watch(wish, prepares(), goes(2048, acceleration=50, velocity=1000)).exchanges
     assert (exchange.effect, exchange.repeatable, exchange.rank) == (Effect.MOTION, True, Rank.CONTROL)
     assert exchange.goals == (Goal(3, "position", 2048 * COUNT, 0.0, 4095 * COUNT),)
 
@@ -152,7 +134,8 @@ def test_a_new_servo_is_asked_for_its_limits_first() -> None:
 
 def test_goals_are_sign_magnitude() -> None:
     play(
-        move(prepared(at_11=0, at_12=0), -1000 * COUNT, wait=False), writes(3, 41, 0, 0xE8, 0x83, 0, 0, 0, 0)
+        move(prepared(), -1000 * COUNT, wait=False),
+        *(prepares(at_11=0, at_12=0), writes(3, 41, 0, 0xE8, 0x83, 0, 0, 0, 0)),
     )
 
 
@@ -163,8 +146,8 @@ def test_goals_are_sign_magnitude() -> None:
 def test_velocity_by_the_unit_of_the_servo_and_no_velocity_is_the_maximum(
     phase: int, velocity: int | None, raw: int
 ) -> None:
-    wish = move(prepared(at_18=phase), 0.0, velocity=velocity and velocity * COUNT, wait=False)
-    play(wish, goes(0, velocity=raw))
+    wish = move(prepared(), 0.0, velocity=velocity and velocity * COUNT, wait=False)
+    play(wish, prepares(at_18=phase), goes(0, velocity=raw))
 
 
 @pytest.mark.parametrize(
@@ -173,13 +156,13 @@ def test_velocity_by_the_unit_of_the_servo_and_no_velocity_is_the_maximum(
 )
 def test_a_bound_too_small_to_be_said_is_not_turned_into_no_bound(bounds: dict[str, float]) -> None:
     with pytest.raises(RequestError, match="not above 0, or is less than"):
-        play(move(prepared(), 1.0, **bounds))  # type: ignore[arg-type]
+        play(move(prepared(), 1.0, **bounds), prepares())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("bounds", [{"velocity": 1000.0}, {"acceleration": 1000.0}])
 def test_a_bound_beyond_the_register_is_refused(bounds: dict[str, float]) -> None:
     with pytest.raises(RequestError, match="out of range"):
-        play(move(prepared(), 1.0, **bounds))  # type: ignore[arg-type]
+        play(move(prepared(), 1.0, **bounds), prepares())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("to", [nan, inf, -inf])
@@ -197,7 +180,7 @@ def test_bounds_that_are_no_numbers_cost_no_packet(name: str, value: float) -> N
 
 def test_a_move_needs_position_mode() -> None:
     with pytest.raises(RequestError, match="operating mode velocity") as caught:
-        play(move(prepared(at_33=1), 1.0))
+        play(move(prepared(), 1.0), prepares(at_33=1))
     assert "set_mode('position')" in caught.value.advice
 
 
@@ -209,6 +192,7 @@ def test_a_stranger_is_not_moved() -> None:
 def test_a_servo_that_acknowledges_nothing_is_read_back() -> None:
     play(
         move(prepared(at_8=0), 2048 * COUNT, wait=False),
+        prepares(at_8=0),
         *(unheard(goes(2048)), reads(3, 41, 0, 0, 8, 0, 0, 0, 0)),
     )
 
@@ -216,7 +200,7 @@ def test_a_servo_that_acknowledges_nothing_is_read_back() -> None:
 def test_waiting_ends_when_it_is_there() -> None:
     there = reads(3, 56, *low_high(2040), *[0] * 13)
     moving = reads(3, 56, *low_high(1000), *[0] * 8, 1, 0, 0, 0, 0)
-    play(move(prepared(), 2048 * COUNT), goes(2048), moving, moving, there)
+    play(move(prepared(), 2048 * COUNT), prepares(), goes(2048), moving, moving, there)
 
 
 def test_goals_are_rounded_to_what_the_servo_can_be_told() -> None:
@@ -231,27 +215,37 @@ SCS_COUNT = radians(300) / 1024
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("smbl", writes(3, 41, 2, 0, 4, 0, 0, 0xF4, 1)),
-        ("smcl", writes(3, 41, 2, 0, 4, 0, 0, 0xF4, 1)),
-        ("hls", writes(3, 41, 2, 0, 4, 0xC8, 0, 10, 0)),
+        ("smbl", writes(3, 40, 1, 2, 0, 4, 0, 0, 0xF4, 1)),
+        ("smcl", writes(3, 40, 1, 2, 0, 4, 0, 0, 0xF4, 1)),
+        ("hls", writes(3, 40, 1, 2, 0, 4, 0xC8, 0, 10, 0)),
     ],
 )
-def test_a_move_of_a_little_endian_servo_is_one_packet(name: str, line: Line) -> None:
+def test_a_move_of_a_little_endian_servo_is_one_packet_with_the_switch_in_it(name: str, line: Line) -> None:
     node = met(name)
     node.bound = 200
     wish = move(node, 1024 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False)
-    exchange, switch = watch(wish, line, ON).exchanges
-    assert switch.effect is Effect.TORQUE
+    _, exchange, _ = watch(wish, prepares_as(name), line, IS_ON).exchanges
+    assert exchange.effect is Effect.MOTION
     assert exchange.goals == (Goal(3, "position", 1024 * COUNT, 0.0, 4095 * COUNT),)
 
 
 @pytest.mark.parametrize("name", ["scs", "scs2"])
 def test_a_move_of_a_big_endian_servo_has_no_acceleration_and_no_time(name: str) -> None:
     wish = move(met(name), 512 * SCS_COUNT, velocity=500 * SCS_COUNT, wait=False)
-    play(wish, writes(3, 42, 2, 0, 0, 0, 1, 0xF4), ON)
+    play(wish, prepares_as(name), writes(3, 40, 1, 0, 2, 0, 0, 0, 1, 0xF4), IS_ON)
     with pytest.raises(RequestError, match="no acceleration register") as caught:
-        play(move(met(name), 1.0, acceleration=1.0))
+        play(move(met(name), 1.0, acceleration=1.0), prepares_as(name))
     assert "register 41 is none of SCS" in caught.value.expected
+
+
+@pytest.mark.parametrize("name", ["smbl", "smcl", "scs", "scs2", "hls"])
+def test_a_move_whose_torque_is_off_again_is_told(name: str) -> None:
+    node = met(name)
+    node.bound = 200
+    assert node.table is not None
+    block = move_block(node, node.table, 0.5)
+    with pytest.raises(MotionError, match="its torque is off"):
+        play(move(node, 0.5), prepares_as(name), writes(3, 40, *block.data), reads(3, 40, 0))
 
 
 @pytest.mark.parametrize(
@@ -310,21 +304,21 @@ def test_goals_over_many_turns_go_as_far_as_is_published(name: str) -> None:
 
 def test_a_servo_of_many_turns_that_tells_one_has_arrived_when_it_rests_there_within_its_turn() -> None:
     there = reads(3, 56, *low_high(104), *[0] * 13)
-    play(move(met("sts", at_11=0, at_12=0), 8296 * COUNT), goes(8296), there)
+    play(move(Node(3), 8296 * COUNT), prepares(at_11=0, at_12=0), goes(8296), there)
     there = reads(3, 56, *low_high(8290), *[0] * 13)
-    play(move(met("sts", at_11=0, at_12=0, at_18=28), 8296 * COUNT), goes(8296), there)
+    play(move(Node(3), 8296 * COUNT), prepares(at_11=0, at_12=0, at_18=28), goes(8296), there)
 
 
 def test_smcl_with_both_limits_0_is_not_moved() -> None:
     with pytest.raises(RequestError, match="nobody has published what that means on smcl") as caught:
-        play(move(met("smcl", at_11=0, at_12=0), 1.0))
+        play(move(Node(3), 1.0), prepares_as("smcl", at_11=0, at_12=0))
     assert "max_position_limit" in caught.value.advice
 
 
 @pytest.mark.parametrize("name", ["scs", "scs2"])
 def test_an_scs_motor_is_no_servo(name: str) -> None:
     with pytest.raises(RequestError, match="operating mode pwm") as caught:
-        play(move(met(name, at_11=0, at_12=0), 1.0))
+        play(move(Node(3), 1.0), prepares_as(name, at_11=0, at_12=0))
     assert "set_mode('position')" in caught.value.advice
 
 
@@ -335,5 +329,8 @@ def test_a_servo_of_any_map_that_acknowledges_nothing_is_read_back(name: str) ->
     assert node.table is not None
     block = move_block(node, node.table, 0.5)
     sent = writes(3, block.address, *block.data)
-    on = [] if node.control.goal_switches_on else [unheard(ON), reads(3, 40, 1)]
-    play(move(node, 0.5, wait=False), unheard(sent), reads(3, block.address, *block.data), *on)
+    told = [] if node.control.goal_switches_on else [IS_ON]
+    play(
+        move(node, 0.5, wait=False),
+        *(prepares_as(name, at_8=0), unheard(sent), reads(3, block.address, *block.data), *told),
+    )

@@ -12,7 +12,7 @@ from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.node import as_nodes
 from motorbus.families.feetech.table import CONTROL, STS, TABLES, Control, Mode
 from tests.families.feetech.driver_script import prepared
-from tests.families.feetech.maps import met
+from tests.families.feetech.maps import met, simulated
 
 COUNT = tau / 4096
 
@@ -75,6 +75,21 @@ def test_angular_resolution_widens_every_position_and_the_limits() -> None:
     assert node.value(STS["present_position"], 1000) == pytest.approx(2000 * COUNT)
     assert node.raw(STS["goal_position"], 2000 * COUNT) == 1000
     assert node.limits == (0, 2 * 4095 * COUNT)
+    assert node.value(STS["max_position_limit"], 4095) == 2 * 4095 * COUNT
+    assert node.raw(STS["min_position_limit"], 2000 * COUNT) == 1000
+
+
+def test_limits_that_are_written_are_the_limits_that_hold() -> None:
+    with simulated("sts") as (simulation, servo):
+        simulation.memory["angular_resolution"] = 2
+        servo.write(min_position_limit=2.0, max_position_limit=10.0)
+        assert servo.read("min_position_limit", "max_position_limit") == {
+            "min_position_limit": pytest.approx(2.0, abs=2 * COUNT),
+            "max_position_limit": pytest.approx(10.0, abs=2 * COUNT),
+        }
+        assert servo.mode() is Mode.POSITION  # which asks anew
+        assert servo.limits == pytest.approx((2.0, 10.0), abs=2 * COUNT)
+        assert simulation.memory["max_position_limit"] == round(10.0 / COUNT / 2)
 
 
 def test_status_return_level_and_mode_are_known() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, nan, tau
+from typing import Any
 
 import pytest
 
@@ -12,10 +13,12 @@ from motorbus.core.operation import Effect, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.orders import blocks, check_names, check_values, only_block, orders_of
-from motorbus.families.feetech.table import STS
+from motorbus.families.feetech.table import STS, TABLES
 from tests.families.feetech.driver_script import prepared
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
+HUGE = pytest.param(10**400, id="huge"), pytest.param(10**5000, id="beyond printing")
 
 
 def made(changes: Mapping[str, int] | None = None, /, **values: Value) -> list[Block]:
@@ -139,3 +142,29 @@ def test_one_block_of_ram_is_one_block_of_ram(values: dict[str, Value]) -> None:
     node = prepared()
     with pytest.raises(RequestError, match="adjoining RAM registers only"):
         only_block(node, orders_of(node, STS, values), "REG WRITE")
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_no_goal_position_goes_to_a_servo_that_heeds_none(mode: int) -> None:
+    with pytest.raises(RequestError, match="heeds no goal position in operating mode") as caught:
+        made({"at_33": mode}, goal_position=1.0)
+    assert "set_mode('position')" in caught.value.advice
+    assert [block.address for block in made({"at_33": 3}, goal_position=1.0)] == [42]
+
+
+@pytest.mark.parametrize(("name", "mode"), [("sts", 7), ("hls", 3), ("hls", 4), ("smbl", 9)])
+def test_no_goal_goes_to_a_servo_whose_goals_nobody_explains(name: str, mode: int) -> None:
+    """Mode 3 of HLS drives with a duty, and no source says which register takes it."""
+    node, table = met(name, at_33=mode), TABLES[name]
+    for row in (one for one in table if one.startswith("goal_") and table[one].effect is Effect.MOTION):
+        with pytest.raises(RequestError, match=f"nobody has published what {row} does"):
+            orders_of(node, table, {row: 0})
+    assert orders_of(node, table, {"torque_enable": 0}) == [(table["torque_enable"], 0)]
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, *HUGE, None, "1", 1j, [1.0], True, nan, inf])
+@pytest.mark.parametrize("name", ["goal_position", "goal_velocity", "position_p", "min_position_limit"])
+def test_what_is_no_number_for_a_register_is_a_bad_request(name: str, value: Any) -> None:
+    with pytest.raises(RequestError) as caught:
+        made(**{name: value})
+    assert len(caught.value.summary) < 120

@@ -10,16 +10,22 @@ from math import radians, tau
 import pytest
 
 from motorbus.core.operation import Effect
-from motorbus.errors import DeviceError, LimitExceeded, RequestError
+from motorbus.errors import DeviceError, LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech import driver
 from motorbus.families.feetech.driver import Node, Promise
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import Line, play, reads, watch, writes
-from tests.families.feetech.maps import eeprom, met
+from tests.families.feetech.maps import eeprom, met, prepares_as
 
 OTHERS = [name for name in TABLES if name != "sts"]
 COUNT = tau / 4096
 SCS_COUNT = radians(300) / 1024
+IS_ON = reads(3, 40, 1)
+
+
+def before(*velocity: int) -> Line:
+    """Registers 40 to 47 of a limp servo, with this goal velocity and what others have left."""
+    return reads(3, 40, 0, 7, 0, 9, 0x2C, 1, *velocity)
 
 
 # --- reading ------------------------------------------------------------------------------------------------
@@ -151,8 +157,8 @@ def test_a_goal_by_name_has_the_byte_order_of_its_map(name: str, address: int, g
 def test_eeprom_is_unlocked_where_its_map_has_the_lock(name: str, lock: int) -> None:
     play(
         driver.write(met(name), led_mask=1),
-        writes(3, 40, 0),
         writes(3, lock, 0),
+        *(writes(3, 40, 0), reads(3, 64, 0)),
         *(writes(3, 20, 1), reads(3, 20, 1)),
         *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
     )
@@ -200,34 +206,33 @@ def test_a_name_that_only_another_map_has_is_no_register_of_an_sts_servo() -> No
 
 @pytest.mark.parametrize("name", ["smbl", "smcl"])
 def test_little_endian_servos_hold_where_they_stand(name: str) -> None:
-    speed = [reads(3, 46, 1, 0)] if name == "smcl" else []
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom(name)), *speed, reads(3, 56, 24, 5), writes(3, 42, 24, 5), writes(3, 40, 1)),
+        *(prepares_as(name), before(1, 0), reads(3, 56, 24, 5), writes(3, 40, 1, 7, 24, 5), IS_ON),
     )
-    play(driver.stop(met(name)), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
+    play(driver.stop(met(name)), prepares_as(name), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
 
 
 @pytest.mark.parametrize("name", ["scs", "scs2"])
 def test_big_endian_servos_hold_where_they_stand(name: str) -> None:
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom(name)), reads(3, 46, 1, 0), reads(3, 56, 2, 13)),
-        *(writes(3, 42, 2, 13), writes(3, 40, 1)),
+        *(prepares_as(name), before(0, 1), reads(3, 56, 2, 13), writes(3, 40, 1, 7, 2, 13), IS_ON),
     )
-    assert play(driver.stop(met(name)), reads(3, 56, 2, 13), writes(3, 42, 2, 13)) is Promise.HOLD_ACCEPTED
+    told = play(driver.stop(met(name)), prepares_as(name), reads(3, 56, 2, 13), writes(3, 42, 2, 13))
+    assert told is Promise.HOLD_ACCEPTED
 
 
 def test_where_velocity_0_is_standstill_torque_comes_on_with_a_velocity_for_the_goals_that_follow() -> None:
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom("scs")), reads(3, 46, 0, 0), reads(3, 56, 2, 13)),
-        *(writes(3, 42, 2, 13, 0, 0, 0x0D, 0x48), writes(3, 40, 1)),
+        *(prepares_as("scs"), before(0, 0), reads(3, 56, 2, 13)),
+        *(writes(3, 40, 1, 7, 2, 13, 0, 0, 0x0D, 0x48), IS_ON),
     )
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom("sts", at_18=4)), reads(3, 46, 0, 0), reads(3, 56, 24, 5)),
-        *(writes(3, 42, 24, 5, 0, 0, 0x48, 0x0D), writes(3, 40, 1)),
+        *(prepares_as("sts", at_18=4), before(0, 0), reads(3, 56, 24, 5)),
+        *(writes(3, 40, 1, 7, 24, 5, 0, 0, 0x48, 0x0D), IS_ON),
     )
 
 
@@ -236,7 +241,7 @@ def test_an_scs_servo_beyond_its_limits_is_not_switched_on() -> None:
     with pytest.raises(LimitExceeded, match="it would jump to"):
         play(
             driver.enable_torque(Node(3)),
-            *(reads(3, 0, *narrow), reads(3, 46, 0, 0), reads(3, 56, 0, 90)),
+            *(reads(3, 0, *narrow), before(0, 0), reads(3, 56, 0, 90)),
         )
 
 
@@ -246,43 +251,40 @@ def test_hls_holds_with_a_bound_of_its_current_beside_the_goal(
 ) -> None:
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom("hls")), reads(3, 44, 0x2C, 1), reads(3, 46, *speed), reads(3, 56, 24, 5)),
-        *(writes(3, 42, 24, 5, *burst), writes(3, 40, 1)),
+        *(prepares_as("hls"), reads(3, 44, 0x2C, 1), before(*speed), reads(3, 56, 24, 5)),
+        *(writes(3, 40, 1, 7, 24, 5, *burst), IS_ON),
     )
-    play(driver.stop(met("hls")), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
+    play(driver.stop(met("hls")), prepares_as("hls"), reads(3, 56, 24, 5), writes(3, 42, 24, 5))
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "stopped", "promise"),
+    ("name", "changes", "address", "promise"),
     [
-        ("smcl", {"at_35": 1}, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
-        ("smcl", {"at_35": 2}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
-        ("scs", {"at_11": 0, "at_12": 0}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
-        ("scs2", {"at_11": 0, "at_12": 0}, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
-        ("hls", {"at_33": 2}, writes(3, 44, 0, 0), Promise.ZERO_CURRENT_ACCEPTED),
+        ("smcl", {"at_35": 1}, 46, Promise.ZERO_VELOCITY_ACCEPTED),
+        ("smcl", {"at_35": 2}, 44, Promise.ZERO_DUTY_ACCEPTED),
+        ("scs", {"at_11": 0, "at_12": 0}, 44, Promise.ZERO_DUTY_ACCEPTED),
+        ("scs2", {"at_11": 0, "at_12": 0}, 44, Promise.ZERO_DUTY_ACCEPTED),
+        ("hls", {"at_33": 2}, 44, Promise.ZERO_CURRENT_ACCEPTED),
     ],
 )
 def test_other_modes_begin_and_end_at_rest(
-    name: str, changes: dict[str, int], stopped: Line, promise: Promise
+    name: str, changes: dict[str, int], address: int, promise: Promise
 ) -> None:
+    asked, found = prepares_as(name, **changes), (7, 0, 9, 0x2C, 1)
     play(
         driver.enable_torque(Node(3)),
-        *(reads(3, 0, *eeprom(name, **changes)), stopped, writes(3, 40, 1)),
+        *(asked, before(0, 99), writes(3, 40, 1, *found[: address - 41], 0, 0), IS_ON),
     )
-    assert play(driver.stop(met(name, **changes)), stopped) is promise
+    assert play(driver.stop(met(name, **changes)), asked, writes(3, address, 0, 0)) is promise
 
 
 def test_hls_in_velocity_mode_begins_at_rest_with_a_bound_of_its_current() -> None:
     play(
         driver.enable_torque(Node(3)),
-        *(
-            reads(3, 0, *eeprom("hls", at_33=1)),
-            reads(3, 44, 0, 1),
-            writes(3, 44, 0, 1, 0, 0),
-            writes(3, 40, 1),
-        ),
+        *(prepares_as("hls", at_33=1), reads(3, 44, 0, 1), before(9, 9)),
+        *(writes(3, 40, 1, 7, 0, 9, 0, 1, 0, 0), IS_ON),
     )
-    play(driver.stop(met("hls", at_33=1)), writes(3, 46, 0, 0))
+    play(driver.stop(met("hls")), prepares_as("hls", at_33=1), writes(3, 46, 0, 0))
 
 
 NO_REST = {
@@ -295,27 +297,41 @@ NO_REST = {
 @pytest.mark.parametrize("case", NO_REST)
 def test_where_no_order_is_known_that_moves_nothing_it_says_so(case: str) -> None:
     name, changes, message = NO_REST[case]
+    on = [IS_ON] if name == "smcl" else []  # where limits are in question, a limp one is left alone
     with pytest.raises(RequestError, match=message) as caught:
-        play(driver.stop(met(name, **changes)))
+        play(driver.stop(Node(3)), prepares_as(name, **changes), *on)
     assert "disable_torque()" in caught.value.advice
     with pytest.raises(RequestError, match=message):
-        play(driver.enable_torque(Node(3)), reads(3, 0, *eeprom(name, **changes)))
+        play(driver.enable_torque(Node(3)), prepares_as(name, **changes))
+
+
+def test_a_limp_servo_of_which_nobody_knows_what_would_hold_it_is_left_alone() -> None:
+    asked = prepares_as("smcl", at_11=0, at_12=0)
+    assert play(driver.stop(Node(3)), asked, reads(3, 40, 0)) is Promise.LIMP
 
 
 @pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
 def test_a_servo_of_many_turns_that_tells_one_is_neither_held_nor_stopped_anywhere(name: str) -> None:
     turns = {"at_11": 0, "at_12": 0, "at_18": 12}
-    bound = [reads(3, 44, 0x2C, 1), reads(3, 46, 1, 0)] if name == "hls" else []
-    image, stands = reads(3, 0, *eeprom(name, **turns)), reads(3, 56, 24, 5)
+    bound = [reads(3, 44, 0x2C, 1)] if name == "hls" else []
+    image, stands = [prepares_as(name, **turns), *bound, before(1, 0)], reads(3, 56, 24, 5)
     with pytest.raises(RequestError, match="nobody knows on which turn it stands"):
-        play(driver.enable_torque(Node(3)), image, *bound, stands)
+        play(driver.enable_torque(Node(3)), *image, stands)
     with pytest.raises(RequestError, match="nobody knows on which turn it stands"):
-        play(driver.stop(met(name, **turns)), stands)
-    held = writes(3, 42, 24, 5, 0x2C, 1) if name == "hls" else writes(3, 42, 24, 5)
-    play(driver.enable_torque(Node(3), jump=48), image, *bound, stands, held, writes(3, 40, 1))
+        play(driver.stop(met(name)), image[0], stands, IS_ON)
+    held = writes(3, 40, 1, 7, 24, 5, *((0x2C, 1) if name == "hls" else ()))
+    play(driver.enable_torque(Node(3), jump=48), *image, stands, held, IS_ON)
 
 
 @pytest.mark.parametrize("name", ["sts", "smbl"])
 def test_a_servo_of_many_turns_that_tells_them_holds_on_its_turn(name: str) -> None:
     turns = {"at_11": 0, "at_12": 0, "at_18": 28}
-    play(driver.stop(met(name, **turns)), reads(3, 56, 0x88, 0xC3), writes(3, 42, 0x88, 0xC3))
+    asked, stands = prepares_as(name, **turns), reads(3, 56, 0x88, 0xC3)
+    play(driver.stop(met(name)), asked, stands, writes(3, 42, 0x88, 0xC3), stands)
+    away = (reads(3, 56, 0x88, 3), writes(3, 40, 0))
+    with pytest.raises(MotionError, match="has forgotten its turns"):
+        play(driver.stop(met(name)), asked, stands, writes(3, 42, 0x88, 0xC3), *away)
+    order = (before(1, 0), stands, writes(3, 40, 1, 7, 0x88, 0xC3))
+    with pytest.raises(MotionError, match="has forgotten its turns"):
+        play(driver.enable_torque(met(name)), asked, *order, *away)
+    play(driver.enable_torque(met(name)), asked, *order, stands, IS_ON)

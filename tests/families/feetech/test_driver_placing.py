@@ -45,7 +45,7 @@ def course() -> Course:
 def test_a_cell_is_written_without_awaiting_anything_and_seen_at_the_new_place() -> None:
     reached = course()
     played = watch(
-        rewritten(ID, prepared(), ID.new, reached), OFF, UNLOCK, unheard(writes(3, 5, 7)), THERE, OPEN
+        rewritten(ID, prepared(), ID.new, reached), UNLOCK, OFF, unheard(writes(3, 5, 7)), THERE, OPEN
     )
     assert played.exchanges[2].replies == ()
     assert played.exchanges[2].effect is Effect.IDENTITY
@@ -54,19 +54,19 @@ def test_a_cell_is_written_without_awaiting_anything_and_seen_at_the_new_place()
 
 
 def test_a_rate_is_tuned_to_before_it_is_looked_for() -> None:
-    lines = (OFF, UNLOCK, unheard(writes(3, 6, 1)), reads(3, 0, *image(3, at_6=1)), reads(3, 55, 0))
+    lines = (UNLOCK, OFF, unheard(writes(3, 6, 1)), reads(3, 0, *image(3, at_6=1)), reads(3, 55, 0))
     assert watch(rewritten(BAUD, prepared(), BAUD.new, Course(BAUD, ["intent"])), *lines).rates == [500_000]
 
 
 @pytest.mark.parametrize("there", [reads(7, 0, *image(7, at_13=60)), reads(7, 0, *image(3))])
 def test_somebody_else_at_the_new_place_is_no_proof(there: Line) -> None:
     with pytest.raises(OutcomeUnknown, match="is not seen there"):
-        play(rewritten(ID, prepared(), ID.new, course()), OFF, UNLOCK, unheard(writes(3, 5, 7)), there)
+        play(rewritten(ID, prepared(), ID.new, course()), UNLOCK, OFF, unheard(writes(3, 5, 7)), there)
 
 
 def test_one_that_is_still_starting_is_awaited() -> None:
     silent = unheard(THERE)
-    lines = (OFF, UNLOCK, unheard(writes(3, 5, 7)), silent, silent, THERE, OPEN)
+    lines = (UNLOCK, OFF, unheard(writes(3, 5, 7)), silent, silent, THERE, OPEN)
     assert play(rewritten(ID, prepared(), ID.new, course()), *lines).node == 7
     with pytest.raises(OutcomeUnknown, match="was told to become 7"):
         play(rewritten(ID, prepared(), ID.new, course()), *lines[:3], silent, silent, silent)
@@ -76,7 +76,7 @@ def test_a_lock_that_has_closed_by_itself_tells_of_a_lost_supply() -> None:
     with pytest.raises(OutcomeUnknown, match="has lost its supply"):
         play(
             rewritten(ID, prepared(), ID.new, course()),
-            *(OFF, UNLOCK, unheard(writes(3, 5, 7)), THERE, reads(7, 55, 1)),
+            *(UNLOCK, OFF, unheard(writes(3, 5, 7)), THERE, reads(7, 55, 1)),
         )
 
 
@@ -116,7 +116,7 @@ def test_a_place_is_called_by_what_changes() -> None:
 
 
 def test_the_record_of_the_writing_stands_before_the_write() -> None:
-    played = Played([OFF, UNLOCK], interrupt_at=2)
+    played = Played([UNLOCK, OFF], interrupt_at=2)
     reached = course()
     with pytest.raises(KeyboardInterrupt):
         played.run(rewritten(ID, prepared(), ID.new, reached))

@@ -66,7 +66,7 @@ def test_what_it_has_already_is_not_written_again() -> None:
         assert wear(simulation) == 0
 
 
-@pytest.mark.parametrize("rate", [0, 9601, 2_000_000, True, "fast"])
+@pytest.mark.parametrize("rate", [0, 9601, 2_000_000, True, 500_000.0, "fast"])
 def test_what_is_no_rate_of_these_servos_is_refused(rate: Any) -> None:
     with motorbus.simulate("feetech", ids="3") as simulation, pytest.raises(RequestError, match="no rate"):
         tuned(simulation, rate)

@@ -15,7 +15,9 @@ from motorbus.core.operation import INTENT, Journal
 from motorbus.errors import LinkError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, recover
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Job, Place
+from motorbus.families.feetech.simulator import effects
 from motorbus.simulation.named import Simulation
+from tests.families.feetech.cuts import VERBS, Cut, World, cuts
 
 RATE, SLOW = 1_000_000, 500_000
 
@@ -26,7 +28,7 @@ def begin(
     """As a host that died: what it recorded of the change of the servo that comes first."""
     servo = simulation.simulator.servos[number]  # type: ignore[attr-defined]
     there = Place(new, RATE) if verb == SET_ID else Place(3, SLOW)
-    job = Job(verb, Place(3, RATE), there, servo.read(0, 40, 0.0), tuple(others))
+    job = Job(verb, Place(3, RATE), there, bytes(servo.memory.read(0, 40)), tuple(others))
     with motorbus.open(simulation.url) as bus:
         assert bus.journal is not None
         bus.journal(Journal(verb, INTENT, job.facts()))
@@ -64,7 +66,7 @@ def test_one_that_is_there_with_its_lock_open_is_only_locked() -> None:
     with motorbus.simulate("feetech", ids="3") as simulation:
         begin(simulation, "writing 7")
         simulation[3].memory["lock"] = 0
-        simulation[3].write(5, b"\7", 0.0)
+        effects.write(simulation[3], 5, b"\7", 0.0)
         assert end(simulation) == "new"
         assert simulation[7].memory.wear == {5: 1}
         assert simulation[7].locked
@@ -74,10 +76,78 @@ def test_one_that_met_a_closed_lock_is_written_again() -> None:
     """It answers under its new id, and would be back under the old one after the next power cycle."""
     with motorbus.simulate("feetech", ids="3") as simulation:
         begin(simulation, "writing 7")
-        simulation[3].write(5, b"\7", 0.0)
+        effects.write(simulation[3], 5, b"\7", 0.0)
         assert end(simulation) == "new"
         simulation[7].power_cycle()
         assert simulation[7].id == 7
+
+
+def test_an_open_lock_proves_nothing_when_a_recovery_has_opened_it() -> None:
+    """It met a closed lock, and the recovery that was about to write it again was cut off behind the unlock."""
+    with motorbus.simulate("feetech", ids="3") as simulation:
+        begin(simulation, "writing 7", "recovering", "again")
+        effects.write(simulation[3], 5, b"\7", 0.0)
+        simulation[7].memory["lock"] = 0
+        assert end(simulation) == "new"
+        simulation[7].power_cycle()
+        assert simulation[7].id == 7
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("model", ["sts3215", "hls3925"])
+def test_a_recovery_that_is_cut_off_on_its_way_to_write_it_again(verb: str, model: str) -> None:
+    def wreck() -> World:
+        """The supply failed right before the write, which was heard, and the host died."""
+        world = World(verb, {"model": model})
+        world.run(world.change, Cut(record=1, kept=True, supply=True))
+        there = world.job()
+        effects.write(world.servo, there.cell, bytes((there.value(there.new),)), world.now)
+        assert world.place == world.new
+        assert world.servo.locked
+        return world
+
+    for cut in cuts(wreck, lambda world: world.recovery):
+        if cut.host and (cut.record is not None or not cut.supply):
+            world = wreck()
+            world.run(world.recovery, cut)
+            outcome = world.run(world.recovery)
+            assert world.faults(outcome) == [], cut
+
+
+@pytest.mark.parametrize(("second", "wear"), [(3, {7: 1}), (7, {}), (255, {7: 1})])
+def test_a_second_id_that_has_not_come_along_follows(second: int, wear: dict[int, int]) -> None:
+    with motorbus.simulate("feetech", ids="3", model="hls3925") as simulation:
+        begin(simulation, "writing 7", "written 7")
+        servo = simulation[3]
+        servo.memory.stored[5], servo.memory.stored[7] = 7, second
+        servo.power_cycle()
+        assert end(simulation) == "new"
+        assert (servo.second_id, servo.locked, servo.memory.wear) == (7, True, wear)
+
+
+def test_a_second_id_that_met_a_closed_lock_is_written_again() -> None:
+    """It reads right, and would be the old one again after the next power cycle."""
+    with motorbus.simulate("feetech", ids="3", model="hls3925") as simulation:
+        begin(simulation, "writing 7", "written 7", "second 7")
+        servo = simulation[3]
+        servo.memory.stored[5] = 7
+        servo.power_cycle()
+        effects.write(servo, 7, b"\7", 0.0)
+        assert end(simulation) == "new"
+        servo.power_cycle()
+        assert (servo.id, servo.second_id) == (7, 7)
+
+
+def test_a_second_id_comes_back_with_the_old_id() -> None:
+    """Its id was torn after its second id had gone ahead; what may have met a closed lock is written once more."""
+    with motorbus.simulate("feetech", ids="3", model="hls3925") as simulation:
+        begin(simulation, "writing 7", "written 7", "second 7")
+        servo = simulation[3]
+        servo.memory.stored[7] = 7
+        servo.power_cycle()
+        assert end(simulation) == "old"
+        servo.power_cycle()
+        assert (servo.id, servo.second_id) == (3, 3)
 
 
 def test_one_as_shipped_gets_its_old_id_back() -> None:

@@ -11,6 +11,7 @@ from motorbus.core.entry import Value
 from motorbus.core.operation import Effect, Exchange, Goal, Rank
 from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, action, action_all, read, read_raw, reg_write, write
+from motorbus.families.feetech.driver.node import Pending
 from motorbus.families.feetech.driver.registers import spans
 from motorbus.families.feetech.table import STS
 from tests.families.feetech.driver_script import (
@@ -27,6 +28,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
+from tests.families.feetech.maps import met
 
 COUNT = tau / 4096
 ORDER = Line(packet(3, REG_WRITE, 42, 0, 8, 0, 0, 0xE8, 3), packet(3, 0))
@@ -131,13 +133,30 @@ def test_a_register_may_be_called_like_an_argument() -> None:
         play(write(prepared(), node=1))
 
 
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("sts", {"operating_mode": 0}),
+        ("sts", {"min_position_limit": 0.1, "led_mask": 1}),
+        ("hls", {"control_loop": 0}),
+    ],
+)
+def test_goals_are_not_written_together_with_what_may_change_their_meaning(
+    name: str, settings: dict[str, Value]
+) -> None:
+    with pytest.raises(RequestError, match="goal_position together with") as caught:
+        play(write(met(name), goal_position=1.0, **settings))
+    assert "enable_torque()" in caught.value.advice
+
+
 def test_reg_write_hands_over_and_is_never_repeated() -> None:
     node = prepared()
     wish = reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT)
     (exchange,) = watch(wish, ORDER).exchanges
     assert (exchange.effect, exchange.repeatable) == (Effect.MOTION, False)
     assert [goal.quantity for goal in exchange.goals] == ["position", "load", "velocity"]
-    assert node.pending == exchange.goals
+    assert node.pending is not None
+    assert node.pending.goals == exchange.goals
 
 
 def test_reg_write_that_is_not_acknowledged_is_in_doubt() -> None:
@@ -162,10 +181,11 @@ def test_reg_write_is_for_one_run_of_ram(values: dict[str, Value]) -> None:
 def test_action_shows_the_gate_what_was_handed_over() -> None:
     node = prepared()
     play(reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT), ORDER)
-    goals = node.pending
+    assert node.pending is not None
+    goals = node.pending.goals
     (exchange,) = watch(action(node), GO).exchanges
     assert (exchange.effect, exchange.goals, exchange.repeatable) == (Effect.MOTION, goals, False)
-    assert node.pending == ()
+    assert node.pending is None
 
 
 def test_action_of_what_others_handed_over_is_leave_to_go() -> None:
@@ -190,15 +210,36 @@ def test_a_servo_that_acknowledges_nothing_is_asked_whether_a_reg_write_still_wa
         play(action(prepared(at_8=0)), go, reads(3, 64, 1))
 
 
+def test_action_of_what_was_handed_over_under_other_settings_is_refused_until_it_is_replaced() -> None:
+    node = prepared()
+    play(reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT), ORDER)
+    for settings in (None, prepared(at_9=1).settings):
+        node.settings = settings
+        with pytest.raises(
+            RequestError, match="the REG WRITE that waits was made before the settings of node 3"
+        ):
+            action_all([node])
+    play(action_all([prepared(4)]), Line(packet(ALL, ACTION), None))
+    play(reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT), ORDER)
+    play(action(node), GO)
+
+
+def test_a_reg_write_that_moves_nothing_replaces_one_that_would() -> None:
+    node = prepared()
+    play(reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT), ORDER)
+    play(reg_write(node, torque_enable=0), Line(packet(3, REG_WRITE, 40, 0), packet(3, 0)))
+    assert node.pending is None
+
+
 def test_action_for_all_is_owed_no_reply() -> None:
     one, other = prepared(3), prepared(4)
     for node in (one, other):
-        node.pending = (Goal(node.node, "position", 1.0, 0.0, 2.0),)
+        node.pending = Pending((Goal(node.node, "position", 1.0, 0.0, 2.0),), node.settings)
     exchange = action_all([one, other])
     assert [goal.node for goal in exchange.goals] == [3, 4]
     assert (exchange.effect, exchange.replies) == (Effect.MOTION, ())
     play(exchange, Line(packet(ALL, ACTION), None))
-    assert one.pending == other.pending == ()
+    assert one.pending is other.pending is None
 
 
 def test_the_broadcast_of_an_action_is_that_of_the_manual() -> None:

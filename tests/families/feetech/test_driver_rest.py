@@ -9,7 +9,7 @@ import pytest
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.rest import at_rest, held, held_within, with_bound
+from motorbus.families.feetech.driver.rest import at_rest, held, held_within, outside, switched_on, with_bound
 from motorbus.families.feetech.table import CONTROL, HLS, STS, TABLES, Mode
 from tests.families.feetech.driver_script import play, prepared, reads
 from tests.families.feetech.maps import met
@@ -40,8 +40,19 @@ def test_held_is_where_it_stands_whatever_its_limits() -> None:
 
 
 def test_held_within_goes_to_the_limit_that_is_near() -> None:
-    block = play(held_within(prepared(at_12=0), STS, jump=5.0), reads(3, 56, 0x84, 3))
-    assert block.data == b"\xff\x00"
+    before = reads(3, 40, 0, 7, 1, 2, 3, 4, 5, 6)
+    block = play(held_within(prepared(at_12=0), STS, jump=5.0), before, reads(3, 56, 0x84, 3))
+    assert (block.address, block.data) == (40, b"\x01\x07\xff\x00")
+    assert outside(prepared(at_12=0), STS, play(held(prepared(at_12=0), STS), reads(3, 56, 0x84, 3)))
+    assert not outside(prepared(), STS, play(held(prepared(), STS), reads(3, 56, 0x84, 3)))
+
+
+def test_the_switch_travels_with_the_order_and_keeps_what_lies_between() -> None:
+    found = bytes((0, 7, 1, 2, 3, 4, 5, 6))
+    assert switched_on(Block(46, b"\0\0"), found) == Block(40, b"\x01\x07\x01\x02\x03\x04\0\0")
+    assert switched_on(Block(44, b"\0\0"), found) == Block(40, b"\x01\x07\x01\x02\0\0")
+    assert switched_on(Block(41, b"\x09\1\2")) == Block(40, b"\x01\x09\1\2")
+    assert switched_on(Block(42, b"\1\2")) == Block(40, b"\x01\x00\1\2")
 
 
 def test_a_bound_stands_before_a_velocity_and_behind_a_goal() -> None:

@@ -63,7 +63,8 @@ def test_the_awaitable_face() -> None:
 
 
 def test_verbs_have_the_types_of_their_functions() -> None:
-    bus = BlockingBus([prepares(), reads(3, 56, *[0] * 15), reads(3, 56, 0, 0), writes(3, 42, 0, 0)])
+    stop = [prepares(), reads(3, 56, 0, 0), writes(3, 42, 0, 0)]
+    bus = BlockingBus([prepares(), reads(3, 56, *[0] * 15), *stop])
     servo = Servo(bus, 3)
     state: State = servo.telemetry()
     promise: Promise = servo.stop()

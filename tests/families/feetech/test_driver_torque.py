@@ -60,6 +60,15 @@ def test_a_servo_that_acknowledges_nothing_is_read_back() -> None:
     play(disable_torque(prepared(at_8=0)), unheard(off(3)), reads(3, 40, 0))
 
 
+def test_where_no_acknowledgement_is_due_it_is_said_until_it_reads_so() -> None:
+    still, limp = reads(3, 40, 1), reads(3, 40, 0)
+    silent = unheard(off(3))
+    play(disable_torque(prepared(at_8=0)), silent, still, silent, limp)
+    play(disable_torque(prepared(at_8=0)), silent, unheard(limp), silent, still, silent, limp)
+    with pytest.raises(VerificationFailed, match="register 40"):
+        play(disable_torque(prepared(at_8=0)), *[silent, still] * 3)
+
+
 def test_everyone_is_let_go_at_once_and_then_one_by_one() -> None:
     assert play(disable_torque_all([1, 2, 3]), all_off(1, 2, 3), off(1), off(2), off(3)) == {}
 

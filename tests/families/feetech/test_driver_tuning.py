@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Effect
-from motorbus.errors import RequestError, VerificationFailed
+from motorbus.core.operation import Effect, Pause
+from motorbus.errors import LimitExceeded, RequestError, VerificationFailed
 from motorbus.families.feetech.driver import (
     Node,
     gains,
@@ -20,23 +20,25 @@ from motorbus.families.feetech.driver import (
 )
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import play, reads, watch, writes
-from tests.families.feetech.maps import met, simulated
+from tests.families.feetech.maps import met, prepares_as, simulated
 
+IDLE = reads(3, 64, 0)
 OFF = writes(3, 40, 0)
 
 
 def guarded(*lines: Any, lock: int = 55) -> tuple[Any, ...]:
-    return (OFF, writes(3, lock, 0), *lines, reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1))
+    return (writes(3, lock, 0), OFF, IDLE, *lines, reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1))
 
 
 # -- torque limit --------------------------------------------------------------------------------------------
 
 
 def test_a_torque_limit_in_ram_acts_at_once() -> None:
-    played = watch(set_torque_limit(met("sts"), 0.5), writes(3, 48, 0xF4, 1), reads(3, 48, 0xF4, 1))
-    assert played.exchanges[0].effect is Effect.TORQUE
+    before, after = reads(3, 48, 0xE8, 3), (writes(3, 48, 0xF4, 1), reads(3, 48, 0xF4, 1))
+    played = watch(set_torque_limit(met("sts"), 0.5), before, *after)
+    assert played.exchanges[1].effect is Effect.TORQUE
     assert play(torque_limit(met("sts")), reads(3, 48, 0xF4, 1)) == 0.5
-    told = play(set_torque_limit(met("hls"), 0.5), writes(3, 48, 0xF4, 1), reads(3, 48, 0xF4, 1))
+    told = play(set_torque_limit(met("hls"), 0.5), before, *after)
     assert told == (0.5, ("torque_limit",), False)
 
 
@@ -66,7 +68,59 @@ def test_what_is_no_torque_limit_sends_nothing(limit: Any) -> None:
 
 def test_a_limit_that_does_not_hold_is_told() -> None:
     with pytest.raises(VerificationFailed, match="register 48 to 49"):
-        play(set_torque_limit(met("sts"), 0.5), writes(3, 48, 0xF4, 1), reads(3, 48, 0, 0))
+        play(
+            set_torque_limit(met("sts"), 0.5),
+            *(reads(3, 48, 0xE8, 3), writes(3, 48, 0xF4, 1), reads(3, 48, 0, 0)),
+        )
+
+
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_after_a_limit_of_0_it_stays_where_it_hangs(name: str) -> None:
+    with simulated(name) as (real, servo):
+        servo.enable_torque()
+        servo.set_torque_limit(0)
+        real.raw_position = real.raw_position - 900
+        hangs = real.raw_position
+        assert servo.set_torque_limit(1.0).value == 1.0
+        servo.bus.run(iter(Pause(2.0)))
+        assert abs(real.raw_position - hangs) <= 1
+        servo.set_torque_limit(0)
+        servo.write(min_position_limit=4.0)
+        servo.enable_torque(jump=6.0)
+        with pytest.raises(LimitExceeded, match="with its force back it would go for the nearer one"):
+            servo.set_torque_limit(0.5)
+        assert real.memory["torque_limit"] == 0
+
+
+@pytest.mark.parametrize(("name", "mode"), [("sts", "velocity"), ("sts", "pwm"), ("hls", "velocity")])
+def test_after_a_limit_of_0_it_does_not_run_off(name: str, mode: str) -> None:
+    with simulated(name) as (real, servo):
+        servo.set_mode(mode)
+        servo.enable_torque()
+        servo.set_torque_limit(0)
+        if mode == "velocity":
+            servo.set_velocity(3.0)
+        else:
+            servo.set_duty(0.5)
+        stood = real.motion.position(servo.bus.link.now())
+        servo.set_torque_limit(1.0)
+        servo.bus.run(iter(Pause(2.0)))
+        assert real.motion.position(servo.bus.link.now()) == pytest.approx(stood, abs=1)
+
+
+@pytest.mark.parametrize("mode", ["position", "step"])
+def test_a_limp_servo_is_given_its_limit_and_nothing_else(mode: str) -> None:
+    with simulated("sts") as (real, servo):
+        servo.set_mode(mode)
+        servo.set_torque_limit(0)
+        servo.set_torque_limit(0.5)
+        assert (real.memory["torque_enable"], real.memory["torque_limit"]) == (0, 500)
+
+
+def test_in_a_mode_that_nobody_explains_a_limit_of_0_is_not_raised() -> None:
+    script = (reads(3, 48, 0, 0), prepares_as("sts", at_33=9), reads(3, 40, 1))
+    with pytest.raises(RequestError, match="operating mode 9"):
+        play(set_torque_limit(met("sts"), 0.5), *script)
 
 
 # -- gains ---------------------------------------------------------------------------------------------------
@@ -186,6 +240,11 @@ def test_masks_are_said_by_the_names_of_alarms() -> None:
     with pytest.raises(RequestError, match="sensor: no alarm of this servo") as caught:
         play(set_protection(met("scs"), led=("sensor", "overload")))
     assert caught.value.expected == "any of voltage, temperature, overload, or none"
+
+
+def test_an_alarm_that_is_named_twice_is_one_bit() -> None:
+    for names in (("current",), ("current", "current")):
+        play(set_protection(met("sts"), unload=names), *guarded(writes(3, 19, 0b1000), reads(3, 19, 0b1000)))
 
 
 def test_voltages_that_leave_none_between_are_refused() -> None:

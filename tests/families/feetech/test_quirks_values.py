@@ -12,6 +12,7 @@ from motorbus.cli.scan import mixed_firmware
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.families.feetech.driver.copying import copyable
+from motorbus.families.feetech.simulator.feedback import read
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.quirk_bus import bench, instruction
 from tests.families.feetech.simulator.host import packet
@@ -32,7 +33,8 @@ def test_quirk_08_a_position_below_zero_is_negative() -> None:
         simulated, servo = there.simulated(), there.servo()
         simulated.memory["phase"] = simulated.memory["phase"] | FULL_TURNS
         simulated.raw_position = -100
-        assert simulated.read(56, 2, there.bus.link.now()) == bytes((100, 0x80))  # 32868 without the sign
+        code = read(simulated, 56, 2, there.bus.link.now())
+        assert code == bytes((100, 0x80))  # 32868 without the sign
         assert servo.position() == pytest.approx(-100 * COUNT)
         assert servo.read_raw("present_position") == {"present_position": -100}
         assert servo.telemetry().position == pytest.approx(-100 * COUNT)
@@ -46,7 +48,7 @@ def test_quirk_09_the_sign_of_the_load_is_bit_10() -> None:
         loads = []
         for simulated.torque in (0.3, -0.3):
             load = servo.telemetry().load
-            code = int.from_bytes(simulated.read(60, 2, there.bus.link.now()), "little")
+            code = int.from_bytes(read(simulated, 60, 2, there.bus.link.now()), "little")
             assert code == round(abs(load) * 1000) | (1 << 10 if load < 0 else 0)
             loads.append(load)
     assert loads[0] == -loads[1] != 0

@@ -317,10 +317,10 @@ def test_what_is_read_only_or_protected_is_refused_and_nothing_is_sent(there: Be
 
 # --- rows that only a verb of their own writes --------------------------------------------------------------
 
-OWNED = ("id", "baud_rate", "homing_offset", "torque_enable", "lock")
+OWNED = ("id", "second_id", "baud_rate", "homing_offset", "torque_enable", "lock")
 """Rows of which only a verb of their own writes every value, or some."""
-NEVER = ("phase", "second_id")
-"""Rows that nothing writes: the phase belongs to one servo, the second id would answer to two names."""
+NEVER = ("phase",)
+"""Rows that nothing writes as a whole: the phase belongs to one servo."""
 
 
 def test_every_row_that_can_be_written_is_written_by_name_or_by_its_verb_or_never(there: Bench) -> None:

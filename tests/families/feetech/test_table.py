@@ -202,9 +202,10 @@ def test_choices_and_bits_name_what_a_value_means() -> None:
         assert all(row.low <= choice <= row.high for choice in row.choices)
 
 
-def test_where_sources_disagree_a_note_says_so() -> None:
-    disputed = (7, 9, 11, 24, 25, 28, 30, 31, 41, 44, 46, 55, 67, 85)
-    assert all(row.note for address in disputed if (row := STS.at(address)))
+def test_where_sources_disagree_the_row_says_so() -> None:
+    disputed = (7, 11, 24, 25, 28, 30, 31, 41, 44, 55, 67)
+    assert all((row := STS.at(address)) and row.conflict for address in disputed)
+    assert all((row := STS.at(address)) and row.note for address in (9, 46, 85))
 
 
 # --- signs --------------------------------------------------------------------------------------------------

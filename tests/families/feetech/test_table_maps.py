@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from motorbus.core.entry import Access, Coding, Entry, Storage, Table
 from motorbus.core.operation import Effect
 from motorbus.families.feetech.table import HLS, SCS, SCS2, SMBL, SMCL, STS, TABLES
-from tests.families.feetech.typed_rows import COMMON, ROWS
+from tests.families.feetech.typed_rows import COMMON, IN_DOUBT, ROWS
 
 # Raw values that a map's own documents give as shipped.
 SHIPPED = {
@@ -166,20 +166,43 @@ def test_every_row_says_where_it_is_from_and_not_from_a_table_of_another_series(
     for row in table.values():
         assert len(row.source) > 10
         assert table is STS or "STS3215 memory table" not in row.source, row.name
-        assert table is STS or "V3.6" not in row.note, row.name
+        assert table is STS or "V3.6" not in row.note + row.conflict, row.name
 
 
 @OF_EACH
-def test_where_sources_disagree_a_note_says_so(table: Table) -> None:
-    disputed = {
-        "sts": (7, 24, 25, 28, 30, 31, 44, 55, 65, 67),
-        "smbl": (7, 24, 25, 44, 67, 80),
-        "smcl": (6, 28, 33, 42, 44, 46, 48),
-        "scs": (2, 7, 9, 11, 23, 28, 44, 46, 69),
-        "scs2": (2, 7, 9, 11, 28, 31, 34, 44, 69, 78, 83),
-        "hls": (5, 7, 16, 26, 27, 28, 33, 40, 44, 53, 73),
-    }.get(table.name, ())
-    assert [address for address in disputed if not ((row := table.at(address)) and row.note)] == []
+def test_what_is_in_doubt_is_marked_and_nothing_else_is(table: Table) -> None:
+    assert {row.address for row in table.values() if row.conflict} == set(IN_DOUBT[table.name])
+
+
+@OF_EACH
+def test_a_mark_says_who_says_what_and_what_was_chosen(table: Table) -> None:
+    for row in table.values():
+        if row.conflict:
+            said, chosen, what = row.conflict.partition(" Chosen: ")
+            assert len(said) > 15, row.name
+            assert chosen, row.name
+            assert what, row.name
+
+
+WHO = (
+    "FD",
+    "V3.6",
+    "lerobot",
+    "rustypot",
+    "SDK",
+    "HLS table",
+    "SCS table",
+    "servolab",
+    "newer pages",
+    "header",
+)
+
+
+@OF_EACH
+def test_a_note_without_a_mark_never_names_two_who_disagree(table: Table) -> None:
+    for row in table.values():
+        assert "chosen" not in row.note.lower(), row.name
+        assert sum(who in row.note for who in WHO) < 2, row.name
 
 
 # --- bytes --------------------------------------------------------------------------------------------------
@@ -216,7 +239,7 @@ def test_signed_rows_are_sign_magnitude_and_no_others_are() -> None:
 def test_notes_speak_only_of_registers_that_the_map_has(table: Table) -> None:
     every = {row.name for other in TABLES.values() for row in other.values()}
     for row in table.values():
-        named = {word.strip(".,:;()") for word in row.note.split()} & every - {
+        named = {word.strip(".,:;()") for word in f"{row.note} {row.conflict}".split()} & every - {
             "id",
             "lock",
             "phase",

@@ -237,3 +237,14 @@ ROWS: Final = {
 86 acceleration_multiplier 1 F r - 0 255
 """,
 }
+
+# Addresses of rows on which the published sources disagree, or which none of them confirms: FD's configuration against
+# the vendor's memory tables, SDK headers, measurements and what other projects wrote down.
+IN_DOUBT: Final = {
+    "sts": (6, 7, 11, 14, 19, 20, 24, 25, 28, 30, 31, 34, 36, 40, 41, 44, 55, 65, 67),
+    "smbl": (6, 19, 20, 24, 25, 34, 36, 44, 65, 67),
+    "smcl": (6, 19, 20, 28, 33, 37, 39, 41, 42, 44, 46, 65),
+    "scs": (2, 5, 6, 7, 9, 11, 23, 28, 37, 39, 44, 69),
+    "scs2": (2, 5, 6, 7, 9, 11, 28, 37, 39, 44, 78, 79, 80, 81, 82, 83),
+    "hls": (6, 26, 27, 28, 33, 40, 44, 48),
+}

@@ -128,7 +128,8 @@ def test_the_comments_are_counted_and_say_what_cannot_be_declared(profile: Profi
     assert list(comments) == [f"Line{number}" for number in range(1, len(comments) + 1)]
     said = " ".join(comments.values())
     assert "Also at 100 kbit/s, for which CiA 306 has no BaudRate key." in said
-    assert all(f"{row.name}: " in said for row in profile.table.values() if row.note)
+    assert all(f"{row.name}: " in said for row in profile.table.values() if row.note or row.conflict)
+    assert said.count("Chosen: ") == sum("Chosen: " in row.conflict for row in profile.table.values())
 
 
 def test_the_rates_are_declared() -> None:

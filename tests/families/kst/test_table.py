@@ -140,7 +140,19 @@ def test_what_is_an_angle_is_in_radians_by_the_scale_of_its_maker() -> None:
 def test_every_row_says_where_it_is_from_in_plain_words() -> None:
     for row in rows():
         assert len(row.source) > 20
-        assert not any(f"[{letter}]" in row.source + row.note for letter in "SFDGKXRCMP")
+        assert not any(f"[{letter}]" in row.source + row.note + row.conflict for letter in "SFDGKXRCMP")
+
+
+def test_where_sources_disagree_the_row_says_so() -> None:
+    disputed = {
+        "kst": {"firmware_version", "store", "present_position"},
+        "kst-ext": {"firmware_version", "store", "present_position", "software_version", "status"},
+        "kingmax": {"firmware_version", "store", "present_position", "software_version", "status"},
+        "xqpower": {"firmware_version", "store", "present_position", "mid_point"},
+    }
+    found = {name: {row.name for row in one.table.values() if row.conflict} for name, one in PROFILES.items()}
+    assert found == disputed
+    assert all("Chosen: " in row.conflict for row in rows() if row.conflict)
 
 
 def test_the_bit_rates_are_those_of_the_manual() -> None:

@@ -6,7 +6,7 @@ use, see `motorbus.cli.faces`.
 
 from __future__ import annotations
 
-from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, tables, tuning
+from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, second_id, tables, tuning
 from motorbus.cli.feetech.commands import COMMANDS
 from motorbus.cli.feetech.offers import say
 from motorbus.cli.feetech.orders import app
@@ -23,6 +23,7 @@ __all__ = [
     "ping_everyone",
     "procedures",
     "say",
+    "second_id",
     "tables",
     "tuning",
 ]

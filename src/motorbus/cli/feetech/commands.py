@@ -9,6 +9,7 @@ COMMANDS: Final = {
     "calibrate(how='offset')": "`motorbus calibrate BUS#ID --how offset`",
     "clear_turns()": "`motorbus feetech clear-turns`",
     "factory_restore()": "`motorbus feetech factory-restore`",
+    "limits=(low, high)": "--low and --high",
     "move()": "`motorbus move`",
     "recover_overload()": "`motorbus feetech recover-overload`",
     "set_current()": "`motorbus feetech drive BUS#ID current=AMPERE`",
@@ -21,6 +22,8 @@ COMMANDS: Final = {
     "set_mode('pwm')": "`motorbus feetech mode BUS#ID pwm`",
     "set_mode('step')": "`motorbus feetech mode BUS#ID step`",
     "set_mode('current')": "`motorbus feetech mode BUS#ID current`",
+    "set_second_id()": "`motorbus feetech second-id BUS#ID NEW`",
+    "set_second_id(": "`motorbus feetech second-id BUS#ID {}`",
     "set_torque_limit(": "`motorbus feetech torque-limit BUS#ID {}`",
     "set_velocity()": "`motorbus feetech drive BUS#ID velocity=VELOCITY`",
 }

@@ -30,11 +30,11 @@ _SCHEMA = "motorbus.feetech.many-turns/1"
 
 @app.command(
     usage="Usage: motorbus feetech many-turns BUS#ID [on|off] [OPTIONS]",
-    help_epilogue="""STS, newer SMS and HLS servos. With `on` both position limits become 0 and bit 4
-of the servo's own phase register is set, after which goals and position count
-7.5 turns to either side; with `off` that bit is cleared, and --low and --high
-hold again. All other bits of that register stay as they are. The servo goes
-limp, and forgets its turns whenever its supply goes: home it after each
+    help_epilogue="""STS, newer SMS and HLS servos. With `on` both position limits become 0 and bit
+4 of the servo's own phase register is set, after which goals and position
+count 7.5 turns to either side; with `off` that bit is cleared, and --low and
+--high hold again. All other bits of that register stay as they are. The servo
+goes limp, and forgets its turns whenever its supply goes: home it after each
 power-up. `clear-turns` forgets them at once.
 
 Examples:

@@ -122,7 +122,7 @@ def _heeds(one: Servo) -> dict[str, Any]:
     return {
         "mode": heeded.value if heeded else None,
         "code": one.settings.mode_code,
-        "lock": one.table["lock"].choices[locked].partition(":")[0],
+        "lock": one.table["lock"].choices.get(locked, str(locked)).partition(":")[0],
         "blockers": blockers,
     }
 

@@ -18,14 +18,16 @@ if TYPE_CHECKING:
 
 _COLUMNS = (
     *(">address", "register", ">bytes", "storage", "access", "sign", "range", ">default", "unit", "effect"),
-    "source",
+    *("source", ""),
 )
 
 
 @app.command(
     help_epilogue="""Which of the six maps a servo has is told by its firmware and byte order, as
 `motorbus info` shows. With --json it is a database of all maps, with the
-source of each row and a note where sources disagree.
+source of each row. What sources disagree about, or none confirms, is marked
+"in doubt" in the table, and in the database by "conflict", which says who says
+what and what was chosen.
 
 Examples:
 
@@ -49,6 +51,8 @@ def registers(*, map: str = "", output: Silent) -> Exit:
         for row in table.values():
             if remarks := "; ".join([*meanings(row), *filter(None, [row.note])]):
                 output.text(f"{row.address} {row.name}: {remarks}")
+            if row.conflict:
+                output.text(f"{row.address} {row.name}, in doubt: {row.conflict}")
         output.text("")
     return Exit.OK
 
@@ -111,6 +115,7 @@ def _facts(row: Entry) -> dict[str, Any]:
         "effect": row.effect.name.lower(),
         "protected": row.protected,
         "source": row.source,
+        "conflict": row.conflict,
         "note": row.note,
     }
 
@@ -129,7 +134,7 @@ def _cells(row: Entry) -> list[object]:
             sign,
             f"{row.low} to {row.high}",
         ),
-        *(row.default, unit, effect, row.source),
+        *(row.default, unit, effect, row.source, "in doubt" if row.conflict else ""),
     ]
 
 

@@ -9,7 +9,7 @@ from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound
 from motorbus.families.feetech.driver.group import sync_writes
-from motorbus.families.feetech.driver.motion import ON, move_block, way
+from motorbus.families.feetech.driver.motion import move_block, way
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,7 +57,8 @@ def move_together(
 ) -> None:
     """All goals (rad by id) in one packet, so that all begin in the same instant; errors as `Servo.move` raises.
 
-    SCS servos get a packet of their own, for they have no acceleration to be told.
+    Where a goal does not switch torque on by itself the switch travels with it, in a packet of their own for those
+    servos: one that starts anew in between never goes for the goal it wakes up with.
     """
     servos = [driver.Servo(bus, node) for node in goals]
     bus.run(_move_together(servos, list(goals.values()), velocity, acceleration, wait))
@@ -76,10 +77,10 @@ def _move_together(
     for servo, goal in zip(servos, goals, strict=True):
         assert servo.table is not None
         yield from ask_bound(servo, servo.table)
-        blocks.append(move_block(servo, servo.table, goal, velocity, acceleration))
-    for exchange in sync_writes([servo.node for servo in servos], blocks):
+        block = move_block(servo, servo.table, goal, velocity, acceleration)
+        blocks.append(block._replace(under=servo.settings))
+    for exchange in sync_writes(servos, blocks):
         yield from exchange
-    yield from _switched_on(servos)
     if wait:
         arrivals = []
         for servo, goal in zip(servos, goals, strict=True):
@@ -87,13 +88,6 @@ def _move_together(
             order = way(servo, servo.table, goal, velocity, acceleration)
             arrivals.append(arrive(servo, servo.table, order))
         yield from Together(arrivals)
-
-
-def _switched_on(servos: Sequence[driver.Servo]) -> Operation[None]:
-    """Torque on for those who do not switch it on by themselves when they get a goal."""
-    off = [servo.node for servo in servos if not servo.control.goal_switches_on]
-    if off:
-        yield from next(sync_writes(off, [ON] * len(off)))
 
 
 def ping_everyone(bus: Bus) -> list[int]:

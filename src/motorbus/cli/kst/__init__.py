@@ -9,6 +9,7 @@ from __future__ import annotations
 from motorbus.cli.kst import identity, position, provision, settings, sheet
 from motorbus.cli.kst.offers import (
     COMMANDS,
+    CUT_OFF,
     bit_rate_heard,
     budget_frames,
     meaning,
@@ -20,6 +21,7 @@ from motorbus.cli.kst.servo import app
 
 __all__ = [
     "COMMANDS",
+    "CUT_OFF",
     "app",
     "bit_rate_heard",
     "budget_frames",

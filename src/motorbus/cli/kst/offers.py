@@ -29,6 +29,10 @@ COMMANDS: Final = {
     "reversed()": "`motorbus kst reverse BUS#ID`",
     "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
+CUT_OFF: Final = (
+    "say what was cut off again, `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it asks the servo "
+    "how far it has come, and goes on from there; nothing was sent"
+)
 VERSIONS: Final = ("firmware_version", "software_version")
 
 

@@ -150,7 +150,7 @@ def _comments(profile: Profile, with_mandatory: bool) -> str:
         "Sub-index 0 of 0x1010 is declared because CiA 301 demands it. It is in no source.",
         f"Sources: {profile.source}.",
         f"Conflicts: {profile.conflicts}.",
-        *(f"{row.name}: {row.note}." for row in profile.table.values() if row.note),
+        *(f"{row.name}: {said}." for row in profile.table.values() if (said := _said(row))),
     ]
     if with_mandatory:
         remarks.append(
@@ -159,6 +159,11 @@ def _comments(profile: Profile, with_mandatory: bool) -> str:
     lines = [line for remark in remarks for line in wrap(remark, _WIDEST)]
     numbered: Keys = {f"Line{number}": line for number, line in enumerate(lines, 1)}
     return _section("Comments", {"Lines": len(lines), **numbered})
+
+
+def _said(row: Entry) -> str:
+    """What there is to know of it, and what its sources disagree about."""
+    return "; ".join(filter(None, (row.note, row.conflict)))
 
 
 def _lists(profile: Profile, rows: list[Entry]) -> Iterator[str]:

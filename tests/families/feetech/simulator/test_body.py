@@ -87,6 +87,16 @@ def test_a_wall_put_into_the_way_and_onto_the_shaft() -> None:
     assert host.read(1, 56) == 2100
 
 
+def test_a_shaft_that_is_turned_back_into_a_wall_it_touches_comes_back() -> None:
+    host, servo = one()
+    host.write(1, POSITION, *word(3000))
+    host.wait(0.2)
+    host.write(1, POSITION, *word(2100))  # which is behind it
+    servo.blocked = (0.0, servo.motion.position(host.now))
+    host.wait(1.0)
+    assert host.read(1, 56) == 2100
+
+
 def test_a_wheel_at_a_wall_stalls_and_turns_back() -> None:
     host, servo = one()
     servo.blocked = (2000.0, 2500.0)

@@ -254,6 +254,14 @@ def test_sync_read_with_one_missing(switch: str, times: list[float]) -> None:
     assert [at for at, _ in host.timed(packet(ALL, SYNC_READ, 56, 2, 1, 2, 3))] == times
 
 
+def test_sync_read_at_status_return_level_0_is_a_read_or_is_not() -> None:
+    for switch, told in (("answer", 2), ("silent", 1)):
+        host = Host((1, 2), sync_read_level=switch)
+        host.bus.nodes[2].memory["status_return_level"] = 0
+        assert len(host.say(packet(ALL, SYNC_READ, 56, 2, 1, 2))) == told
+        assert len(host.say(packet(2, READ, 56, 2))) == 1
+
+
 def test_sync_write_reaches_those_who_are_there() -> None:
     host = Host((1, 3))
     assert host.say(packet(ALL, SYNC_WRITE, 41, 1, 1, 10, 2, 20, 3, 30)) == []

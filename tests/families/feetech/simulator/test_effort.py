@@ -106,6 +106,17 @@ def test_a_wall_in_an_overshoot_is_left_again() -> None:
     assert carried.again == carried.motion.done_at == pytest.approx(1 - 0.4**0.5)
 
 
+@pytest.mark.parametrize("ahead", [0.0, 1e-13])
+def test_a_wall_nearer_than_the_clock_can_tell_is_reached_at_once(ahead: float) -> None:
+    """Otherwise the moment at which it thinks again would not pass, and come for ever."""
+    at, wall = 100.0, 30.0
+    plan = move(at, wall - ahead, 10.0, velocity=100.0, speed=100.0, acceleration=100.0)
+    carried = carried_out(
+        lambda drive: plan, Settings(torque=1.0), World(blocked=(-inf, wall)), at, DRIVE, Switches()
+    )
+    assert carried == Carried(rest(at, wall), None, at)
+
+
 @pytest.mark.parametrize(
     ("torque", "cruise", "push"),
     [(0.2, 300.0, None), (-0.2, 700.0, None), (0.5, 0.0, 0.5), (0.8, 0.0, 0.5)],

@@ -343,3 +343,26 @@ def test_the_shaft_can_be_turned_by_hand() -> None:
     host.bus.nodes[1].raw_position = 1304
     assert host.read(1, PRESENT) == 1304
     assert host.bus.nodes[1].raw_position == 1304
+
+
+# What its registers ask for.
+
+
+def test_goals_and_readings_change_nothing_of_what_the_other_registers_ask() -> None:
+    host = moving_host()
+    servo = host.bus.nodes[1]
+    asked = servo.asked
+    host.write(1, GOAL, *word(1200))
+    host.read(1, PRESENT, 15)
+    assert servo.asked is asked  # so it is not worked out again for every goal
+
+
+@pytest.mark.parametrize("address", [MODE, ACCELERATION, DUTY, VELOCITY, LIMIT, 9, 11, 16, 18, 30])
+def test_every_other_register_is_heeded_as_soon_as_it_is_written_or_poked(address: int) -> None:
+    host = moving_host()
+    servo = host.bus.nodes[1]
+    asked = servo.asked
+    host.write(1, address, 2)
+    assert servo.asked is not asked
+    servo.memory["max_torque"] = servo.memory["torque_limit"] = 100
+    assert servo.asked.limit == 0.1

@@ -51,8 +51,9 @@ def test_each_has_a_help_text_a_source_and_a_default_among_its_choices(one: obje
     assert not metadata["choices"] or default in metadata["choices"]
 
 
-def test_every_switch_is_an_option_with_its_choices_in_the_help() -> None:
+def test_every_switch_is_an_option_with_its_choices_and_its_source() -> None:
     found = {option.name: option for option in options(Switches)}
     assert set(found) == {one.name for one in fields(Switches)}
-    assert found["id_ack"].help.endswith("(new, old)")
+    assert found["id_ack"].choices == ("new", "old")
+    assert all(option.source for option in found.values())
     assert found["store_time"].kind is float

@@ -41,6 +41,7 @@ from motorbus.families.feetech.driver.registers import action, action_all, read,
 from motorbus.families.feetech.driver.renaming import set_id
 from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
+from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
@@ -110,6 +111,7 @@ __all__ = [
     "recover_overload",
     "reg_write",
     "scan",
+    "second_id",
     "set_baud",
     "set_current",
     "set_duty",
@@ -118,6 +120,7 @@ __all__ = [
     "set_many_turns",
     "set_mode",
     "set_protection",
+    "set_second_id",
     "set_torque_limit",
     "set_velocity",
     "step",

@@ -79,11 +79,23 @@ def _mode(node: Node, raws: Mapping[str, int]) -> Iterator[str]:
         yield "its goal velocity is 0: set_velocity() gives one"
     if mode is Mode.PWM and control.duty and raws[control.duty] == 0:
         yield "its duty is 0: set_duty() gives one"
-    if control.current and raws[control.current] == 0 and mode is not Mode.PWM:
-        yield (
-            f"{control.current} is 0: the current of its motor is bounded to 0 A, and no order moves it: "
-            "set_current() or the option current of move() gives one"
-        )
+    if control.current and raws[control.current] == 0:
+        yield from _powerless(mode, control.current, settings.protection_current)
+
+
+def _powerless(mode: Mode | None, name: str, protection: int) -> Iterator[str]:
+    """What a goal torque of 0 does in this mode, and which order ends that; nothing where nobody has said."""
+    if mode is Mode.CURRENT:
+        yield f"{name}, its goal current, is 0: set_current() gives one"
+    if mode not in (Mode.POSITION, Mode.VELOCITY):
+        return
+    orders = "move()" if mode is Mode.POSITION else "set_velocity()"
+    what = f"{name} is 0: the current of its motor is bounded to 0 A, and nothing moves it"
+    other = f"write({name}=…) sets a bound in A until power-off"
+    if protection:
+        yield f"{what}: enable_torque() and {orders} set it to its protection current; {other}"
+    else:
+        yield f"{what}, and its protection current is 0 as well: {other}, write(protection_current=…) one for good"
 
 
 def _power(node: Node, table: Table, raws: Mapping[str, int]) -> Iterator[str]:

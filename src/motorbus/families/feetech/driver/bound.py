@@ -7,13 +7,15 @@ servo would set itself at power-up, its protection current. Source: FEETECH SDK,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Table
 from motorbus.core.operation import Operation, Report
 from motorbus.errors import RequestError
-from motorbus.families.feetech.driver.exchanges import read_block
+from motorbus.families.feetech.driver.exchanges import Block, read_block
 from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.table import Mode
 
 
 class Powerless(NamedTuple):
@@ -66,6 +68,22 @@ def raw_bound(node: Node, row: Entry, current: float | None) -> int:
         advice="give current= in A, or write(protection_current=…); nothing was sent",
         node=node.node,
     )
+
+
+def leaving_current_mode(
+    node: Node, table: Table, wanted: Mode | None, blocks: Sequence[Block]
+) -> Sequence[Block]:
+    """These blocks, which put a limp servo into another mode, with what makes a bound of its last goal current.
+
+    The servo keeps that register, and in the next mode it bounds the current: whoever pushed with 0.1 A last would be
+    left with a servo that hardly moves, in every program that comes after. So it becomes 0 first, which every order
+    notices should the supply go in between, and what it is at power-up in the end: the protection current.
+    """
+    if not node.control.current or wanted is Mode.CURRENT or node.known_mode not in (Mode.CURRENT, None):
+        return blocks
+    row = table[node.control.current]
+    protection = node.settings.protection_current if node.settings else 0
+    return [Block(row.address, row.encode(0)), *blocks, Block(row.address, row.encode(protection))]
 
 
 def refuse_current(node: Node, current: float | None) -> None:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Table
+from motorbus.core.entry import Entry, Table, is_number, shown
 from motorbus.core.operation import Effect, Operation, Rank, Timeout
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
@@ -114,7 +114,7 @@ def calibrate(node: Node, to: float | None = None, how: str = "auto") -> Operati
     if not 0 <= pose.position < job.turn:
         raise _turned(node, job, pose)
     plan = _planned(node, job, pose)
-    return (yield from eeprom.unlocked(node, table, lambda: _renamed(node, job, plan)))
+    return (yield from eeprom.unlocked(node, table, lambda: _renamed(node, job, plan, table["lock"].address)))
 
 
 def shortest(distance: int, turn: int) -> int:
@@ -133,9 +133,9 @@ def _sensible(node: Node, to: float | None, how: str) -> None:
             advice="nothing was sent",
             node=node.node,
         )
-    if to is not None and (isinstance(to, bool) or not isinstance(to, int | float) or not math.isfinite(to)):
+    if to is not None and not is_number(to):
         raise RequestError(
-            f"{to!r} is no position", advice="give a number in rad; nothing was sent", node=node.node
+            f"{shown(to)} is no position", advice="give a number in rad; nothing was sent", node=node.node
         )
 
 
@@ -271,10 +271,11 @@ def _offset_told(node: Node, row: Entry, data: bytes) -> int:
     )
 
 
-def _renamed(node: Node, job: _Job, plan: _Plan) -> Operation[Calibration]:
+def _renamed(node: Node, job: _Job, plan: _Plan, lock: int) -> Operation[Calibration]:
     now = yield from _pose(node, job.position, job.offset)
     if now != plan.pose:  # it gave way when it went limp
         plan = _planned(node, job, now)
+    yield from eeprom.still_open(node, lock)
     doubt = yield from _ordered(node, job, plan)
     found = yield from _pose(node, job.position, job.offset)
     after = Pose(plan.reads, plan.offset)

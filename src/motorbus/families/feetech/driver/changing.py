@@ -7,12 +7,67 @@ parts it from the servo, leaves the journal open.
 
 from __future__ import annotations
 
-from motorbus.core.operation import INTENT, Operation, Tune, afterwards, outcome
-from motorbus.errors import MotorbusError, VerificationFailed
-from motorbus.families.feetech.driver.jobs import Course, Job
+from motorbus.core.operation import (
+    ASKED,
+    INTENT,
+    Alone,
+    Journal,
+    Operation,
+    Report,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import MotorbusError, RequestError, VerificationFailed
+from motorbus.families.feetech.driver.identity import learn
+from motorbus.families.feetech.driver.jobs import SET_ID, SHIPPED_ID, Course, Job, Place
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.placing import called, locked, look, rewritten
+from motorbus.families.feetech.driver.placing import (
+    called,
+    followed,
+    locked,
+    look,
+    refuse_taken,
+    rewritten,
+    whoever,
+)
 from motorbus.families.feetech.driver.recovery import recovered
+
+
+def guarded(job: Job, node: Node) -> Operation[None]:
+    """Carry out the job on this servo with nobody else on the bus, once nothing has come between since all was looked
+    over: other tasks of this program may have changed a servo meanwhile, this one, or another one to the same place.
+
+    Raises RequestError then, with nothing written; otherwise as `changed`.
+    """
+    try:
+        yield from Alone(_once_more(job, node))
+    finally:
+        node.forget_settings()
+
+
+def _once_more(job: Job, node: Node) -> Operation[None]:
+    yield from Report(Journal(job.verb, ASKED, {}))
+    yield from afterwards(_unchanged(job), lambda: iter(Tune(job.old.rate)))
+    learn(node, job.image)
+    yield from changed(job, node, Course(job))
+
+
+def _unchanged(job: Job) -> Operation[None]:
+    """Is it as it was, is its new place free, and the id that a servo has whose own is torn?"""
+    if (yield from whoever(job.old.id)) != job.image:
+        raise RequestError(
+            f"node {job.old.id} is not what it was a moment ago",
+            expected="the same servo with the same settings",
+            cause="another task of this program changes servos on this bus, too, or it has lost its supply",
+            advice="change one after the other; nothing was written",
+            node=job.old.id,
+        )
+    shipped = Place(SHIPPED_ID, job.old.rate)
+    if job.verb == SET_ID and SHIPPED_ID not in (job.old.id, job.new.id, *job.others):
+        refuse_taken(shipped, (yield from whoever(shipped.id)))
+    yield from Tune(job.new.rate)
+    refuse_taken(job.new, (yield from whoever(job.new.id)))
 
 
 def changed(job: Job, node: Node, course: Course) -> Operation[None]:
@@ -29,6 +84,8 @@ def changed(job: Job, node: Node, course: Course) -> Operation[None]:
             return
         for end in ends:
             error.add_note(_became(job, end))
+        if course.reached and not ends:  # interrupted again, in the middle of clearing up
+            error.add_note("the change may be unfinished: recover() ends it")
         raise
 
 
@@ -39,8 +96,9 @@ def _became(job: Job, end: str | MotorbusError) -> str:
 
 
 def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
-    yield from course.reach(INTENT)
+    yield from _begun(course)
     there = yield from rewritten(job, node, job.new, course)
+    yield from followed(job, there, job.new, course)
     yield from locked(job, there)
     if job.old.rate != job.new.rate:
         yield from Tune(job.old.rate)
@@ -56,8 +114,21 @@ def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusErro
     ends.append("new")
 
 
+def _begun(course: Course) -> Operation[None]:
+    """Record the intent. What cannot be recorded does not begin, and the servo need not be looked for."""
+    try:
+        yield from course.reach(INTENT)
+    except MotorbusError:
+        closed = yield from outcome(course.end("old"))  # the record may be on the disk all the same
+        if closed is None or isinstance(closed, RequestError):  # that of another change says so
+            course.reached.clear()
+        raise
+
+
 def _settled(job: Job, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
     """Whatever has happened: bring it to one of both places, and set the rate of the bus back."""
-    if course.reached and not ends:
-        ends.append((yield from outcome(recovered(job, course))))
-    yield from Tune(job.old.rate)
+    try:
+        if course.reached and not ends:
+            ends.append((yield from outcome(recovered(job, course))))
+    finally:
+        yield from Tune(job.old.rate)

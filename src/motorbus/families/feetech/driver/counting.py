@@ -28,6 +28,7 @@ from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed
 from motorbus.families.feetech.driver.identity import learn, writable
 from motorbus.families.feetech.driver.node import IMAGE, Node
 from motorbus.families.feetech.driver.orders import unheeded
+from motorbus.families.feetech.driver.torque import disable_torque
 from motorbus.families.feetech.table import CONTROL, Mode
 from motorbus.families.feetech.table.phase import many_turns_are_told, with_many_turns_told
 
@@ -174,7 +175,7 @@ def _refuse_one_turn(node: Node, table: Table) -> None:
 def _limits_wanted(node: Node, table: Table) -> RequestError:
     return RequestError(
         f"node {node.node} counts over many turns, so it has no limits, and nobody here knows which it shall have",
-        expected=f"limits=(low, high) in rad; {_widest(node, table)}",
+        expected=f"limits=(low, high), in rad; {_widest(node, table)}",
         advice="give limits that what it moves can bear; nothing was sent",
         node=node.node,
     )
@@ -228,6 +229,7 @@ def _attempt(
 ) -> Operation[None]:
     try:
         for change in changes:
+            yield from eeprom.still_open(node, lock)
             begun.append(change)
             yield from eeprom.stored(node, Block(change.address, change.after, Effect.PERSISTENT))
         yield from eeprom.still_open(node, lock)
@@ -256,9 +258,11 @@ def _put_back(
 
 
 def _restored(node: Node, lock: int, change: _Change) -> Operation[None]:
-    """Open the lock again, for whoever has lost its supply has closed it, and write what was there."""
+    """Open the lock again, for whoever has lost its supply has closed it, let it go limp once more, for it may have
+    begun with torque on, and write what was there."""
     opened = Block(lock, b"\0", Effect.PERSISTENT)
     yield from confirmed(node, opened, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    yield from disable_torque(node)
     yield from eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
 
 

@@ -1,26 +1,24 @@
 """Orders for other modes than position: a velocity, a duty, a current, a way to go from here.
 
-Each needs the mode it is for, which `set_mode` sets, and torque, which `enable_torque` switches on at rest. All but a
-step can be repeated without harm; a step that was not acknowledged is never sent again, for it would go twice.
+Each needs the mode it is for, which `set_mode` sets, and torque, which `enable_torque` switches on at rest. The mode is
+read anew each time, for another program may have set it since, and a velocity there is a position here. All but a step
+can be repeated without harm; a step that was not acknowledged is never sent again, for it would go twice.
 Source: STS3215 memory table V3.6; FEETECH SDK headers; servolab, measured on STS3215.
 """
 
 from __future__ import annotations
 
-import math
-
-from motorbus.core.entry import Table
+from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.operation import Effect, Goal, Operation
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.identity import writable
 from motorbus.families.feetech.driver.motion import ON, finite, ordered, way
 from motorbus.families.feetech.driver.node import MANY_TURNS, Node
 from motorbus.families.feetech.driver.orders import DUTY, unheeded
 from motorbus.families.feetech.driver.pace import burst, ramp_of
-from motorbus.families.feetech.driver.rest import unpublished_duty, with_bound
+from motorbus.families.feetech.driver.rest import asked_anew, unpublished_duty, with_bound
 from motorbus.families.feetech.table import Mode
 
 
@@ -35,14 +33,14 @@ def set_velocity(
     """
     _number(node, velocity, "velocity in rad/s")
     finite(node, 0.0, acceleration, current)
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     _heed(node, Mode.VELOCITY, "cannot be given a velocity")
     refuse_current(node, current)
     row = table["goal_velocity"]
     raw = node.raw(row, velocity)
     low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
     goal = Goal(node.node, "velocity", float(node.value(row, raw)), low, high)
-    block = Block(row.address, row.encode(raw), row.effect, (goal,))
+    block = Block(row.address, row.encode(raw), row.effect, (goal,), under=node.settings)
     yield from ask_bound(node, table, current)
     if current is not None or not node.bound:
         block = with_bound(node, table, block, current)
@@ -68,7 +66,7 @@ def set_duty(node: Node, duty: float) -> Operation[None]:
             advice="give a fraction; nothing was sent",
             node=node.node,
         )
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     if not node.control.duty:
         raise unpublished_duty(node)
     _heed(node, Mode.PWM, "cannot be given a duty")
@@ -85,7 +83,7 @@ def set_current(node: Node, current: float) -> Operation[None]:
     is no finite number or more than the register takes (13.3 A).
     """
     _number(node, current, "current in A")
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     _heed(node, Mode.CURRENT, "cannot be given a current")
     row = table[node.control.current]
     raw = node.raw(row, current)
@@ -119,9 +117,9 @@ def step(
     in `move`. The limits of the servo should be 0 in this mode; what they do otherwise is not published.
     """
     finite(node, by, velocity, acceleration, tolerance, timeout)
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     _heed(node, Mode.STEP, "cannot step")
-    block = _step_block(node, table, by, velocity, acceleration)
+    block = _step_block(node, table, by, velocity, acceleration)._replace(under=node.settings)
     goal = block.goals[0].value
     if not node.control.goal_switches_on:
         yield from confirmed(node, ON)  # which alone moves nothing in step mode
@@ -165,11 +163,11 @@ def _heed(node: Node, wanted: Mode, complaint: str) -> None:
 def _number(node: Node, value: float, what: str) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise RequestError(
-            f"{value!r} is no {what}", advice="give a number; nothing was sent", node=node.node
+            f"{shown(value)} is no {what}", advice="give a number; nothing was sent", node=node.node
         )
-    if not math.isfinite(value):
+    if not is_number(value):
         raise LimitExceeded(
-            f"node {node.node}: {value} is no {what}",
+            f"node {node.node}: {shown(value)} is no {what}",
             advice="give a number; nothing was sent",
             node=node.node,
         )

@@ -7,15 +7,34 @@ serial bus servo protocol manual V1.01; STS3215 memory table V3.6.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Answer, Due, Effect, Exchange, Goal, Operation, Rank, Timeout
-from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, VerificationFailed, WireError
+from motorbus.core.operation import (
+    Answer,
+    Due,
+    Effect,
+    Exchange,
+    Goal,
+    Operation,
+    Rank,
+    Refusal,
+    Stops,
+    Timeout,
+)
+from motorbus.errors import (
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    RequestError,
+    VerificationFailed,
+    WireError,
+)
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import Node, Settings
 
 T = TypeVar("T")
+
 
 PRESENT: Final = 56
 """Where feedback begins in every map: the present position."""
@@ -30,7 +49,8 @@ DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
 class Block(NamedTuple):
     """Adjoining registers to be written at once, and what that does.
 
-    `repeatable`: writing it twice does no more than writing it once.
+    `repeatable`: writing it twice does no more than writing it once. `under` are the settings that its goals were
+    reckoned by, where it is kept for a while before it is sent; None: those that are known when it is made a packet.
     """
 
     address: int
@@ -38,6 +58,7 @@ class Block(NamedTuple):
     effect: Effect = Effect.NONE
     goals: tuple[Goal, ...] = ()
     repeatable: bool = True
+    under: Settings | None = None
 
 
 def read_block(
@@ -86,9 +107,13 @@ def acknowledged(
     *,
     rank: Rank = Rank.CONTROL,
     timeout: Timeout = Timeout.REPLY,
+    refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
 ) -> Exchange[None]:
-    """A request that is answered by nothing but an acknowledgement; by silence at status return level 0."""
+    """A request that is answered by nothing but an acknowledgement; by silence at status return level 0.
+
+    It is not sent once the settings of the servo are others than when it was made, unless `refusal` judges that.
+    """
 
     def read(answer: Answer) -> None:
         for reply in answer.replies:
@@ -105,6 +130,32 @@ def acknowledged(
         goals=block.goals if block else (),
         timeout=timeout,
         repeatable=block is not None and block.repeatable,
+        refusal=refusal or changed_since([(node, block.under if block else None)]),
+    )
+
+
+def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Refusal:
+    """Refuses an order for these servos once one has other settings than those, or than now (None): in another mode,
+    with other limits or another zero it would mean something else. What is not known any more counts as other."""
+    under = [(node, settings or node.settings) for node, settings in made]
+
+    def refusal(_: Stops) -> MotorbusError | None:
+        for node, settings in under:
+            if node.settings is not settings and node.settings != settings:
+                return outdated(node)
+        return None
+
+    return refusal
+
+
+def outdated(node: Node, what: str = "this order") -> RequestError:
+    """The error for what was made under other settings of a servo than it has now."""
+    return RequestError(
+        f"{what} was made before the settings of node {node.node} were changed, and may mean something else now",
+        expected="the mode, the limits and the zero that it was made for",
+        cause="its mode, its limits, its zero or another EEPROM register was written since, here or by another task",
+        advice="make it again: call the verb once more; what a loop keeps, after prepare(). Nothing was sent",
+        node=node.node,
     )
 
 
@@ -114,10 +165,11 @@ def unanswered(
     goals: tuple[Goal, ...] = (),
     *,
     rank: Rank = Rank.CONTROL,
+    refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
 ) -> Exchange[None]:
     """A request to several servos, which none of them answers."""
-    return Exchange(request, (), lambda _: after(), rank=rank, effect=effect, goals=goals)
+    return Exchange(request, (), lambda _: after(), rank=rank, effect=effect, goals=goals, refusal=refusal)
 
 
 def write_block(

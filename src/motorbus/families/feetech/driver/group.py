@@ -14,7 +14,14 @@ from motorbus.core.entry import Table, Value
 from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, another, read_block, unanswered
+from motorbus.families.feetech.driver.exchanges import (
+    PRESENT,
+    Block,
+    another,
+    changed_since,
+    read_block,
+    unanswered,
+)
 from motorbus.families.feetech.driver.identity import learn, unknown_map
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
@@ -215,16 +222,22 @@ def sync_write(
     if errors:
         raise next(iter(errors.values()))
     _refuse_other_names(nodes, list(values.values()))
-    blocks = [_block(node, orders) for node, orders in zip(nodes, values.values(), strict=True)]
-    for exchange in sync_writes([node.node for node in nodes], blocks):
+    blocks = [
+        _block(node, orders)._replace(under=node.settings)
+        for node, orders in zip(nodes, values.values(), strict=True)
+    ]
+    for exchange in sync_writes(nodes, blocks):
         yield from exchange
 
 
-def sync_writes(ids: Sequence[int], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
-    """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many."""
-    places: dict[tuple[int, int], list[tuple[int, Block]]] = {}
-    for id, block in zip(ids, blocks, strict=True):
-        places.setdefault((block.address, len(block.data)), []).append((id, block))
+def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
+    """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many.
+
+    One is not sent once a servo that it is for has other settings than when it was made.
+    """
+    places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
+    for node, block in zip(nodes, blocks, strict=True):
+        places.setdefault((block.address, len(block.data)), []).append((node, block))
     for (address, size), group in places.items():
         capacity = wire.sync_write_capacity(size)
         for start in range(0, len(group), capacity):
@@ -232,7 +245,10 @@ def sync_writes(ids: Sequence[int], blocks: Sequence[Block]) -> Iterator[Exchang
             goals: tuple[Goal, ...] = tuple(goal for _, block in part for goal in block.goals)
             effect = max(block.effect for _, block in part)
             yield unanswered(
-                wire.sync_write(address, [(id, block.data) for id, block in part]), effect, goals
+                wire.sync_write(address, [(node.node, block.data) for node, block in part]),
+                effect,
+                goals,
+                refusal=changed_since([(node, block.under) for node, block in part]),
             )
 
 

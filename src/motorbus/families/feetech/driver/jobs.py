@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import OUTCOME, Effect, Journal, Operation, Report
+from motorbus.core.operation import OUTCOME, REACHED, Effect, Journal, Operation, Report
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -23,6 +23,10 @@ ID: Final = 5
 BAUD: Final = 6
 WRITING: Final = "writing"
 WRITTEN: Final = "written"
+SECOND: Final = "second"
+"""The second id is about to be written, see `Job.second`."""
+AGAIN: Final = "again"
+"""A recovery is about to open a lock that it has met closed, so an open one proves nothing from now on."""
 SHIPPED_ID: Final = 1
 SHIPPED_RATES: Final = (1_000_000, 115_200, 500_000)
 """bit/s as shipped: STS and HLS, SMS, some SCS. Source: vendor memory tables."""
@@ -63,6 +67,17 @@ class Job(NamedTuple):
         """The address of the EEPROM lock in its map."""
         return self.table["lock"].address
 
+    @property
+    def second(self) -> int | None:
+        """The address of a second id that goes along with the id, for it is the old id; None when nothing goes along.
+
+        An HLS servo that kept it would go on obeying every write to the id that the next new servo has.
+        """
+        if self.verb != SET_ID or "second_id" not in self.table:
+            return None
+        address = self.table["second_id"].address
+        return address if self.image[address] == self.old.id else None
+
     def value(self, place: Place) -> int:
         """What the cell holds of a servo that is there."""
         return place.id if self.cell == ID else CODES[place.rate]
@@ -77,32 +92,44 @@ class Job(NamedTuple):
         """The write that brings it there."""
         return Block(self.cell, bytes((self.value(place),)), Effect.IDENTITY, repeatable=False)
 
-    def is_it(self, image: bytes) -> bool:
-        """Are these the registers of this very servo, wherever it is? Model, firmware and all settings are the same."""
-        return _apart_from_place(image) == _apart_from_place(self.image)
+    def is_it(self, image: bytes, met: bytes = b"") -> bool:
+        """Are these the registers of this very servo, wherever it is? Model, firmware and all settings are the same as
+        before the change; or, where it has been met since, the same as then."""
+        return self._lasting(image) == self._lasting(met or self.image)
+
+    def is_at(self, place: Place, image: bytes, met: bytes = b"") -> bool:
+        """Are these the registers of this very servo when it is there?"""
+        there = self.expected(place)
+        return image == there or (self.is_it(image, met) and image[ID : BAUD + 1] == there[ID : BAUD + 1])
 
     def is_like_it(self, image: bytes) -> bool:
-        """Model and firmware are the same: it, with settings changed since, or another one of its kind."""
+        """Model and firmware are the same: it, with settings changed since, or another one of its kind.
+
+        Settings that were written while the lock was closed are gone after a power cycle, so it may have others itself.
+        """
         return image[:_HEAD] == self.image[:_HEAD]
 
     def facts(self) -> dict[str, object]:
         """All of it as plain data."""
         return {
-            "node": self.old.id,
+            **self.name(),
             "rate": self.old.rate,
-            "new": self.new.id,
-            "new_rate": self.new.rate,
             "registers": self.image.hex(),
             "others": list(self.others),
         }
 
+    def name(self) -> dict[str, object]:
+        """Which change of this verb it is, among its facts."""
+        return {"node": self.old.id, "new": self.new.id, "new_rate": self.new.rate}
+
+    def _lasting(self, image: bytes) -> bytes:
+        """What of its registers a change leaves as it is."""
+        changing = (ID, BAUD, self.second)
+        return bytes(value for address, value in enumerate(image) if address not in changing)
+
 
 CODES: Final = {rate: code for code, rate in BAUD_CODES.items()}
 """bit/s -> value of the baud rate register."""
-
-
-def _apart_from_place(image: bytes) -> bytes:
-    return image[:ID] + image[BAUD + 1 :]
 
 
 def job_of(verb: str, facts: Mapping[str, Any]) -> Job:
@@ -124,7 +151,11 @@ def job_of(verb: str, facts: Mapping[str, Any]) -> Job:
 
 
 class Course:
-    """How far a job has come, in the journal and here; `reached` are its states in order."""
+    """How far a job has come, in the journal and here; `reached` are its states in order.
+
+    A state is kept here before it is recorded: whatever interrupts the recording must find that something has begun.
+    One that stands here and not in the journal costs a look at the servo, or a write of what it has, and no more.
+    """
 
     def __init__(self, job: Job, reached: Sequence[str] = ()) -> None:
         self.job = job
@@ -134,13 +165,24 @@ class Course:
         """Record that this state is reached; with a place, of which of both the value is meant."""
         word = state if place is None else f"{state} {self.job.value(place)}"
         facts = {} if self.reached else self.job.facts()
-        yield from Report(Journal(self.job.verb, word, facts))
         self.reached.append(word)
+        yield from Report(Journal(self.job.verb, word, facts))
+
+    def resume(self, state: str) -> Operation[None]:
+        """The same for whoever takes it up again, maybe on a bus whose journal knows nothing of it: all is told."""
+        facts = {**self.job.facts(), REACHED: list(self.reached)}
+        self.reached.append(state)
+        yield from Report(Journal(self.job.verb, state, facts))
 
     def end(self, outcome: str) -> Operation[None]:
         """Record how it ended: "new" or "old"."""
-        yield from Report(Journal(self.job.verb, OUTCOME, {"outcome": outcome}))
         self.reached.append(OUTCOME)
+        yield from Report(Journal(self.job.verb, OUTCOME, {"outcome": outcome, **self.job.name()}))
+
+    @property
+    def following(self) -> bool:
+        """The second id may have been written, with the lock open or not."""
+        return any(state.startswith(SECOND) for state in self.reached)
 
     def doubtful(self, place: Place) -> bool:
         """A servo that is at this place and has its lock closed may not be there after the next power-off.

@@ -130,7 +130,7 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
     if len(positions) != len(nodes):
         raise RequestError(f"{len(positions)} positions for {len(nodes)} servos", advice="nothing was sent")
     blocks = [_goal(node, to) for node, to in zip(nodes, positions, strict=True)]
-    exchanges = list(sync_writes([node.node for node in nodes], blocks))
+    exchanges = list(sync_writes(nodes, blocks))
     if len(exchanges) > 1:
         raise RequestError(
             f"one packet cannot carry the goals of {len(nodes)} servos",

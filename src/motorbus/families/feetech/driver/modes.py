@@ -14,6 +14,7 @@ from motorbus.core.entry import Table
 from motorbus.core.operation import Effect, Operation
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import eeprom
+from motorbus.families.feetech.driver.bound import leaving_current_mode
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import prepare, writable
 from motorbus.families.feetech.driver.motion import ordered
@@ -39,8 +40,9 @@ def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None
 
     Every map has position and PWM mode; STS and SMBL have velocity and step mode too, SMCL velocity mode, HLS velocity
     and current mode. On SCS PWM mode is both limits 0, and position mode needs `limits` in rad, unless it was this
-    object that set them to 0. Raises RequestError for a mode or limits that the map does not have, for PWM mode of HLS,
-    whose duty no source places, and errors of a guarded write to EEPROM.
+    object that set them to 0. An HLS that leaves current mode is bounded by its protection current again. Raises
+    RequestError for a mode or limits that the map does not have, for PWM mode of HLS, whose duty no source places, and
+    errors of a guarded write to EEPROM.
     """
     wanted = _named(mode)
     yield from prepare(node)
@@ -54,14 +56,10 @@ def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None
         if node.control.modes
         else _by_limits(node, table, wanted, limits)
     )
-    protection = node.settings.protection_current if node.settings else 0
-    before = node.known_mode
-    yield from eeprom.store(node, table, blocks)
+    yield from eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks))
     yield from prepare(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
         yield from ordered(node, table, at_rest(node, table, wanted))
-    if before is Mode.CURRENT and wanted is not Mode.CURRENT:
-        node.bound = protection  # what the register holds was a goal: the next order brings a bound instead
 
 
 def _named(mode: Mode | str) -> Mode:
@@ -115,7 +113,7 @@ def _limits_wanted(node: Node, table: Table) -> RequestError:
     shipped = [f"{row.to_value(row.default):.4g}" for row in rows if row.default is not None]
     return RequestError(
         f"node {node.node} becomes a servo again by its limits, and nobody here knows which",
-        expected="limits=(low, high) in rad" + (f"; shipped are {' to '.join(shipped)}" if shipped else ""),
+        expected="limits=(low, high), in rad" + (f"; shipped are {' to '.join(shipped)}" if shipped else ""),
         advice="give limits that what it moves can bear; nothing was sent",
         node=node.node,
     )

@@ -1,28 +1,38 @@
 """Holding, moving and standing still, such that nothing ever jumps.
 
 What these servos do of their own accord decides the order of things: writing a goal position switches torque on
-by itself; a goal velocity of 0 means "as fast as you can" or "not at all", as the phase register says; the moving
-flag drops also when the servo stands off its goal. Source: STS3215 memory table V3.6; measured on hardware by
-feetech-cli and servolab.
+by itself; a servo that starts anew is limp and has forgotten its goal; a goal velocity of 0 means "as fast as you can"
+or "not at all", as the phase register says; the moving flag drops also when the servo stands off its goal. Source:
+STS3215 memory table V3.6; measured on hardware by feetech-cli and servolab.
 """
 
 from __future__ import annotations
 
-import math
 from enum import Enum
 from typing import Final
 
-from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Operation
-from motorbus.errors import LimitExceeded, RequestError
+from motorbus.core.entry import Table, is_number, shown
+from motorbus.core.operation import Effect, Operation, outcome
+from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
 from motorbus.families.feetech.driver.exchanges import Block, confirmed
-from motorbus.families.feetech.driver.identity import prepare, writable
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import position_goal
 from motorbus.families.feetech.driver.pace import burst, ramp_of
-from motorbus.families.feetech.driver.rest import at_rest, held, held_within, unknown_mode, with_bound
+from motorbus.families.feetech.driver.rest import (
+    asked_anew,
+    at_rest,
+    beginning,
+    checked_jump,
+    held,
+    is_limp,
+    not_turns_away,
+    outside,
+    surely_on,
+    switched_on,
+    unknown_mode,
+)
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
 from motorbus.families.feetech.table import Mode
 
@@ -38,6 +48,11 @@ class Promise(Enum):
     """What an acknowledged stop promises, and no more than that."""
 
     HOLD_ACCEPTED = "goal := present position accepted: it decelerates and holds; standstill was not verified"
+    OUTSIDE_ACCEPTED = (
+        "goal := present position accepted, outside its limits: it may go on to the nearer limit, as torque makes it; "
+        "only torque off ends that"
+    )
+    LIMP = "it is limp, where torque could move it (outside its limits, or nobody knows): nothing was sent"
     ZERO_VELOCITY_ACCEPTED = "goal velocity := 0 accepted: it decelerates; standstill was not verified"
     ZERO_DUTY_ACCEPTED = "duty := 0 accepted: it runs out without holding; standstill was not verified"
     ZERO_CURRENT_ACCEPTED = "current := 0 accepted: it runs out without holding; standstill was not verified"
@@ -45,6 +60,7 @@ class Promise(Enum):
 
 
 ON: Final = Block(TORQUE_ENABLE, b"\1", Effect.TORQUE)
+_TRIES: Final = 3
 _AT_REST: Final = {
     Mode.VELOCITY: Promise.ZERO_VELOCITY_ACCEPTED,
     Mode.PWM: Promise.ZERO_DUTY_ACCEPTED,
@@ -55,39 +71,48 @@ _AT_REST: Final = {
 
 
 def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
-    """Torque on without a jump: the goal becomes the present position first (velocity, duty or current 0 there).
+    """Torque on without a jump: the goal becomes the present position with it (velocity, duty or current 0 there).
 
+    One packet carries both, so that a servo which starts anew in between is limp and nothing else; the switch is read
+    back. In step mode, where a goal is a way to go and torque alone moves nothing, the switch goes by itself.
     Where a goal velocity of 0 means standstill and nothing else is set, that becomes the maximum, so that goals which
     come without a velocity are gone to.
 
     A servo that was turned by hand beyond its limits would go for the nearer limit as soon as it holds; that is
     refused with LimitExceeded unless the way is at most `jump` (rad). Raises RequestError where no order is known that
     would not move it: in PWM mode of HLS, in a mode that no source explains, on SMCL with both limits 0, and on a servo
-    of many turns that tells its position within one (there `jump` must be as much as all of them).
+    of many turns that tells its position within one (there `jump` must be as much as all of them); for a `jump` that
+    is no finite number from 0 on; MotionError when its torque is off again at once, or it has forgotten its turns.
     """
-    yield from prepare(node)
-    table = yield from writable(node)
+    checked_jump(node, jump)
+    table = yield from asked_anew(node)
     mode = node.known_mode
     if mode is None:
         raise unknown_mode(node)
-    if mode is Mode.POSITION:
-        yield from ordered(node, table, (yield from held_within(node, table, jump)))
-    elif mode is Mode.VELOCITY:
-        yield from ask_bound(node, table)
-        yield from ordered(node, table, with_bound(node, table, at_rest(node, table, mode)))
-    elif mode is not Mode.STEP:  # where torque alone moves nothing
-        yield from ordered(node, table, at_rest(node, table, mode))
-    yield from confirmed(node, ON)
+    if mode is Mode.STEP:
+        yield from confirmed(node, ON)
+    else:
+        block = yield from beginning(node, table, mode, jump)
+        yield from ordered(node, table, block)
+        if mode is Mode.POSITION:
+            yield from not_turns_away(node, table, block, jump)
+    yield from surely_on(node)
 
 
 def stop(node: Node) -> Operation[Promise]:
     """Decelerate and stay: the goal becomes the position of this moment (velocity, duty or current 0 in those modes).
 
-    Returns what was promised. A limp STS servo begins to hold, a limp one of another map may stay limp. Raises
-    RequestError where nothing is known to end a movement but torque off: in step mode, where a goal is a way to go; in
-    PWM mode of HLS; in a mode that no source explains; on a servo of many turns that tells its position within one.
+    Mode and limits are read anew, for another program may have changed them. Returns what was promised. A limp STS
+    servo begins to hold, a limp one of another map may stay limp. Outside its limits a servo goes for the nearer one
+    as soon as it has torque: one that is limp there is left alone (`LIMP`), one with torque is on its way already, and
+    whether the goal ends that is not known (`OUTSIDE_ACCEPTED`).
+
+    Raises RequestError where nothing is known to end a movement but torque off: in step mode, where a goal is a way to
+    go; in PWM mode of HLS; in a mode that no source explains; and with torque on SMCL with both limits 0, and on a
+    servo of many turns that tells its position within one. Raises MotionError, with the servo limp, when it has
+    forgotten its turns meanwhile; VerificationFailed when it reads back something else three times.
     """
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     mode = node.known_mode
     if mode is None:
         raise unknown_mode(node)
@@ -97,11 +122,54 @@ def stop(node: Node) -> Operation[Promise]:
             advice="use disable_torque(), after which it is limp; nothing was sent",
             node=node.node,
         )
-    if mode is Mode.POSITION:
-        yield from ordered(node, table, (yield from held(node, table)))
-        return Promise.HOLD_ACCEPTED
-    yield from ordered(node, table, at_rest(node, table, mode))
+    for again in reversed(range(_TRIES)):
+        try:
+            if mode is Mode.POSITION:
+                return (yield from _stay(node, table))
+            yield from ordered(node, table, at_rest(node, table, mode))
+            break
+        except VerificationFailed:  # where no acknowledgement is due, this is how a lost packet shows
+            if not again:
+                raise
     return _AT_REST[mode]
+
+
+def _stay(node: Node, table: Table) -> Operation[Promise]:
+    """Goal := here, unless that could set a limp servo into motion."""
+    here = yield from outcome(held(node, table))
+    doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
+    if doubtful and (yield from is_limp(node)):
+        return Promise.LIMP
+    if isinstance(here, MotorbusError):
+        raise here
+    yield from ordered(node, table, here)
+    yield from not_turns_away(node, table, here)
+    return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
+
+
+def calmed(node: Node, table: Table) -> Operation[None]:
+    """What a servo that has torque and no force would go for becomes where it is, or no velocity, duty or current.
+
+    For whoever is about to give it its force back. Does nothing to a limp one, and in step mode, where nothing waits.
+    Raises LimitExceeded when it stands outside its limits, to which it would go; errors as enable_torque() otherwise.
+    """
+    mode = node.known_mode
+    if mode is Mode.STEP or (yield from is_limp(node)):
+        return
+    if mode is None:
+        raise unknown_mode(node)
+    if mode is not Mode.POSITION:
+        yield from ordered(node, table, at_rest(node, table, mode))
+        return
+    block = yield from held(node, table)
+    if outside(node, table, block):
+        raise LimitExceeded(
+            f"node {node.node} stands outside its limits: with its force back it would go for the nearer one",
+            expected="a position within its limits",
+            advice="disable_torque() first, then enable_torque(jump=…) bounds that way; nothing was sent",
+            node=node.node,
+        )
+    yield from ordered(node, table, block)
 
 
 def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
@@ -132,23 +200,26 @@ def move(
 ) -> Operation[None]:
     """Move to `to` rad, at most at `velocity` rad/s and `acceleration` rad/s² (None: the servo's maximum).
 
-    Goal, velocity and acceleration leave in one packet. Torque goes on: on STS by itself, on other maps, of which
-    nobody has said that, by a packet that follows. On HLS the first packet also bounds the current: by `current` (A),
-    or as it was; 0 is never sent, and a servo that was found with 0 is reported (`Powerless`). Returns when the servo
-    is in position within `tolerance` rad (None: 0.05, or ten counts where these are more) and no longer moves; at once
-    with `wait=False`. A servo of many turns that tells its position within one is judged within that.
+    Mode and limits are read first, each time: another program may have changed them (a loop that cannot spare that
+    runs `sync_write_positions`, which asks nobody). Goal, velocity and acceleration leave in one packet. Torque goes
+    on: on STS by itself, on other maps, of which nobody has said that, by the switch in the same packet, which is read
+    back. On HLS the packet also bounds the current: by `current` (A), or as it was; 0 is never sent, and a servo that
+    was found with 0 is reported (`Powerless`). Returns when the servo is in position within `tolerance` rad (None:
+    0.05, or ten counts where these are more) and no longer moves; at once with `wait=False`. A servo of many turns
+    that tells its position within one is judged within that.
 
     Raises LimitExceeded when `to` is not a finite number (and the gate does outside the limits), RequestError in other
     than position mode, for an acceleration where the map has no register for it (SCS) or a current where it has none
-    (all but HLS), Stalled when it stays off its goal, MotionError after `timeout` seconds (None: by way and velocity).
+    (all but HLS), Stalled when it stays off its goal, MotionError after `timeout` seconds (None: by way and velocity),
+    MotionError when its torque is off again at once.
     """
     finite(node, to, velocity, acceleration, current, tolerance, timeout)
-    table = yield from writable(node)
+    table = yield from asked_anew(node)
     yield from ask_bound(node, table, current)
     block = move_block(node, table, to, velocity, acceleration, current)
     yield from ordered(node, table, block)
     if not node.control.goal_switches_on:
-        yield from confirmed(node, ON)
+        yield from surely_on(node)
     if wait:
         goal = block.goals[0].value
         yield from arrive(node, table, way(node, table, goal, velocity, acceleration, tolerance, timeout))
@@ -182,27 +253,28 @@ def move_block(
 ) -> Block:
     """All that a move says, in one block: acceleration, goal position, bound of the current or time, velocity.
 
-    Registers 41 to 47; on SCS, which have no acceleration, 42 to 47. The time is 0, so that the velocity counts. Raises
-    RequestError when a bound of the current is needed and not known (see `ask_bound`).
+    Registers 41 to 47 where the goal switches torque on; elsewhere 40 to 47, the switch with them. The time is 0, so
+    that the velocity counts. Raises RequestError when a bound of the current is needed and not known (see `ask_bound`).
     """
     raw, order = position_goal(node, table["goal_position"], to)
     data = table["goal_position"].encode(raw) + burst(node, table, velocity, current)
     ramp = ramp_of(node, table, acceleration)
-    return Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, (order,))
+    block = Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, (order,))
+    return block if node.control.goal_switches_on else switched_on(block)
 
 
 def finite(node: Node, to: float, *bounds: float | None) -> None:
     """Raise LimitExceeded for a goal that is no number, RequestError for bounds that are none above 0."""
-    if not math.isfinite(to):
+    if not is_number(to):
         raise LimitExceeded(
-            f"node {node.node}: {to} is no position",
+            f"node {node.node}: {shown(to)} is no position",
             advice="give a number in rad; nothing was sent",
             node=node.node,
         )
     for bound in bounds:
-        if (bound is not None and not bound >= 0) or bound == math.inf:
+        if bound is not None and not (is_number(bound) and bound >= 0):
             raise RequestError(
-                f"node {node.node}: {bound} is not a finite number above 0",
+                f"node {node.node}: {shown(bound)} is not a finite number above 0",
                 advice="velocity in rad/s, acceleration in rad/s², tolerance in rad, timeout in s; nothing was sent",
                 node=node.node,
             )

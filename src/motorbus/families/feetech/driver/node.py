@@ -11,7 +11,7 @@ from functools import cache
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Table, Value
+from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
 from motorbus.core.operation import Goal
 from motorbus.errors import RequestError
@@ -36,8 +36,9 @@ MANY_TURNS: Final = 30719
 _UNKNOWN: Final = Control()
 _PRESENT: Final = "present_position"
 _POSITIONS: Final = (_PRESENT, "goal_position", "goal_position_echo")
+_LIMITS: Final = ("min_position_limit", "max_position_limit")
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
-SCALED: Final = frozenset((*_POSITIONS, *_VELOCITIES))
+SCALED: Final = frozenset((*_POSITIONS, *_LIMITS, *_VELOCITIES))
 """Rows whose unit depends on settings of the servo (angular resolution, phase)."""
 
 alarm_names: Final = cache(alarms)
@@ -83,11 +84,20 @@ class Settings(NamedTuple):
         return (raw - self.shift) % self.turn
 
 
+class Pending(NamedTuple):
+    """What a REG WRITE from here ordered and no ACTION has carried out yet: the goals, the settings by which they were
+    reckoned, and how many stops had left for the servo until then."""
+
+    goals: tuple[Goal, ...]
+    settings: Settings | None
+    stops: int = 0
+
+
 class Node:
     """One servo by its id, 0 to 253, and what is known of it.
 
     `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s);
-    `pending` what a REG WRITE from here ordered and no ACTION has carried out yet. `bound` is the raw bound of the
+    `pending` the goals that wait in it for an ACTION, None when none from here do. `bound` is the raw bound of the
     current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
     those (rad) that were given up to make a motor of it, where limits decide about that.
     """
@@ -99,7 +109,7 @@ class Node:
         self.settings: Settings | None = None
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
-        self.pending: tuple[Goal, ...] = ()
+        self.pending: Pending | None = None
         self.bound: int | None = None
         self.former_limits: tuple[float, float] | None = None
 
@@ -149,12 +159,12 @@ class Node:
         """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RequestError(
-                f"{row.name}: {value!r} is not a number",
+                f"{row.name}: {shown(value)} is not a number",
                 advice="give a number; nothing was sent",
                 node=self.node,
             )
         factor = self.settings.factors.get(row.name, 1) if self.settings else 1
-        return row.to_raw(value / factor if factor != 1 else value)
+        return row.to_raw(value / factor if factor != 1 and is_number(value) else value)
 
 
 def checked_id(node: int) -> int:
@@ -205,7 +215,7 @@ def settings_of(table: Table, image: bytes) -> Settings:
         accumulates=many_turns_are_told(phase, table.name),
         shift=0 if mode in (Mode.POSITION, None) else offset,
         factors={
-            **dict.fromkeys(_POSITIONS, turns),
+            **dict.fromkeys((*_POSITIONS, *_LIMITS), turns),
             **dict.fromkeys(_VELOCITIES, float(velocity_scale(phase, table.name))),
         },
         protection_current=raw("protection_current") if control.current else 0,

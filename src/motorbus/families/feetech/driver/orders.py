@@ -5,11 +5,10 @@ All of it is decided before the first byte is sent. The same rules hold for WRIT
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage, Table, Value
+from motorbus.core.entry import Entry, Storage, Table, Value, is_number, shown
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.exchanges import Block
@@ -23,6 +22,7 @@ _CALIBRATE: Final = 128
 _INSTEAD: Final = {
     "id": "use set_id(), which sees to it that the servo is found again",
     "baud_rate": "use set_baud(), which sees to it that the servo is found again",
+    "second_id": "use set_second_id(), which sees to it that no other servo has it",
     "homing_offset": "use calibrate(), which reckons it from where the servo stands",
 }
 
@@ -39,10 +39,28 @@ def orders_of(node: Node, table: Table, values: Mapping[str, Value]) -> list[Ord
     orders = [Order(table[name], node.raw(table[name], value)) for name, value in values.items()]
     for order in orders:
         _check(order, node.node)
+        _refuse_unheeded(node, order.row)
         if order.row.name == node.control.current:
             _check_bound(node, order)
             node.bound = None
     return orders
+
+
+def _refuse_unheeded(node: Node, row: Entry) -> None:
+    """A goal says what its mode makes of it: where nobody knows that, the gate could not judge it."""
+    if node.settings is None or not is_goal(row):
+        return
+    mode = node.known_mode
+    if mode is None or (mode is Mode.PWM and not node.control.duty):
+        raise RequestError(
+            f"node {node.node} is in operating mode {shown_mode(node)}, in which nobody has published what "
+            f"{row.name} does",
+            expected="a mode whose goals can be judged",
+            advice="set_mode('position'), or disable_torque(); nothing was sent",
+            node=node.node,
+        )
+    if row.name == "goal_position" and mode not in (Mode.POSITION, Mode.STEP):
+        raise unheeded(node, Mode.POSITION, "heeds no goal position")
 
 
 def _check_bound(node: Node, order: Order) -> None:
@@ -83,6 +101,11 @@ def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
     )
 
 
+def is_goal(row: Entry) -> bool:
+    """Whether writing it orders a movement, for the gate to judge."""
+    return row.effect is Effect.MOTION and row.storage is Storage.RAM and not limps(row)
+
+
 def limps(row: Entry) -> bool:
     """Whether this RAM register may be written to a limp servo only: it moves a servo, and is no goal to judge."""
     return row.effect is Effect.MOTION and row.storage is Storage.RAM and not row.name.startswith("goal_")
@@ -99,10 +122,10 @@ def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
         raise unheeded(node, Mode.POSITION, "cannot go to a position")
     if node.limits is None:
         raise no_limits(node)
-    raw = node.raw(row, to) if math.isfinite(to) else row.high + 1
+    raw = node.raw(row, to) if is_number(to) else row.high + 1
     if not row.low <= raw <= row.high:
         raise LimitExceeded(
-            f"node {node.node}: {to} is no position it could go to",
+            f"node {node.node}: {shown(to)} is no position it could go to",
             expected=f"{node.value(row, row.low):.4g} to {node.value(row, row.high):.4g} rad at the very most",
             advice="give a number in rad; nothing was sent",
             node=node.node,
@@ -164,9 +187,9 @@ def check_values(values: Mapping[str, Value]) -> None:
 
 def _fault(row: Entry, value: Value) -> RequestError | None:
     """What is wrong with this value whatever the settings of the servo are, which may scale some rows."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         return RequestError(
-            f"{row.name}: {value!r} is not a finite number", advice="give a number; nothing was sent"
+            f"{row.name}: {shown(value)} is not a finite number", advice="give a number; nothing was sent"
         )
     try:
         _check(Order(row, 0 if row.name in SCALED else row.to_raw(value)))

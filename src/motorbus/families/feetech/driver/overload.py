@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Operation, Pause
-from motorbus.errors import DeviceError
+from motorbus.core.operation import Operation, Pause, outcome
+from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech.driver.alarm import alarms
 from motorbus.families.feetech.driver.feedback import state_exchange
 from motorbus.families.feetech.driver.identity import writable
@@ -26,6 +26,8 @@ TRIPS: Final = frozenset(("overload", "current"))
 """Alarms that stay after what raised them is over."""
 REST: Final = 1.0
 """s without torque before it is switched on again."""
+_LONGEST: Final = 3600.0
+"""s; whoever asks for more has mistaken the unit."""
 
 
 class Recovery(NamedTuple):
@@ -40,19 +42,46 @@ def recover_overload(node: Node, *, rest: float = REST) -> Operation[Recovery]:
     """Bring a servo back whose overload (or over-current) protection has tripped; it holds where it stands then.
 
     Between the two it is limp for `rest` s, and an arm sags. Does nothing when neither alarm is set. Raises
-    DeviceError, with the servo limp, when the alarm stays: then only a power cycle helps; and what enable_torque()
-    raises, with the servo limp too.
+    DeviceError, with the servo limp, when the alarm stays: then only a power cycle helps; what enable_torque()
+    raises, after letting go once more, with a note when even that was not acknowledged; RequestError, with nothing
+    sent, when `rest` is no finite number from 0 on.
     """
+    _check(node, rest)
     table = yield from writable(node)
     tripped = tuple(name for name in (yield from state_exchange(node, table)).alarm if name in TRIPS)
     if tripped:
         yield from disable_torque(node)
         yield from Pause(rest)
-        yield from enable_torque(node)
-        if (yield from _tripped(node, table)):
+        try:
+            yield from enable_torque(node)
+            stays = yield from _tripped(node, table)
+        except MotorbusError as error:
+            yield from _let_go(node, error)
+            raise
+        if stays:
             yield from disable_torque(node)
             raise _stays(node, tripped)
     return Recovery(tripped, (yield from alarms(node)))
+
+
+def _check(node: Node, rest: float) -> None:
+    number = isinstance(rest, int | float) and not isinstance(rest, bool)
+    if not (number and 0 <= rest <= _LONGEST):
+        raise RequestError(
+            f"node {node.node}: {rest!r} is no time to rest",
+            expected=f"0 to {_LONGEST:.0f} s",
+            advice="leave it out for one second; nothing was sent",
+            node=node.node,
+        )
+
+
+def _let_go(node: Node, error: MotorbusError) -> Operation[None]:
+    """Whatever came of switching its torque on, it ends limp."""
+    failure = yield from outcome(disable_torque(node))
+    if failure is not None:
+        error.add_note(
+            f"node {node.node} may still hold: disable_torque() was not acknowledged ({failure.summary})"
+        )
 
 
 def _tripped(node: Node, table: Table) -> Operation[bool]:

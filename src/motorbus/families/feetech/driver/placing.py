@@ -16,7 +16,7 @@ from motorbus.errors import NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, unanswered, verified
 from motorbus.families.feetech.driver.identity import learn
-from motorbus.families.feetech.driver.jobs import WRITING, WRITTEN, Course, Job, Place
+from motorbus.families.feetech.driver.jobs import SECOND, WRITING, WRITTEN, Course, Job, Place
 from motorbus.families.feetech.driver.node import IMAGE, Node
 from motorbus.families.feetech.driver.torque import disable_torque
 
@@ -32,13 +32,14 @@ NOISE: Final = b"\xff"
 """Stands for bytes that are no answer."""
 
 
-def rewritten(job: Job, node: Node, goal: Place, course: Course) -> Operation[Node]:
+def rewritten(job: Job, node: Node, goal: Place, course: Course, before: bytes = b"") -> Operation[Node]:
     """Write the cell with the lock open and see the servo at its goal; gives it as it is there, its lock open.
+
+    `before` are its registers 0 to 39 as they are now, where they may differ from those of the job.
 
     Raises OutcomeUnknown when it is not seen there, or its lock has been closed since: it has lost its supply.
     """
-    yield from disable_torque(node)
-    yield from confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=Timeout.STORE)
+    yield from unlocked(job, node)
     yield from course.reach(WRITING, goal)
     block = job.block(goal)
     request = wire.write(node.node, block.address, block.data)
@@ -46,19 +47,44 @@ def rewritten(job: Job, node: Node, goal: Place, course: Course) -> Operation[No
     yield from Pause(COMMIT)
     yield from Tune(goal.rate)
     image = yield from seen(goal.id)
-    if image != job.expected(goal):
+    if not job.is_at(goal, image, before):
         raise _not_there(job, goal, image)
     there = like(node, goal.id)
-    if (yield from read_block(there, job.lock, 1, bytes)) != OPEN:
+    yield from _still_open(job, there)
+    yield from course.reach(WRITTEN, goal)
+    return there
+
+
+def followed(job: Job, node: Node, goal: Place, course: Course) -> Operation[None]:
+    """Write the second id of a servo that is at its goal, its lock open, where it goes along (`Job.second`).
+
+    Raises VerificationFailed when it reads back different, OutcomeUnknown when the lock has been closed since.
+    """
+    if job.second is None:
+        return
+    yield from course.reach(SECOND, goal)
+    block = Block(job.second, bytes((goal.id,)), Effect.PERSISTENT)
+    yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    yield from Pause(COMMIT)
+    yield from verified(node, block, timeout=Timeout.STORE)
+    yield from _still_open(job, node)
+
+
+def unlocked(job: Job, node: Node) -> Operation[None]:
+    """Open the lock of a servo, and let it go limp: in this order, for one that restarts later has its lock closed."""
+    yield from confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=Timeout.STORE)
+    yield from disable_torque(node)
+
+
+def _still_open(job: Job, node: Node) -> Operation[None]:
+    if (yield from read_block(node, job.lock, 1, bytes)) != OPEN:
         raise OutcomeUnknown(
-            f"node {goal.id} has closed its lock by itself: it has lost its supply in the middle of the change",
+            f"node {node.node} has closed its lock by itself: it has lost its supply in the middle of the change",
             expected="an open lock",
             cause="a loose supply cable, or somebody switched it off",
             advice="see that its supply stays on, then recover()",
-            node=goal.id,
+            node=node.node,
         )
-    yield from course.reach(WRITTEN, goal)
-    return there
 
 
 def locked(job: Job, node: Node) -> Operation[None]:

@@ -11,16 +11,29 @@ from collections.abc import Sequence
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import ASKED, Alone, Journal, Operation, Report, Tune, afterwards
-from motorbus.errors import RequestError
+from motorbus.core.operation import (
+    ASKED,
+    Alone,
+    Journal,
+    Operation,
+    Pause,
+    Report,
+    Timeout,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.changing import changed
+from motorbus.families.feetech.driver.changing import guarded
 from motorbus.families.feetech.driver.exchanges import read_block
-from motorbus.families.feetech.driver.identity import identify, writable
-from motorbus.families.feetech.driver.jobs import SET_BAUD, Course, Job, Place
+from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.jobs import SET_BAUD, Job, Place
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
-from motorbus.families.feetech.driver.placing import locked, refuse_taken, whoever
-from motorbus.families.feetech.driver.renaming import others_than
+from motorbus.families.feetech.driver.others import others_than
+from motorbus.families.feetech.driver.placing import NOISE, locked, refuse_taken, whoever
+from motorbus.families.feetech.driver.renaming import met_alone
+from motorbus.families.feetech.driver.scanning import DRAIN
 from motorbus.families.feetech.driver.sharing import refuse_duplicates
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF
 
@@ -32,34 +45,31 @@ def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Operation[F
     some seconds to ask. What it has already is not written again.
 
     Raises RequestError (nothing was written) for a rate that its map or the link does not have, a servo of its id that
-    answers there already, two servos that seem to have its id, an HLS servo that has it as its second id, or while
+    answers at any other rate, two servos that seem to have its id, an HLS servo that has it as its second id, or while
     another change on this bus is unfinished; otherwise as `set_id`.
     """
     _refuse_unknown(rate)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
     yield from Report(Journal(SET_BAUD, ASKED, {}))
+    image = yield from met_alone(node)
     table = yield from writable(node)
     _refuse_lacking(node, table, rate)
     present = yield from Tune(0)
-    here, there = Place(node.node, present), Place(node.node, rate)
-    image = yield from read_block(node, 0, IMAGE, bytes)
-    job = Job(SET_BAUD, here, there, image)
+    job = Job(SET_BAUD, Place(node.node, present), Place(node.node, rate), image)
     if rate == present:
         yield from Alone(locked(job, node))
-        return Found(node.node, rate, (yield from identify(node)))
+        return Found(node.node, rate, node.identity)
     yield from refuse_duplicates(node)
-    yield from Alone(afterwards(_look_there(there), lambda: iter(Tune(present))))
+    yield from Alone(afterwards(_look_there(job.new), lambda: iter(Tune(present))))
+    yield from Alone(afterwards(_look_around(job), lambda: iter(Tune(present))))
     others = yield from others_than(node, asked, (node.node,))
     job = job._replace(others=tuple(others))
-    try:
-        yield from Alone(changed(job, node, Course(job)))
-    finally:
-        node.forget_settings()
+    yield from guarded(job, node)
     return Found(node.node, rate, node.identity)
 
 
 def _refuse_unknown(rate: int) -> None:
-    if isinstance(rate, bool) or rate not in BAUD_CODES.values():
+    if isinstance(rate, bool) or not isinstance(rate, int) or rate not in BAUD_CODES.values():
         raise RequestError(
             f"{rate!r} bit/s is no rate of these servos",
             expected=", ".join(map(str, BAUD_CODES.values())),
@@ -82,3 +92,28 @@ def _look_there(there: Place) -> Operation[None]:
     """Is the link able to have this rate, and is the id free there?"""
     yield from Tune(there.rate)
     refuse_taken(there, (yield from whoever(there.id)))
+
+
+def _look_around(job: Job) -> Operation[None]:
+    """Has nobody its id at any other rate? One whose rate is torn may appear at each of them, and must be the only one.
+
+    A rate that the link does not have is no place where anybody is looked for, before or after.
+    """
+    for rate in BAUD_CODES.values():
+        if rate in (job.old.rate, job.new.rate):
+            continue
+        refusal = yield from outcome(iter(Tune(rate)))
+        if isinstance(refusal, LinkLost):
+            raise refusal
+        if isinstance(refusal, MotorbusError):
+            continue
+        yield from Pause(DRAIN)
+        image = yield from outcome(_glance(job.old.id))
+        if isinstance(image, LinkLost):
+            raise image
+        if not isinstance(image, NoReply):
+            refuse_taken(Place(job.old.id, rate), image if isinstance(image, bytes) else NOISE)
+
+
+def _glance(id: int) -> Operation[bytes]:
+    return (yield from read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))

@@ -6,8 +6,11 @@ a valid id or rate might answer, as shipped. Carrying this out again, after anot
 harm. One cell is one byte, so no order of writes avoids a torn one; a servo that answers to no id at all hears
 broadcasts at the most, and those may be used only when it is alone on its bus; one that heeds no rate hears nothing.
 
-Servos of one model, set alike, cannot be told apart. So whoever answered before the change began is never taken for the
-one that changes, and nothing new should be connected until the change has ended.
+Servos of one model cannot be told apart by more than their settings, and those that were written while the lock was
+closed are gone after a power cut. So the servo is known by its model, its firmware and a place at which nobody else
+answered before the change began; whoever answered before is never taken for it, and nothing new should be connected
+until the change has ended. Whatever is written is judged by the settings just met, and a lock that was opened is closed
+again, come what may.
 """
 
 from __future__ import annotations
@@ -32,9 +35,9 @@ from motorbus.errors import LinkLost, MotorbusError, NoReply, OutcomeUnknown, Re
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, read_block, unanswered
 from motorbus.families.feetech.driver.jobs import (
+    AGAIN,
     SET_ID,
     SHIPPED_ID,
-    SHIPPED_RATES,
     WRITING,
     Course,
     Job,
@@ -43,7 +46,18 @@ from motorbus.families.feetech.driver.jobs import (
     job_of,
 )
 from motorbus.families.feetech.driver.node import IMAGE, Node
-from motorbus.families.feetech.driver.placing import AWAKE, COMMIT, OPEN, locked, look, met, rewritten
+from motorbus.families.feetech.driver.others import others_than
+from motorbus.families.feetech.driver.placing import (
+    AWAKE,
+    COMMIT,
+    OPEN,
+    followed,
+    locked,
+    look,
+    met,
+    rewritten,
+    unlocked,
+)
 from motorbus.families.feetech.driver.sharing import duplicates
 from motorbus.families.feetech.driver.torque import LIMP
 from motorbus.families.feetech.table import BAUD_CODES
@@ -78,11 +92,15 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     present = yield from Tune(0)
 
     def work() -> Operation[str]:
-        yield from course.reach(RESUMED)
+        yield from course.resume(RESUMED)
         return (yield from recovered(job, course, alone=alone))
 
     try:
         return (yield from Alone(afterwards(work(), lambda: iter(Tune(present)))))
+    except BaseException as error:
+        if not isinstance(error, MotorbusError):  # one of ours says itself what to do
+            error.add_note("the change may still be unfinished: recover() ends it")
+        raise
     finally:
         node.forget_settings()
 
@@ -103,16 +121,47 @@ def recovered(job: Job, course: Course, *, alone: bool = False) -> Operation[str
 
 def _ended(job: Job, course: Course, found: Seen) -> Operation[str]:
     """Bring the servo that was found to one of both places, for good, and lock it."""
+    goal = found.place if found.place in (job.old, job.new) else job.old
+    ended: list[str] = []
+    yield from afterwards(
+        _brought(job, course, found, goal, ended),
+        lambda: _closed(job, found, goal) if not ended else iter(Tune(0)),
+    )
+    return "new" if goal == job.new else "old"
+
+
+def _brought(job: Job, course: Course, found: Seen, goal: Place, ended: list[str]) -> Operation[None]:
     place = found.place
     yield from Tune(place.rate)
     node = met(place.id, found.image)
-    goal = place if place in (job.old, job.new) else job.old
-    if place != goal:
-        node = yield from rewritten(job, node, goal, course)
-    elif course.doubtful(goal) and (yield from read_block(node, job.lock, 1, bytes)) != OPEN:
-        node = yield from rewritten(job, node, goal, course)  # the write may have met a closed lock
+    again = place == goal and course.doubtful(goal) and (yield from _may_be_lost(job, node, course))
+    follows = job.second is not None and (course.following or found.image[job.second] != goal.id)
+    if place != goal or again or follows:
+        yield from others_than(node, job.others, (place.id, goal.id))
+    if again:
+        yield from course.reach(AGAIN)
+    if place != goal or again:
+        node = yield from rewritten(job, node, goal, course, found.image)
+    if follows:
+        yield from unlocked(job, node)
+        yield from followed(job, node, goal, course)
     yield from locked(job, node)
-    return "new" if goal == job.new else "old"
+    ended.append("locked")
+
+
+def _closed(job: Job, found: Seen, goal: Place) -> Operation[None]:
+    """Close the lock of a servo that could not be brought to its goal, wherever it is by now, as far as it answers."""
+    yield from Pause(COMMIT)  # a lock that closes too early may drop what is being stored
+    for place in dict.fromkeys((found.place, goal)):
+        yield from Tune(place.rate)
+        image = yield from outcome(look(place.id))
+        if isinstance(image, bytes) and image and job.is_like_it(image):
+            yield from outcome(locked(job, met(place.id, image)))
+
+
+def _may_be_lost(job: Job, node: Node, course: Course) -> Operation[bool]:
+    """May the write have met a closed lock, so that the value is gone at the next power-off?"""
+    return AGAIN in course.reached or (yield from read_block(node, job.lock, 1, bytes)) != OPEN
 
 
 # -- where is it? -------------------------------------------------------------------------------------------------
@@ -140,7 +189,7 @@ def _found(job: Job, course: Course, alone: bool) -> Operation[Seen]:
 
 
 def _among(job: Job, places: Iterable[Place]) -> Operation[list[Seen]]:
-    """Who of its kind answers at these places."""
+    """Who of its kind answers at these places; nobody else did before the change began, see `guarded`."""
     found = []
     for place in dict.fromkeys(places):
         yield from Tune(place.rate)
@@ -159,16 +208,15 @@ def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
     Whoever answered there before the change began is somebody else, and may look just like it.
     """
     taken = _others(job, alone)
-    rates = (job.old.rate, job.new.rate)
-    possible = (job.old.id, job.new.id, *((SHIPPED_ID,) if job.verb == SET_ID else ()))
-    ids = [id for id in possible if id not in taken]
-    any_id = [id for id in range(wire.MAX_ID + 1) if id not in taken] if job.verb == SET_ID and alone else []
-    shipped = SHIPPED_RATES if job.verb == SET_ID else tuple(BAUD_CODES.values())
-    for places in (elsewhere(job, ids, (*rates, *shipped)), elsewhere(job, any_id, rates)):
-        for place in places:
-            one = yield from _glimpsed(job, place)
-            if one is not None:
-                return one
+    if job.verb == SET_ID:  # its rate is not touched: one of its kind at another rate is somebody else
+        ids = (SHIPPED_ID, *(range(wire.MAX_ID + 1) if alone else ()))
+        places = elsewhere(job, [id for id in ids if id not in taken], (job.old.rate,))
+    else:
+        places = elsewhere(job, (job.old.id,), tuple(BAUD_CODES.values()))
+    for place in places:
+        one = yield from _glimpsed(job, place)
+        if one is not None:
+            return one
     if SHIPPED_ID in taken and job.verb == SET_ID:
         yield from _hidden(job)
     return None
@@ -180,11 +228,11 @@ def _others(job: Job, alone: bool) -> set[int]:
 
 
 def _glimpsed(job: Job, place: Place) -> Operation[Seen | None]:
-    """This very servo at a place where nobody is expected; silence is the usual answer and is not waited for."""
+    """One of its kind at a place where nobody answered before; silence is the usual answer and is not waited for."""
     image = yield from outcome(_asked(place))
     if isinstance(image, LinkLost):
         raise image
-    return Seen(place, image) if isinstance(image, bytes) and job.is_it(image) else None
+    return Seen(place, image) if isinstance(image, bytes) and job.is_like_it(image) else None
 
 
 def _asked(place: Place) -> Operation[bytes]:
@@ -231,7 +279,7 @@ def _refuse_others(job: Job) -> Operation[None]:
             raise answer
         if not isinstance(answer, NoReply):
             known = id in _others(job, alone=True)
-            there.append((id, isinstance(answer, bytes) and job.is_it(answer) and not known))
+            there.append((id, isinstance(answer, bytes) and job.is_like_it(answer) and not known))
     others = [id for id, is_it in there if not is_it or len(there) > 1]
     if others:
         raise RequestError(

@@ -10,18 +10,28 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
-from motorbus.core.operation import Effect, Exchange, Operation, Runnable
-from motorbus.errors import OutcomeUnknown
+from motorbus.core.operation import Effect, Exchange, Operation, Refusal, Runnable, Stops
+from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
-from motorbus.families.feetech.driver.exchanges import Block, acknowledged, confirmed, read_block, unanswered
+from motorbus.families.feetech.driver.bound import leaving_current_mode
+from motorbus.families.feetech.driver.exchanges import (
+    Block,
+    acknowledged,
+    changed_since,
+    confirmed,
+    outdated,
+    read_block,
+    unanswered,
+)
 from motorbus.families.feetech.driver.identity import known, refuse_unless_writable, writable
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import Node, Pending
 from motorbus.families.feetech.driver.orders import (
     Order,
     blocks,
     check_names,
     check_values,
+    is_goal,
     limps,
     only_block,
     orders_of,
@@ -101,23 +111,46 @@ def _end(row: Entry) -> int:
 def write(node: Node, /, **values: Value) -> Operation[None]:
     """Write registers by name, in API units; all are checked before the first is sent.
 
-    Registers in EEPROM go through the guarded sequence: torque off (the servo goes limp and stays so), unlock,
+    Registers in EEPROM go through the guarded sequence: unlock, torque off (the servo goes limp and stays so),
     write, read back, lock. What changes the meaning of a goal (`control_loop` of HLS) lets it go limp as well. Raises
-    RequestError for what cannot or must not be written so, DeviceError when the register map is not known,
-    VerificationFailed when EEPROM reads back different.
+    RequestError for what cannot or must not be written so, and for goals together with EEPROM; DeviceError when the
+    register map is not known, VerificationFailed when EEPROM reads back different.
     """
     check_values(values)
     table = yield from writable(node)
     orders = orders_of(node, table, values)
+    _refuse_goals_among_settings(node, orders)
     kept = list(blocks(node, [order for order in orders if order.row.storage is Storage.EEPROM]))
     if kept:
-        yield from eeprom.store(node, table, kept)
+        yield from eeprom.store(node, table, _kept(node, table, orders, kept))
     live = [order for order in orders if order.row.storage is not Storage.EEPROM]
     if any(limps(order.row) for order in live):
         yield from disable_torque(node)
         yield from _confirmed_limp(node, [order for order in live if limps(order.row)])
-    for block in blocks(node, [order for order in live if not limps(order.row)]):
-        yield from confirmed(node, block)
+    made = None if kept else node.settings
+    for block in list(blocks(node, [order for order in live if not limps(order.row)])):
+        yield from confirmed(node, block._replace(under=made))
+
+
+def _refuse_goals_among_settings(node: Node, orders: Sequence[Order]) -> None:
+    """What lies in EEPROM, or must be written limp, may give a goal another meaning, and lets go before."""
+    goals = [order.row.name for order in orders if is_goal(order.row)]
+    before = [order.row.name for order in orders if order.row.storage is Storage.EEPROM or limps(order.row)]
+    if goals and before:
+        raise RequestError(
+            f"node {node.node}: {', '.join(goals)} together with {', '.join(before)}, for which the servo goes limp",
+            expected="goals alone",
+            advice=f"write {', '.join(before)} first, then enable_torque() and the goals; nothing was sent",
+            node=node.node,
+        )
+
+
+def _kept(node: Node, table: Table, orders: Iterable[Order], kept: Sequence[Block]) -> Sequence[Block]:
+    """What is stored, and where that changes the mode, what the last goal of the old mode would do to the new one."""
+    for order in orders:
+        if order.row.name == "operating_mode":
+            return leaving_current_mode(node, table, node.control.modes.get(order.raw), kept)
+    return kept
 
 
 def _confirmed_limp(node: Node, orders: Sequence[Order]) -> Operation[None]:
@@ -129,17 +162,34 @@ def _confirmed_limp(node: Node, orders: Sequence[Order]) -> Operation[None]:
 def reg_write(node: Node, /, **values: Value) -> Operation[None]:
     """REG WRITE: hand over a write of adjoining RAM registers that is carried out at the next ACTION.
 
-    A second one replaces the first; a power cycle loses it. Never sent twice: raises OutcomeUnknown when it was
-    not acknowledged.
+    A second one replaces the first; a power cycle loses it. It survives torque off and an emergency stop, so `action`
+    refuses it after those, until the next one; a write to EEPROM replaces it by torque off, and `action` refuses as
+    well. Never sent twice: raises OutcomeUnknown when it was not acknowledged.
     """
     check_values(values)
     table = yield from writable(node)
     block = only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
-    exchange = acknowledged(node, wire.reg_write(node.node, block.address, block.data), block)
-    node.pending = block.goals
+    request = wire.reg_write(node.node, block.address, block.data)
+    exchange = acknowledged(node, request, block, refusal=_handed_over(node, block))
     yield from exchange
     if not exchange.replies:
         yield from _pending(node, table, exchange)
+    if not block.goals:
+        node.pending = None
+
+
+def _handed_over(node: Node, block: Block) -> Refusal:
+    """Keep in mind what is handed over, and how often the servo had been stopped when it left."""
+    changed = changed_since([(node, block.under)])
+    if block.goals:
+        node.pending = Pending(block.goals, node.settings)
+
+    def refusal(stops: Stops) -> MotorbusError | None:
+        if block.goals:
+            node.pending = Pending(block.goals, node.settings, stops(node.node))
+        return changed(stops)
+
+    return refusal
 
 
 def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
@@ -164,14 +214,20 @@ def _waits(node: Node, table: Table) -> Exchange[bytes]:
 def action(node: Node) -> Runnable[None]:
     """ACTION for this servo: carry out what REG WRITE left. Never sent twice; nothing pending does nothing.
 
-    Raises DeviceError when the register map is not known, for then nobody knows what waits; OutcomeUnknown when it was
-    not acknowledged, or still waits on a servo that acknowledges nothing.
+    Raises RequestError when the settings of the servo were changed since its REG WRITE, or when it was let go or
+    stopped since, by whomever on this bus: reg_write() it again. Raises DeviceError when the register map is not known,
+    for then nobody knows what waits; OutcomeUnknown when it was not acknowledged, or still waits on a servo that
+    acknowledges nothing.
     """
     if node.table is None or node.settings is None:
         return _met(node)
     refuse_unless_writable(node)
     exchange = acknowledged(
-        node, wire.action(node.node), _released([node]), after=lambda: _carried_out([node])
+        node,
+        wire.action(node.node),
+        _released([node]),
+        refusal=_still_wanted([node]),
+        after=lambda: _carried_out([node]),
     )
     return exchange if exchange.replies else _seen(node, node.table, exchange)
 
@@ -197,23 +253,57 @@ def _seen(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]
 def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
     """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers.
 
-    `nodes` are those whose goals were handed over here, for the gate to see once more. Raises DeviceError when the
-    register map of one of these is known not to be described. Servos that are not named obey as well.
+    `nodes` are those whose goals were handed over here, for the gate to see once more, and to be refused as `action`
+    says. Raises DeviceError when the register map of one of these is known not to be described. Servos that are not
+    named obey as well, also those that were let go since (a write to EEPROM makes what waits harmless, a stop cannot):
+    name all.
     """
     for node in nodes:
         if node.identity is not None:
             refuse_unless_writable(node)
     block = _released(nodes)
-    return unanswered(wire.action(), block.effect, block.goals, after=lambda: _carried_out(nodes))
+    return unanswered(
+        wire.action(),
+        block.effect,
+        block.goals,
+        refusal=_still_wanted(nodes),
+        after=lambda: _carried_out(nodes),
+    )
 
 
 def _released(nodes: Sequence[Node]) -> Block:
     """What ACTION lets go. Goals handed over by others are not known; the gate has seen them at REG WRITE, if it
     was asked, and ACTION is then no more than torque: leave to go for a goal."""
-    goals = tuple(goal for node in nodes for goal in node.pending)
+    goals = tuple(goal for node in nodes if node.pending is not None for goal in node.pending.goals)
     return Block(0, b"", Effect.MOTION if goals else Effect.TORQUE, goals, repeatable=False)
+
+
+def _still_wanted(nodes: Sequence[Node]) -> Refusal:
+    """Refuses what was handed over under other settings, now already, or before a servo was told to let go."""
+
+    def refusal(stops: Stops) -> MotorbusError | None:
+        for node in nodes:
+            if node.pending is not None and node.pending.settings != node.settings:
+                return outdated(node, "the REG WRITE that waits")
+            if node.pending is not None and stops(node.node) > node.pending.stops:
+                return _let_go_since(node)
+        return None
+
+    if (error := refusal(lambda _: 0)) is not None:
+        raise error
+    return refusal
+
+
+def _let_go_since(node: Node) -> RequestError:
+    return RequestError(
+        f"node {node.node} was told to let go after its REG WRITE was handed over, and ACTION would move it",
+        expected="no stop between the two",
+        cause="disable_torque(), an emergency stop, or a write to EEPROM, which begins with torque off",
+        advice="reg_write() it again, which replaces what waits; nothing was sent",
+        node=node.node,
+    )
 
 
 def _carried_out(nodes: Iterable[Node]) -> None:
     for node in nodes:
-        node.pending = ()
+        node.pending = None

@@ -2,35 +2,35 @@
 
 A write to an id reaches everybody who has it: two servos with one id would both be renamed (feetech-cli), and so would
 an HLS servo whose second id it is, which hears writes and does not show in any answer. So the bus is looked over first.
+For the same reason a second id that is the old id goes along: it would be the id of the next new servo.
 The rest is `changing.py`; what becomes of a crash in the middle is `recovery.py`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import replace
 
 from motorbus.core.family import Found
-from motorbus.core.operation import ASKED, Alone, Journal, Operation, Progress, Report, Timeout, Tune, outcome
-from motorbus.errors import NoReply, RequestError
+from motorbus.core.operation import ASKED, Alone, Journal, Operation, Report, Tune
+from motorbus.errors import WireError
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.changing import changed
+from motorbus.families.feetech.driver.changing import guarded
 from motorbus.families.feetech.driver.exchanges import read_block
-from motorbus.families.feetech.driver.identity import identify, identity_of, writable
-from motorbus.families.feetech.driver.jobs import SET_ID, Course, Job, Place
+from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.jobs import SET_ID, SHIPPED_ID, Job, Place
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes, checked_id
+from motorbus.families.feetech.driver.others import others_than
 from motorbus.families.feetech.driver.placing import locked, refuse_taken, whoever
 from motorbus.families.feetech.driver.sharing import refuse_duplicates
-from motorbus.families.feetech.table import TABLES
-
-_HEAD: Final = 5
 
 
 def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Operation[Found]:
     """Give this servo the id `new`, for good; gives where it is now. A `Servo` of the new id speaks to it from then on.
 
     The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
-    some seconds to ask. What it has already is not written again.
+    some seconds to ask. What it has already is not written again. The second id of an HLS servo becomes the new id,
+    too, when it is the old one; any other second id stays (`set_second_id`).
 
     Raises RequestError (nothing was written) for an impossible id, one that answers already, two servos that seem to
     have the old id, an HLS servo that has one of both as its second id, or while another change on this bus is
@@ -40,51 +40,28 @@ def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Operation[Foun
     checked_id(new)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
     yield from Report(Journal(SET_ID, ASKED, {}))
-    yield from writable(node)
+    image = yield from met_alone(node)
+    assert node.identity is not None
+    found = replace(node.identity, node=new)
     rate = yield from Tune(0)
-    image = yield from read_block(node, 0, IMAGE, bytes)
     job = Job(SET_ID, Place(node.node, rate), Place(new, rate), image)
     if new == node.node:
         yield from Alone(locked(job, node))
-        return Found(new, rate, (yield from identify(node)))
+        return Found(new, rate, found)
     yield from refuse_duplicates(node)
     refuse_taken(Place(new, rate), (yield from whoever(new)))
-    others = yield from others_than(node, asked, (new, node.node))
+    others = yield from others_than(node, asked, (new, node.node, SHIPPED_ID))
     job = job._replace(others=tuple(others))
+    yield from guarded(job, node)
+    return Found(new, rate, found)
+
+
+def met_alone(node: Node) -> Operation[bytes]:
+    """Registers 0 to 39 of a servo that may be written to. Garbled answers are called a bad line only when it does not
+    seem to be two servos that give them. Raises RequestError when it does, otherwise as `writable`."""
     try:
-        yield from Alone(changed(job, node, Course(job)))
-    finally:
-        node.forget_settings()
-    return Found(new, rate, (yield from identify(Node(new))))
-
-
-def others_than(node: Node, asked: Sequence[int], ids: Sequence[int]) -> Operation[list[int]]:
-    """Who else is on this bus, of these ids; a servo whose second id is one of `ids` raises RequestError."""
-    others = []
-    for done, id in enumerate(asked):
-        yield from Report(Progress(done + 1, len(asked), f"who else is there? id {id}"))
-        if id == node.node:
-            continue
-        head = yield from outcome(read_block(Node(id), 0, _HEAD, bytes, timeout=Timeout.SCAN))
-        if isinstance(head, NoReply):
-            continue
-        others.append(id)
-        if isinstance(head, bytes):
-            yield from _refuse_second(id, head, ids)
-    return others
-
-
-def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> Operation[None]:
-    table = TABLES.get(identity_of(id, head).table)
-    if table is None or "second_id" not in table:
-        return
-    row = table["second_id"]
-    second = yield from read_block(Node(id), row.address, row.size, row.decode)
-    if second in ids:
-        raise RequestError(
-            f"servo {id} has {second} as its second id: it would obey every write to {second} without a word",
-            expected="no servo whose second id is one of " + " and ".join(map(str, ids)),
-            cause="HLS servos hear writes to a second id (register 7)",
-            advice=f"take servo {id} off the bus meanwhile; nothing was written",
-            node=id,
-        )
+        yield from writable(node)
+        return (yield from read_block(node, 0, IMAGE, bytes))
+    except WireError:
+        yield from refuse_duplicates(node)
+        raise

@@ -1,23 +1,135 @@
 """Orders that make nothing move: stay where it stands, no velocity, no duty, no current, as the mode asks for.
 
-They are what comes before torque goes on, and what a stop says. Where no such order is known, that is said.
+They are what torque goes on with, and what a stop says. Where no such order is known, that is said.
+
+A servo that loses its supply for a moment (the inrush of its own motor may do it) forgets its goal, and whoever then
+switches its torque on by itself sends it to wherever that register begins. So the switch never travels alone where a
+goal is heeded: registers 40 to 47 adjoin in every map, and one packet carries both. The mode and the limits may be
+another program's by now, so they are read again before anything is ordered.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.entry import Table
+from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.operation import Goal, Operation
-from motorbus.errors import LimitExceeded, RequestError
+from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, read_block
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.exchanges import PRESENT, Block, outdated, read_block
+from motorbus.families.feetech.driver.identity import prepare, writable
+from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.orders import no_limits, shown_mode
 from motorbus.families.feetech.driver.pace import burst
+from motorbus.families.feetech.driver.torque import TORQUE_ENABLE, disable_torque
 from motorbus.families.feetech.table import Mode
 
 _QUANTITY: Final = {Mode.VELOCITY: "velocity", Mode.PWM: "load", Mode.CURRENT: "current"}
+_ON: Final = b"\1"
+_COMMANDS: Final = 8
+"""Bytes from the torque switch to the goal velocity, registers 40 to 47 in every map."""
+_HERE, _AWAY = "here", "away"
+
+
+# -- what is so now ------------------------------------------------------------------------------------------
+
+
+def asked_anew(node: Node) -> Operation[Table]:
+    """The map of a servo whose mode, limits and units are read at this moment: another program may have set them.
+
+    Costs one READ of registers 0 to 39. Raises DeviceError when the register map is not known.
+    """
+    yield from prepare(node)
+    return (yield from writable(node))
+
+
+def is_limp(node: Node) -> Operation[bool]:
+    """Whether its torque switch says anything but 'on'."""
+    return (yield from read_block(node, TORQUE_ENABLE, 1, bytes)) != _ON
+
+
+def surely_on(node: Node) -> Operation[None]:
+    """Raise MotionError when the torque switch of a servo that has acknowledged 'on' says something else."""
+    if (yield from is_limp(node)):
+        raise MotionError(
+            f"node {node.node} has taken the order to switch its torque on, and its torque is off",
+            expected="register 40 at 1",
+            cause="it has lost its supply for a moment, which switching the torque on may do; or an alarm let it drop; "
+            "or a stop or another program has switched it off",
+            advice="see to its supply and its alarms, then enable_torque(); it is limp",
+            node=node.node,
+        )
+
+
+# -- torque on -----------------------------------------------------------------------------------------------
+
+
+def beginning(node: Node, table: Table, mode: Mode, jump: float) -> Operation[Block]:
+    """The one packet with which torque comes on at rest, in any mode but step; errors as `held_within` and `at_rest`.
+
+    What lies between the switch and the order keeps the value it has.
+    """
+    if mode is Mode.POSITION:
+        return (yield from held_within(node, table, jump))
+    block = at_rest(node, table, mode)._replace(under=node.settings)
+    if mode is Mode.VELOCITY:
+        yield from ask_bound(node, table)
+        block = with_bound(node, table, block)
+    return switched_on(block, (yield from _commands(node)))
+
+
+def switched_on(block: Block, found: bytes = bytes(_COMMANDS)) -> Block:
+    """This order and the torque switch before it, in one packet; `found` are registers 40 to 47 as they are.
+
+    SCS have no register 41: there it carries what was read, or 0, which is the maximum should it be the acceleration
+    that some libraries (lerobot, rustypot) take it for. What real ones do with it is not known; a servo that refused
+    the packet for it would stay limp.
+    """
+    between = found[1 : block.address - TORQUE_ENABLE]
+    return block._replace(address=TORQUE_ENABLE, data=_ON + between + block.data)
+
+
+def _commands(node: Node) -> Operation[bytes]:
+    return (yield from read_block(node, TORQUE_ENABLE, _COMMANDS, bytes))
+
+
+def not_turns_away(node: Node, table: Table, block: Block, jump: float = 0.0) -> Operation[None]:
+    """See that a servo which counts its turns still stands on the turn on which this order would have it stay.
+
+    It forgets them with its supply: lost between being asked where it stands and the order, "here" is turns away, and
+    it is on its way there. Then its torque is switched off at once, and MotionError raised.
+    """
+    settings = node.settings
+    if settings is None or not settings.accumulates:
+        return
+    row, goal = table["present_position"], block.goals[0].value
+    far = abs(float(node.value(table["goal_position"], settings.turn // 2))) + jump
+
+    def take(data: bytes) -> str:
+        return _AWAY if abs(float(node.value(row, row.decode(data))) - goal) > far else _HERE
+
+    if (yield from read_block(node, PRESENT, row.size, take)) != _HERE:
+        yield from disable_torque(node)
+        raise MotionError(
+            f"node {node.node} has forgotten its turns while it was told to stay at {goal:.4g} rad",
+            cause="it has lost its supply for a moment",
+            advice="see to its supply, home it, then enable_torque(); it is limp",
+            node=node.node,
+        )
+
+
+def checked_jump(node: Node, jump: float) -> None:
+    """Raise RequestError for a jump that bounds nothing."""
+    if not (is_number(jump) and jump >= 0):
+        raise RequestError(
+            f"node {node.node}: {shown(jump)} is no way that it may jump",
+            expected="a finite number from 0 on, in rad",
+            advice="leave it out to allow none; nothing was sent",
+            node=node.node,
+        )
+
+
+# -- stay ----------------------------------------------------------------------------------------------------
 
 
 def held(node: Node, table: Table) -> Operation[Block]:
@@ -28,37 +140,54 @@ def held(node: Node, table: Table) -> Operation[Block]:
 
 
 def held_within(node: Node, table: Table, jump: float) -> Operation[Block]:
-    """Goal := the present position, or the limit it would go for when that is at most `jump` rad away.
+    """Torque on, and goal := the present position, or the limit it would go for when that is at most `jump` rad away.
 
     With a bound of the current that lets it hold, where the map has one, and with a velocity when it would not go to
     the next goal without. Raises LimitExceeded when it would go farther.
     """
     if node.limits is None:
         raise no_limits(node)
+    settings = node.settings
     yield from ask_bound(node, table)
-    still = yield from _stays_put(node, table)
+    found = yield from _commands(node)
+    _still(node, settings)
     raw = yield from _stands(node, table)
     _know_the_turn(node, raw, jump)
     block = _hold(node, table, _within(node, table, raw, jump))
-    if still:
-        return block._replace(data=block.data + burst(node, table, None, None))
-    return with_bound(node, table, block)
+    if _stays_put(node, table, found):
+        return switched_on(block._replace(data=block.data + burst(node, table, None, None)), found)
+    return switched_on(with_bound(node, table, block), found)
 
 
-def _stays_put(node: Node, table: Table) -> Operation[bool]:
+def _stays_put(node: Node, table: Table, found: bytes) -> bool:
     """Whether its goal velocity is 0 and means standstill, so that goals alone would move nothing."""
     if node.settings is None or node.settings.zero_is_maximum:
         return False
     row = table["goal_velocity"]
-    return (yield from read_block(node, row.address, row.size, row.decode)) == 0
+    return row.decode(found[row.address - TORQUE_ENABLE :][: row.size]) == 0
+
+
+def outside(node: Node, table: Table, block: Block) -> bool:
+    """Whether this order to stay lies outside the limits: a servo with torque goes for the nearer one then."""
+    assert node.limits is not None
+    here, slack = block.goals[0].value, table["goal_position"].scale / 2
+    return not node.limits[0] - slack <= here <= node.limits[1] + slack
 
 
 def _stands(node: Node, table: Table) -> Operation[int]:
     """Raw present position. Raises RequestError when no goal could be told to be within the limits."""
     if node.limits is None:
         raise no_limits(node)
-    row = table["present_position"]
-    return (yield from read_block(node, PRESENT, row.size, row.decode))
+    row, settings = table["present_position"], node.settings
+    raw = yield from read_block(node, PRESENT, row.size, row.decode)
+    _still(node, settings)
+    return raw
+
+
+def _still(node: Node, settings: Settings | None) -> None:
+    """Raise RequestError when another task has changed the settings of this servo since."""
+    if node.settings != settings:
+        raise outdated(node)
 
 
 def at_rest(node: Node, table: Table, mode: Mode) -> Block:

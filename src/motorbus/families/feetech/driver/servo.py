@@ -19,6 +19,7 @@ from motorbus.families.feetech.driver import (
     registers,
     renaming,
     restoring,
+    second,
     sharing,
     torque,
     tuning,
@@ -61,6 +62,8 @@ class ServoVerbs(Node):
     duplicates = verb(sharing.duplicates)
     set_id = verb(renaming.set_id)
     set_baud = verb(rates.set_baud)
+    second_id = verb(second.second_id)
+    set_second_id = verb(second.set_second_id)
     recover = verb(recovery.recover)
     factory_restore = verb(restoring.factory_restore)
     calibrate = verb(calibration.calibrate)

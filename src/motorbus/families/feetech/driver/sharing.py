@@ -26,6 +26,8 @@ BLOCKS: Final = ((PRESENT, FEEDBACK), (0, IMAGE))
 SIGNS: Final = 4
 """Garbled answers that make a suspicion; fewer may be noise. Where few questions are asked, half as many do."""
 FEW: Final = 20
+MOST: Final = 100_000
+"""Polls at most: some minutes at 1 Mbit/s, and nothing that more of them could show."""
 ENOUGH: Final = 10
 """Signs after which nobody need look any further."""
 _ID: Final = 5
@@ -77,11 +79,13 @@ class Suspicion(NamedTuple):
 def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operation[Suspicion]:
     """Does more than one servo answer to this id? Asks at most `polls` times, fewer when it is plain; writes nothing.
 
-    Reports `Progress` unless `quiet`. Raises NoReply when there was no answer at all, RequestError for fewer than one
-    poll.
+    Reports `Progress` unless `quiet`. Raises NoReply when there was no answer at all, RequestError for fewer polls
+    than one or more than `MOST`.
     """
-    if polls < 1:
-        raise RequestError(f"{polls} polls: at least 1 is needed", advice="nothing was sent", node=node.node)
+    if not 1 <= polls <= MOST:
+        raise RequestError(
+            f"{polls} polls", expected=f"1 to {MOST}", advice="nothing was sent", node=node.node
+        )
     seen = Suspicion(node.node, (yield from Tune(0)), 0)
     first = b""
     silence: MotorbusError | None = None
@@ -89,7 +93,7 @@ def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operat
         block = BLOCKS[number // 2 % len(BLOCKS)]
         answers = yield from outcome((_alone if number % 2 == 0 else _twice)(node, *block))
         if isinstance(answers, NoReply):
-            silence = answers
+            silence = silence or answers  # the first one says what may be the cause, too
         if block[0] == 0 and not first and not isinstance(answers, MotorbusError):
             first = answers[0]
         told = _told(answers, first if block[0] == 0 else None)

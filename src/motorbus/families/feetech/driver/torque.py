@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from motorbus.core.operation import Effect, Exchange, Operation, Rank, afterwards, outcome
-from motorbus.errors import MotorbusError
+from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
 from motorbus.families.feetech.driver.node import Node, as_nodes
@@ -23,20 +23,21 @@ _TRIES: Final = 3
 def disable_torque(node: Node) -> Operation[None]:
     """Torque off: the servo goes limp. Alarms do not matter; said up to three times until it is acknowledged.
 
-    Without an acknowledgement the switch is read back. Raises OutcomeUnknown when nobody answers at all,
-    VerificationFailed when the torque is still on.
+    Without an acknowledgement the switch is read back: after the third time, or each time where none is due (status
+    return level 0). Raises OutcomeUnknown when nobody answers at all, VerificationFailed when the torque is still on.
     """
     doubt: MotorbusError | None = None
     for _ in range(_TRIES):
         exchange = write_block(node, LIMP, rank=Rank.STOP)
         try:
             yield from exchange
-        except DOUBTS as error:
-            doubt = error
-            continue
-        if exchange.replies:
+            if not exchange.replies:
+                yield from verified(node, LIMP)
             return
-        break
+        except (*DOUBTS, VerificationFailed) as error:
+            doubt = error
+    if isinstance(doubt, VerificationFailed):
+        raise doubt
     yield from verified(node, LIMP, doubt)
 
 

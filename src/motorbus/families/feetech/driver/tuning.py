@@ -13,13 +13,15 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage, Table, Value
+from motorbus.core.entry import Entry, Storage, Table, Value, shown
 from motorbus.core.operation import Operation
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, verified
 from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.motion import calmed
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.registers import read, read_raw, write
+from motorbus.families.feetech.driver.rest import asked_anew
 from motorbus.families.feetech.table import CONTROL
 
 
@@ -121,12 +123,13 @@ def set_torque_limit(node: Node, limit: float, *, persistent: bool = False) -> O
     """Bound its torque, 0 to 1 of the stall torque: at once and until power-off, with `persistent` for good.
 
     Servos without such a register in RAM (SCS, old SMS) have max_torque in EEPROM alone: there it is always for good,
-    and the servo goes limp. A limit of 0 lets it hang; a greater one lets it go for its goal again, so set the goal
-    first. Raises RequestError outside 0 to 1, VerificationFailed when it reads back different.
+    and the servo goes limp. A limit of 0 lets it hang, and a greater one after that would let it go for its old goal:
+    so the goal becomes where it hangs first (velocity, duty or current 0 in those modes). Raises RequestError outside 0
+    to 1, LimitExceeded for a servo that hangs outside its limits, VerificationFailed when it reads back different.
     """
     if isinstance(limit, bool) or not isinstance(limit, int | float) or not 0 <= limit <= 1:
         raise RequestError(
-            f"{limit!r} is no torque limit",
+            f"{shown(limit)} is no torque limit",
             expected="a fraction of the stall torque, 0 to 1",
             advice="nothing was sent",
             node=node.node,
@@ -135,6 +138,8 @@ def set_torque_limit(node: Node, limit: float, *, persistent: bool = False) -> O
     row = limiting(table)
     kept = persistent or row.storage is Storage.EEPROM
     names = tuple(dict.fromkeys((row.name, "max_torque"))) if kept else (row.name,)
+    if limit and not kept and not (yield from read_raw(node, row.name))[row.name]:
+        yield from calmed(node, (yield from asked_anew(node)))
     yield from _put(node, table, dict.fromkeys(names, limit))
     return TorqueLimit(limit, names, kept)
 
@@ -252,7 +257,7 @@ def _mask(node: Node, row: Entry, names: object) -> int:
 
 def _number(part: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise RequestError(f"{part}: {value!r} is not a number", advice="nothing was sent")
+        raise RequestError(f"{part}: {shown(value)} is not a number", advice="nothing was sent")
     return value
 
 

@@ -1,8 +1,9 @@
 """Several simulated servos on one half-duplex wire: who hears which packet, who answers, and when.
 
 What all real ones have in common, so no switch: a packet with a wrong checksum is met with silence; a broadcast is
-obeyed and not answered, PING excepted; at status return level 0 only PING and reads are answered (FEETECH serial bus
-servo protocol manual V1.01, 1.1 and 1.3). Servos that answer at once pull the wire low together.
+obeyed and not answered, PING excepted; at status return level 0 only PING and READ are answered (FEETECH serial bus
+servo protocol manual V1.01, 1.1 and 1.3), and of SYNC READ, which that manual has not, a switch decides. Servos that
+answer at once pull the wire low together.
 """
 
 from __future__ import annotations
@@ -219,6 +220,8 @@ class FeetechBus:
 
     def _syncs(self, servo: Servo) -> bool:
         wish = self.switches.sync_read
+        if self.switches.sync_read_level == "silent" and servo.memory["status_return_level"] == 0:
+            return False
         return servo.model.control.sync_read if wish == "by_map" else wish == "yes"
 
     def _in_turn(self, speaking: list[tuple[Servo, Answer]], at: float) -> None:

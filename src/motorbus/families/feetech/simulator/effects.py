@@ -102,8 +102,12 @@ def clear_turns(servo: Servo, at: float) -> None:
 
 def restore_factory(servo: Servo, at: float) -> None:
     """0x06: as shipped, offset 0, the id kept (servolab, STS3215 firmware 3.10); then it starts again."""
-    kept = frozenset({"id", "second_id"} if servo.switches.restore_id == "keep" else ())
-    servo.memory.restore_factory(kept, servo.switches.restore_time)
+    kept = {"id", "second_id"} if servo.switches.restore_id == "keep" else set()
+    if servo.switches.wrong_bridge == "blind":
+        kept.add(
+            "phase"
+        )  # or it would heal what no factory restore has healed (iotdesignshop/Feetech-tuna#2)
+    servo.memory.restore_factory(frozenset(kept), servo.switches.restore_time)
     servo.stores()
     servo.power_up(at, cut=False)
     servo.deaf_until = at + servo.switches.restore_time

@@ -60,6 +60,13 @@ class BusSwitches:
         "no",
         source="lerobot and rustypot: an SCS0009 does not; of other SCS servos nobody has said",
     )
+    sync_read_level: str = switch(
+        "answer",
+        "at status return level 0 a servo answers SYNC READ, which is a read, or only PING and READ",
+        "answer",
+        "silent",
+        source="not documented: manual V1.01, which says PING and READ, knows no SYNC READ",
+    )
     sync_read_missing: str = switch(
         "wait",
         "when a listed servo is missing the next ones leave its time free, close up, or stay silent",

@@ -2,7 +2,8 @@
 
 A default of an STS3215 is no default of another servo, and a note on what its sources say is no note on another's. So
 a borrowed row gets the source of the map that borrows it, loses its default unless that is the same in every servo, and
-keeps its note only where the note is about the thing and not about one map's sources.
+keeps its note only where the note is about the thing and not about one map's sources. What its sources disagree about
+stays behind likewise.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ _TRUE_OF_THE_THING: Final = frozenset(
         *("present_load", "reg_write_pending", "moving"),
     )
 )
+_IN_DOUBT_EVERYWHERE: Final = frozenset(("id", "protective_torque", "overload_torque"))
+"""Rows whose sources disagree in the same way in every map that has them."""
 
 
 def borrowed(
@@ -66,6 +69,7 @@ def borrowed(
                     "source": source,
                     "default": shipped.get(row.name),
                     "note": row.note if row.name in _TRUE_OF_THE_THING else "",
+                    "conflict": row.conflict if row.name in _IN_DOUBT_EVERYWHERE else "",
                     **differences,
                 },
             )

@@ -15,7 +15,7 @@ from motorbus.core.operation import Effect
 from motorbus.families.feetech.table.borrowed import borrowed
 from motorbus.families.feetech.table.codes import ALARM_BITS_OF, rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
-from motorbus.families.feetech.table.sources import FD, HLS_TABLE, MANUAL, SDK_HLS, SPECIAL_HLS
+from motorbus.families.feetech.table.sources import FD, HEADERS, HLS_TABLE, MANUAL, SDK_HLS, SPECIAL_HLS
 from motorbus.families.feetech.table.sts import AMPERE, COUNT, STS
 
 _BOTH = f"{FD}; {HLS_TABLE}"
@@ -52,7 +52,7 @@ _SETTINGS = (
     _row("byte_order", source=HLS_TABLE, note=STS["byte_order"].note),
     _row("model_major", default=10),
     _row("id", source=f"{MANUAL}, example 3; {_BOTH}", note=f"the main id; {STS['id'].note}"),
-    _row("baud_rate", choices=rates("hls"), source=_ALL, note="FD allows 0 to 7"),
+    _row("baud_rate", choices=rates("hls"), source=_ALL, conflict=HEADERS),
     Entry(
         name="second_id", address=7, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, high=253,
         effect=Effect.IDENTITY, protected=True, source=_BOTH,
@@ -70,19 +70,21 @@ _SETTINGS = (
     _row("led_mask", bits=ALARM_BITS_OF["hls"]),
     _row("integral_limit", note="the greatest integral is 4 times this, 0 is none"),
     *(
-        _row(name, high=16, note="HLS table: 0 to 16; FD: 0 to 32. Chosen: 0 to 16")
+        _row(name, high=16, conflict="HLS table: 0 to 16; FD: 0 to 32. Chosen: 0 to 16")
         for name in ("dead_band_cw", "dead_band_ccw")
     ),
     _row(
         "protection_current", high=2047,
-        note="loaded into goal_torque at power-up; HLS table: 0 to 2047; FD: 0 to 1023. Chosen: 0 to 2047",
+        conflict="HLS table: 0 to 2047; FD: 0 to 1023. Chosen: 0 to 2047",
+        note="loaded into goal_torque at power-up",
     ),
     _row("angular_resolution", high=128, note="multiplies the angle of a count"),
     _row("homing_offset", sign_bit=15, low=-4095, high=4095, note="sign at bit 15, where STS and SMS have bit 11"),
     _row(
         "operating_mode", high=4,
         choices={0: "position", 1: "velocity", 2: "constant current", 3: "PWM", 4: "not documented"},
-        note="other numbers than on STS; FD allows 0 to 4, the HLS table describes 0 to 3",
+        conflict="FD: 0 to 4; the HLS table: 0 to 3. Chosen: 4 may be written, and nobody knows what it does",
+        note="other numbers than on STS",
     ),
     _setting("current_p", 34, note="current loop; on STS this address is the protective torque"),
     _setting("current_i", 35, note="current loop; on STS this address is the overload time"),
@@ -93,7 +95,8 @@ _SETTINGS = (
 _COMMANDS = (
     _row(
         "torque_enable", high=2, choices={0: "off", 1: "on", 2: "damped"}, source=_ALL,
-        note="FD allows 0 to 254; the position is set by the instruction 0x0B and not by 128",
+        conflict="FD: 0 to 254; the HLS table: 0 to 2. Chosen: 0 to 2",
+        note="the position is set by the instruction 0x0B and not by 128",
     ),
     _row("acceleration", note="0 means the maximum; HLS table: 8.7 °/s² for each unit, which is 100 counts/s²"),
     _row(
@@ -104,14 +107,18 @@ _COMMANDS = (
         name="goal_torque", address=44, size=2, access=Access.READ_WRITE, storage=Storage.RAM,
         coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-2047, high=2047, unit="A", scale=AMPERE,
         effect=Effect.MOTION, source=_ALL,
+        conflict="FD: -2048 to 2047; the HLS table: -2047 to 2047. Chosen: -2047 to 2047",
         note="in position and velocity mode the greatest current, so never 0 there; in constant current mode the "
-        "goal; loaded from protection_current at power-up. FD: -2048 to 2047",
+        "goal; loaded from protection_current at power-up",
     ),
     _row(
         "goal_velocity", scale=_VELOCITY, source=f"{MANUAL}, example 4; {_ALL}",
         note="50 counts/s (0.732 rpm) for each unit whatever phase says; 0 means standstill",
     ),
-    _row("torque_limit", note="loaded from max_torque at power-up; FD gives it a sign bit, and no negative range"),
+    _row(
+        "torque_limit", conflict="FD: a sign bit, and no negative range; the HLS table: none. Chosen: none",
+        note="loaded from max_torque at power-up",
+    ),
     _live("live_p", 50, "position_p"),
     _live("live_d", 51, "position_d"),
     _live("live_i", 52, "position_i"),

@@ -21,6 +21,7 @@ from motorbus.families.feetech.table.codes import ALARM_BITS_OF, rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
 from motorbus.families.feetech.table.sources import (
     FD,
+    HEADERS,
     HLS_TABLE,
     LEROBOT,
     SCS_TABLE,
@@ -38,6 +39,7 @@ _TIME: Final = 0.04
 _BOTH = f"{FD}; {SCS_TABLE}"
 _ALL = f"{_BOTH}; {SDK_SCS}"
 _ARC = "the arc of a count depends on the model"
+_DELAY = "the SCS table: in 2 µs, shipped 0; FD: reserved, and 250. Chosen: the SCS table"
 _SHIPPED = {
     "firmware_major": 0, "model_major": 5, "byte_order": 1, "return_delay": 0, "max_temperature": 80,
     "min_position_limit": 20, "max_position_limit": 1003, "max_voltage": 90, "min_voltage": 45,
@@ -73,19 +75,21 @@ _UNSIGNED = {"coding": Coding.UNSIGNED, "sign_bit": None, "low": 0}
 _SETTINGS = (
     _row(
         "byte_order", source=f"{HLS_TABLE}; {SMS_PAGE}",
-        note="called END by the vendor; 0 is documented for STS, SMS and HLS, 1 on SCS is an assumption",
+        conflict="0 is documented for STS, SMS and HLS; nothing has been published for SCS. Chosen: 1, big",
+        note="called END by the vendor",
     ),
-    _row("id", note=f"{STS['id'].note}; some SCS tables print 0 as shipped"),
+    _row("id", conflict="servos ship with 1; some SCS tables print 0 as shipped. Chosen: 1"),
     _row(
         "baud_rate", high=10, choices=rates("scs"), source=_ALL,
-        note="SCS servos ship with 1000000 or 500000 bit/s, by model; FD allows 0 to 10",
+        conflict="FD: 0 to 10; the SDK: 0 to 7; public headers: 0 to 11. Chosen: 0 to 10",
+        note="SCS servos ship with 1000000 or 500000 bit/s, by model",
     ),
-    _row("return_delay", source=SCS_TABLE, note="SCS table: in 2 µs; FD: reserved, and 250"),
+    _row("return_delay", source=SCS_TABLE, conflict=_DELAY),
     *(
         _position(
             name, **_UNSIGNED, high=1023, effect=Effect.MOTION,
-            note="both limits 0 make a motor of it, which goal_time then drives; FD gives it a sign at bit 15, chosen: "
-            f"none; {_ARC}",
+            conflict="FD: sign at bit 15; the SCS table: none. Chosen: none",
+            note=f"both limits 0 make a motor of it, which goal_time then drives; {_ARC}",
         )
         for name in ("min_position_limit", "max_position_limit")
     ),
@@ -93,12 +97,13 @@ _SETTINGS = (
     _row("phase", bits=PHASE_BITS["scs"], source=f"{SPECIAL_SCS}; {_BOTH}"),
     _row("unload_mask", bits=ALARM_BITS_OF["scs"]),
     _row("led_mask", bits=ALARM_BITS_OF["scs"]),
-    _row("position_i", source=SCS_TABLE, note="in the SCS table and not in FD"),
+    _row("position_i", source=SCS_TABLE, conflict="the SCS table: at 23; FD has none. Chosen: the SCS table"),
     _row("min_start_force", size=2, high=1000),
     *(_position(name) for name in ("dead_band_cw", "dead_band_ccw")),
     changed(
         _position("dead_band_cw"), name="hysteresis", address=28, high=254, source=SCS_TABLE,
-        note="in the SCS table and not in FD; rustypot has it at 27, which is the dead band",
+        conflict="the SCS table: at 28; rustypot: at 27, which is the dead band; FD has none. Chosen: the SCS table",
+        note="",
     ),
     _row("protective_torque", address=37),
     _row("overload_time", address=38, scale=_TIME, note="in 40 ms, where other series have 10 ms"),
@@ -113,8 +118,10 @@ _COMMANDS = (
     _position("goal_position", **_UNSIGNED, high=1023, source=_ALL),
     _row(
         "goal_time", source=_ALL,
+        conflict="FD: sign at bit 10 for the time too, so that one of 1024 ms and more reads as a negative number; the "
+        "SCS table: for the duty alone. Chosen: FD",
         note="position mode: the time of the way in ms, heeded when the velocity is 0; motor mode: duty in 0.1 %, sign "
-        "at bit 10. FD has that sign for the time too, so a time of 1024 ms and more reads as a negative number",
+        "at bit 10",
     ),
     _position(
         "goal_velocity", **_UNSIGNED, source=_ALL,
@@ -134,7 +141,8 @@ _FEEDBACK = (
     _row("hardware_error", bits=ALARM_BITS_OF["scs"]),
     _row(
         "present_current", unit="", scale=1.0, source=SDK_SCS,
-        note="the SDK has it, FD's map does not: it may mean nothing, and no unit is published",
+        conflict="the SDK: at 69; FD has none. Chosen: it is offered, and may mean nothing",
+        note="no unit is published",
     ),
 )  # fmt: skip
 
@@ -171,12 +179,12 @@ SCS: Final = _ROWS.derive(
 _SECOND = borrowed(
     SCS, source=FD, order="big", defaults={"firmware_major": 3, "model_major": 9, "byte_order": 1}
 )
-_UNPUBLISHED = "laid out as in the SCS map; not in FD's map of SCS2"
+_UNPUBLISHED = "FD's map of SCS2 has no such register. Chosen: as in the SCS map"
 
 
 def _scs2(name: str, **differences: object) -> Entry:
     """The row as SCS has it, with what is said of it there."""
-    return changed(_SECOND[name], **{"note": SCS[name].note, **differences})
+    return changed(_SECOND[name], **{"note": SCS[name].note, "conflict": SCS[name].conflict, **differences})
 
 
 SCS2: Final = _SECOND.derive(
@@ -190,31 +198,29 @@ SCS2: Final = _SECOND.derive(
             *("present_position", "present_velocity"),
         )
     ),
-    _scs2("baud_rate", high=7, choices=rates("scs2"), note="FD allows 0 to 7"),
+    _scs2("baud_rate", high=7, choices=rates("scs2"), conflict=HEADERS, note=""),
     _scs2(
         "goal_time",
-        note="motor mode: duty in 0.1 %, sign at bit 10, which is all that FD has it for; position mode: the time of "
-        "the way in ms, heeded when the velocity is 0, is taken from SCS",
+        conflict="FD: the duty alone; the SCS table: in position mode the time. Chosen: both, as on SCS",
+        note="motor mode: duty in 0.1 %, sign at bit 10; position mode: the time of the way in ms, heeded when the "
+        "velocity is 0",
     ),
-    _scs2("return_delay", source=SCS_TABLE, note=f"FD: reserved; {_UNPUBLISHED}"),
-    _scs2("hysteresis", source=SCS_TABLE, note=_UNPUBLISHED),
+    _scs2("return_delay", source=SCS_TABLE, conflict=_DELAY),
+    _scs2("hysteresis", source=SCS_TABLE, conflict=_UNPUBLISHED),
     changed(
         STS["overcurrent_time"], address=31, order="big", scale=_TIME, default=None, source=FD,
         note="taken to be in 40 ms as the other protection time of SCS",
     ),
     changed(
-        STS["protection_current"], address=32, order="big", default=None, source=FD,
+        STS["protection_current"], address=32, order="big", default=None, source=FD, conflict="",
         note="the unit is that of other maps",
     ),
     changed(
         STS["homing_offset"], address=34, order="big", size=1, sign_bit=7, low=-127, high=127, scale=SCS_COUNT,
-        source=FD, note=f"one byte, sign at bit 7; {_ARC}",
+        source=FD, conflict="", note=f"one byte, sign at bit 7; {_ARC}",
     ),
-    _scs2("present_current", unit="A", scale=AMPERE, note="the unit is that of other maps"),
-    *(
-        _scs2(row.name, source=LEROBOT, note="; ".join(filter(None, (row.note, _UNPUBLISHED))))
-        for row in _FACTORY
-    ),
+    _scs2("present_current", unit="A", scale=AMPERE, conflict="", note="the unit is that of other maps"),
+    *(_scs2(row.name, source=LEROBOT, conflict=_UNPUBLISHED) for row in _FACTORY),
     without=("position_i",),
     title="SCS servos of the second kind (SCSXX-2), firmware 3.20 to 3.39, big-endian",
 )  # fmt: skip

@@ -40,9 +40,10 @@ def _smbl(name: str, **differences: object) -> Entry:
     return changed(_ROWS[name], **differences)
 
 
+_BIT_4 = "bit 4 is the angle limit on an STS3215; nothing confirms that for SMS. Chosen: as on STS"
 _NAMED_BY_SDK = (
     *("model_major", "model_minor", "status_return_level", "max_temperature", "max_voltage", "min_voltage"),
-    *("max_torque", "led_mask", "dead_band_cw", "dead_band_ccw", "protection_current", "present_load"),
+    *("max_torque", "dead_band_cw", "dead_band_ccw", "protection_current", "present_load"),
     *("present_voltage", "present_temperature", "moving"),
 )
 """Rows that need no other word than that the SDK header, in one of its editions, names the register, as FD does."""
@@ -54,8 +55,9 @@ SMBL: Final = _ROWS.derive(
     _smbl("id", source=f"{MANUAL}, example 3; {_BOTH}"),
     _smbl(
         "baud_rate", high=11, default=4, choices=rates("smbl"), source=f"{FD}; {SMS_PAGE}",
-        note="SMS servos ship with 115200 bit/s; lerobot and rustypot name other rates for 5 to 7 "
-        "and are wrong there",
+        conflict="FD: 5 to 7 are 76800, 57600 and 38400 bit/s; lerobot and rustypot name other rates, and are wrong. "
+        "Chosen: FD",
+        note="SMS servos ship with 115200 bit/s",
     ),
     _smbl(
         "return_delay", default=250, source=f"{FD}; {SMS_PAGE}",
@@ -66,13 +68,15 @@ SMBL: Final = _ROWS.derive(
         for name in ("min_position_limit", "max_position_limit")
     ),
     *(_smbl(name, source=_BOTH) for name in _NAMED_BY_SDK),
+    _smbl("led_mask", source=_BOTH, conflict=_BIT_4),
+    *(_smbl(name, conflict=_BIT_4) for name in ("unload_mask", "hardware_error")),
     _smbl("phase", bits=PHASE_BITS["smbl"], note=f"{STS['phase'].note}; bits {_LIKE_STS}"),
     _smbl(
         "integral_limit", source=f"{FD}; {HLS_TABLE}",
-        note="the greatest integral is 4 times this, 0 is none; lerobot takes it for the high byte of "
-        "min_start_force",
+        conflict="FD: the integral limit; lerobot: the high byte of min_start_force. Chosen: FD",
+        note="the greatest integral is 4 times this, 0 is none",
     ),
-    _smbl("min_start_force", note="FD: one byte, 0 to 254; lerobot: two bytes. Chosen: one byte"),
+    _smbl("min_start_force", conflict="FD: one byte, 0 to 254; lerobot: two bytes. Chosen: one byte"),
     _smbl("angular_resolution", high=128, note="multiplies the angle of a count"),
     _smbl(
         "homing_offset", source=_BOTH,
@@ -94,7 +98,8 @@ SMBL: Final = _ROWS.derive(
     ),
     _smbl(
         "goal_time", source=f"{MANUAL}, example 4; {FD}",
-        note="FD calls it goal PWM: duty in 0.1 % in PWM mode; the manual writes a time there",
+        conflict="FD: the duty in 0.1 % in PWM mode; the manual: a time. Chosen: each in its mode",
+        note="FD calls it goal PWM",
     ),
     _smbl(
         "goal_velocity", source=f"{MANUAL}, example 4; {_BOTH}",
@@ -112,8 +117,8 @@ SMBL: Final = _ROWS.derive(
     ),
     _smbl(
         "goal_position_echo", source=f"{HLS_TABLE}; {LEROBOT}",
-        note="laid out as in the STS map, where it is in doubt too: documented for HLS, and lerobot names address 71 "
-        "instead, so do not rely on it",
+        conflict="the HLS table: here, for HLS; lerobot: at 71. Chosen: here, not to be relied on",
+        note="laid out as in the STS map, where it is in doubt too",
     ),
     _smbl("present_current", source=_BOTH, note="supply side on STS; always 0 there when bit 5 of phase is set"),
     *(_smbl(name, source=LEROBOT, note=STS[name].note) for name in _FACTORY),
@@ -158,7 +163,7 @@ SMCL: Final = _OLD.derive(
     _smcl("id", source=f"{MANUAL}, example 3; {FD}"),
     _smcl(
         "baud_rate", high=7, choices=rates("smcl"), source=f"{FD}; {SMS_PAGE}",
-        note="SMS servos ship with 115200 bit/s; FD allows 0 to 254, the SDK names 0 to 7. Chosen: 0 to 7",
+        conflict="FD: 0 to 254; the SDK: 0 to 7. Chosen: 0 to 7", note="SMS servos ship with 115200 bit/s",
     ),
     _smcl("max_torque", effect=Effect.TORQUE, note="of the stall torque; there is no torque limit beside it"),
     _smcl("return_delay", source=f"{FD}; {SMS_PAGE}", note=SMBL["return_delay"].note),
@@ -166,36 +171,41 @@ SMCL: Final = _OLD.derive(
     _smcl("min_start_force", size=2, high=1000, source=f"{FD}; {SDK_SMSCL}"),
     _smcl(
         "protection_current", source=f"{FD}; {SDK_SMSCL}",
-        note="older SDK headers have it at 36 and 37; FD has it at 28 for all of firmware 1. Chosen: 28",
+        conflict="older SDK headers: at 36 and 37; FD: at 28 for all of firmware 1. Chosen: 28",
     ),
     _smcl(
         "homing_offset", source=f"{FD}; {SDK_SMSCL}",
-        note="FD's English file puts the sign at bit 15, so do old SDKs; its Chinese file and newer SDKs at "
-        "bit 11. Chosen: bit 11",
+        conflict="FD's English file and old SDKs: sign at bit 15; its Chinese file and newer SDKs: at bit 11. Chosen: "
+        "bit 11",
     ),
     _smcl(
         "operating_mode", high=2, choices={0: "position", 1: "velocity", 2: "PWM"},
         source=f"{FD}; {SDK_SMSCL}",
     ),
+    *(_smcl(name, conflict=_BIT_4) for name in ("unload_mask", "led_mask", "hardware_error")),
     *(_smcl(name) for name in ("overcurrent_time", "protective_torque", "overload_time", "overload_torque")),
     _smcl(
         "torque_enable", source=f"{FD}; {SDK_SMSCL}",
         note="128 writes homing_offset; its state after power-up varies",
     ),
-    _smcl("acceleration", note="0 means the maximum; the oldest SDK headers have no such register"),
+    _smcl(
+        "acceleration", conflict="FD: at 41; the oldest SDK headers have no such register. Chosen: FD",
+        note="0 means the maximum",
+    ),
     _smcl(
         "goal_position", source=f"{FD}; {SDK_SMSCL}",
-        note="FD: -32766 to 32766 without a sign bit; the SDK writes the sign at bit 15. Chosen: bit 15",
+        conflict="FD: -32766 to 32766 without a sign bit; the SDK: sign at bit 15. Chosen: bit 15",
     ),
     _smcl(
         "goal_time",
-        note="FD calls it goal PWM: duty in 0.1 % in PWM mode, sign at bit 10; the SDK calls it goal time, and puts "
-        "the sign of a duty at bit 15. Chosen: bit 10",
+        conflict="FD: goal PWM, sign at bit 10; the SDK: goal time, and the sign of a duty at bit 15. Chosen: bit 10",
+        note="duty in 0.1 % in PWM mode",
     ),
     _smcl(
         "goal_velocity", low=0, source=f"{FD}; {SDK_SMSCL}",
-        note="FD: 0 to 32766, no sign; the SDK writes a negative velocity with bit 15. Chosen: it is read so, and "
-        "only 0 and above is written. In counts/s by the SDK's examples",
+        conflict="FD: 0 to 32766, no sign; the SDK: sign at bit 15. Chosen: it is read so, and only 0 and above is "
+        "written",
+        note="in counts/s by the SDK's examples",
     ),
     _smcl(
         "lock", source=f"{FD}; {SDK_SMSCL}",

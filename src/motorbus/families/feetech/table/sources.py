@@ -1,6 +1,6 @@
 """Where the facts of the register maps come from, each named once, so that every row says it in the same words.
 
-Where two of these disagree, the row's note says what each of them has and which one was chosen.
+Where two of these disagree, the row's `conflict` says what each of them has and which one was chosen.
 """
 
 from __future__ import annotations
@@ -22,4 +22,5 @@ SDK_SMSCL: Final = "FEETECH SDK, SMSCL"
 SDK_HLS: Final = "FEETECH SDK, hls.py"
 LEROBOT: Final = "lerobot, motors/feetech/tables.py"
 CLI: Final = "measured by feetech-cli on an STS3215"
+HEADERS: Final = "FD: 0 to 7; public headers: 0 to 11. Chosen: 0 to 7"
 SERVOLAB: Final = "measured by servolab on an STS3215, firmware 3.10"

@@ -1,6 +1,7 @@
 """The STS register map: firmware 3.0 to 3.39, little-endian (STS3215, STS3032, STS3250, HTS, STS..BL).
 
-A note stands where sources disagree, and says what was chosen. The effect of a write is the worst it can do:
+Where sources disagree, `conflict` says who says what, and what was chosen. The effect of a write is the worst it can
+do:
 
 - MOTION: a new goal, and also what gives the present goal another meaning (operating mode, homing offset,
   angular resolution, the direction bits of the phase). A servo that holds may move when one of those is
@@ -45,6 +46,9 @@ AMPERE: Final = 0.0065
 _COMMON = f"{FD}; {SDK}"
 _BOTH = f"{FD}; {V36}"
 
+_ANGLE = "V3.6: bit 4 is the angle limit; newer pages leave it unused. Chosen: V3.6"
+_PERCENTAGE = "FD: 0 to 254; but it is a percentage. Chosen: 0 to 100"
+
 _identity = partial(
     Entry, size=1, access=Access.READ, storage=Storage.EEPROM, high=255, protected=True, source=_COMMON
 )
@@ -78,14 +82,16 @@ _IDENTITY_ROWS = (
     _setting(
         name="baud_rate", address=6, high=7, default=0, effect=Effect.IDENTITY, protected=True,
         source=_COMMON, choices=rates("sts"),
-        note="FD allows 0 to 7 on STS; lerobot and rustypot name other rates for 5 to 7 and are wrong there",
+        conflict="FD: 0 to 7, public headers: 0 to 11; lerobot and rustypot name other rates for 5 to 7 than FD and "
+        "the SDK, and are wrong there. Chosen: FD and the SDK",
     ),
 )  # fmt: skip
 
 _SETTING_ROWS = (
     _setting(
         name="return_delay", address=7, high=254, default=0, unit="s", scale=2e-6, source=V36,
-        note="V3.6: in 2 µs; FD and newer pages: reserved. lerobot says many servos ship with 250 (500 µs)",
+        conflict="V3.6: in 2 µs, shipped 0; FD and newer pages: reserved; lerobot: many servos ship with 250 (500 µs). "
+        "Chosen: V3.6",
     ),
     _setting(
         name="status_return_level", address=8, high=1, default=1, source=_COMMON,
@@ -99,12 +105,13 @@ _SETTING_ROWS = (
     _setting(
         name="max_position_limit", address=11, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, high=4095,
         default=4095, unit="rad", scale=COUNT,
-        note="given as 1 to 4095; 0 is allowed here because both limits 0 mean many turns",
+        conflict="FD and V3.6: 1 to 4095; V3.6 too: both limits 0 mean many turns. Chosen: 0 to 4095",
+        note="both limits 0 mean many turns",
     ),
     _setting(name="max_temperature", address=13, high=100, default=70, unit="°C"),
     _setting(
         name="max_voltage", address=14, high=254, default=80, unit="V", scale=0.1,
-        note="12 V variants ship with other limits (140 was seen)",
+        conflict="V3.6: shipped 80, of 7.4 V servos; 140 was seen on a 12 V one, which nothing confirms. Chosen: 80",
     ),
     _setting(name="min_voltage", address=15, high=254, default=40, unit="V", scale=0.1),
     _setting(
@@ -117,37 +124,41 @@ _SETTING_ROWS = (
         note="never copy it from another servo: a wrong value can leave a permanent voltage alarm",
     ),
     _setting(
-        name="unload_mask", address=19, high=255, default=44, bits=ALARM_BITS,
+        name="unload_mask", address=19, high=255, default=44, bits=ALARM_BITS, conflict=_ANGLE,
         note="which alarms let the torque drop",
     ),
-    _setting(name="led_mask", address=20, high=255, default=47, bits=ALARM_BITS),
+    _setting(name="led_mask", address=20, high=255, default=47, bits=ALARM_BITS, conflict=_ANGLE),
     _setting(name="position_p", address=21, high=254, default=32),
     _setting(name="position_d", address=22, high=254, default=32, note="the order is P, D, I"),
     _setting(name="position_i", address=23, high=254, default=0),
     _setting(
         name="min_start_force", address=24, high=254, default=16, unit="fraction", scale=0.001,
-        note="FD: one byte, 0 to 254; V3.6 and lerobot: two bytes, 0 to 1000. Chosen: one byte",
+        conflict="FD: one byte, 0 to 254; V3.6 and lerobot: two bytes, 0 to 1000. Chosen: one byte",
     ),
     _setting(
         name="integral_limit", address=25, high=254, default=0, source=f"{FD}; {HLS_TABLE}",
-        note="the greatest integral is 4 times this, 0 is none; V3.6 and lerobot take it for the high byte "
-        "of min_start_force",
+        conflict="FD and the HLS table: the integral limit; V3.6 and lerobot: the high byte of min_start_force. "
+        "Chosen: FD",
+        note="the greatest integral is 4 times this, 0 is none",
     ),
     _setting(name="dead_band_cw", address=26, high=32, default=1, unit="rad", scale=COUNT),
     _setting(name="dead_band_ccw", address=27, high=32, default=1, unit="rad", scale=COUNT),
     _setting(
         name="protection_current", address=28, size=2, high=1023, default=500, unit="A", scale=AMPERE,
-        note="FD: 0 to 1023; V3.6: 0 to 511. Chosen: 0 to 1023",
+        conflict="FD: 0 to 1023; V3.6: 0 to 511. Chosen: 0 to 1023",
     ),
     _setting(
         name="angular_resolution", address=30, low=1, high=4, default=1, effect=Effect.MOTION,
-        note="multiplies the angle of a count; FD: 1 to 4, other pages 1 to 3 or 1 to 100. Chosen: 1 to 4",
+        conflict="FD: 1 to 4; other pages: 1 to 3, or 1 to 100. Chosen: 1 to 4",
+        note="multiplies the angle of a count",
     ),
     _setting(
         name="homing_offset", address=31, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=11, low=-2047,
         high=2047, default=0, unit="rad", scale=COUNT, effect=Effect.MOTION, protected=True,
         source=f"{V36}; {LEROBOT}; {CLI}",
-        note="present = (encoder - offset) mod 4096, in position mode only; newest FD: 0 to 8191 unsigned",
+        conflict="V3.6 and lerobot: -2047 to 2047, sign at bit 11, and so it was measured; newest FD: 0 to 8191 "
+        "unsigned. Chosen: bit 11",
+        note="present = (encoder - offset) mod 4096, in position mode only",
     ),
     _setting(
         name="operating_mode", address=33, high=3, default=0, effect=Effect.MOTION,
@@ -156,12 +167,12 @@ _SETTING_ROWS = (
     ),
     _setting(
         name="protective_torque", address=34, high=100, default=20, unit="fraction", scale=0.01,
-        note="what is left of the torque after an overload; a percentage, though FD allows up to 254",
+        conflict=_PERCENTAGE, note="what is left of the torque after an overload",
     ),
     _setting(name="overload_time", address=35, high=254, default=200, unit="s", scale=0.01),
     _setting(
         name="overload_torque", address=36, high=100, default=80, unit="fraction", scale=0.01,
-        note="a percentage, though FD allows up to 254",
+        conflict=_PERCENTAGE,
     ),
     _setting(name="velocity_p", address=37, high=254, default=10, note="velocity mode"),
     _setting(name="overcurrent_time", address=38, high=254, default=200, unit="s", scale=0.01),
@@ -176,13 +187,15 @@ _COMMAND_ROWS = (
         name="torque_enable", address=40, size=1, high=128, default=0, effect=Effect.TORQUE,
         choices={0: "off", 1: "on", 2: "damped (not every firmware)", 128: "call the present position 2048"},
         source=f"{_COMMON}; {V36}; {CLI}",
+        conflict="V3.6: off after power-up; users report servos that hold. Chosen: off as the default, and always read",
         note="128 writes homing_offset; writing goal_position turns it on by itself; its state after "
         "power-up varies",
     ),
     _command(
         name="acceleration", address=41, size=1, high=254, default=0, unit="rad/s²", scale=100 * COUNT,
         source=f"{_COMMON}; {V36}; {SERVOLAB}",
-        note="0 means the maximum; 104 to 105 counts/s² for each unit were measured on firmware 3.10",
+        conflict="V3.6: 100 counts/s² for each unit; servolab measured 104 to 105 on firmware 3.10. Chosen: 100",
+        note="0 means the maximum",
     ),
     _command(
         name="goal_position", address=42, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32766,
@@ -194,8 +207,9 @@ _COMMAND_ROWS = (
     _command(
         name="goal_time", address=44, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=10, low=-1000, high=1000,
         default=0, effect=Effect.MOTION, source=f"{MANUAL}, example 4; {FD}; {SERVOLAB}",
+        conflict="FD, and servolab by measuring: sign at bit 10; V3.6 and lerobot: at bit 11. Chosen: bit 10",
         note="position mode: ms, and only some firmware heeds it; PWM mode: duty in 0.1 %, positive turns "
-        "towards smaller angles. V3.6 and lerobot put the sign at bit 11; chosen: bit 10",
+        "towards smaller angles",
     ),
     _command(
         name="goal_velocity", address=46, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32766,
@@ -213,7 +227,8 @@ _COMMAND_ROWS = (
         name="lock", address=55, size=1, high=1, default=1, effect=Effect.PERSISTENT,
         choices={0: "open: writes to EEPROM persist", 1: "closed: they are lost at power-off"},
         source=f"{_COMMON}; {V36}; {CLI}",
-        note="shipped 0 by V3.6, 1 by FD and on current servos; a locked write still changes the live value",
+        conflict="V3.6: shipped 0; FD, and current servos: 1. Chosen: 1",
+        note="a locked write still changes the live value",
     ),
 )  # fmt: skip
 
@@ -239,7 +254,7 @@ _FEEDBACK_ROWS = (
     ),
     _feedback(
         name="hardware_error", address=65, size=1, high=255, default=0, bits=ALARM_BITS,
-        source=_BOTH, note="bit 4 by V3.6 and in the masks too; newer pages leave it unused",
+        source=_BOTH, conflict=_ANGLE,
     ),
     _feedback(
         name="moving", address=66, size=1, high=1, bits={0: "moving"},
@@ -248,7 +263,7 @@ _FEEDBACK_ROWS = (
     _feedback(
         name="goal_position_echo", address=67, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32767,
         high=32767, unit="rad", scale=COUNT, source=f"{HLS_TABLE}; {LEROBOT}",
-        note="documented for HLS; lerobot names address 71 instead, so do not rely on it",
+        conflict="the HLS table: here, for HLS; lerobot: at 71. Chosen: here, not to be relied on",
     ),
     _feedback(
         name="present_current", address=69, size=2, coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32767,

@@ -22,7 +22,7 @@ from motorbus.families.kst.simulator.switches import Switches
 from motorbus.families.kst.table import PROFILES, Profile
 
 OPTIONS = (
-    Option("profile", str, "kst", f"which relative of the protocol they speak ({', '.join(PROFILES)})"),
+    Option("profile", str, "kst", "which relative of the protocol they speak", tuple(PROFILES)),
     *switches_of(Switches),
 )
 """What a bus string may say of a simulated KST bus beside ids."""

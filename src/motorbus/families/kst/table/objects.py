@@ -2,7 +2,7 @@
 
 `KST` is the KST CAN protocol manual and nothing else. The later tables are that table plus differences, and each
 difference names the public driver it was read from: those are programs that drive real servos, not vendor
-documents. A note stands where sources disagree, and says what was chosen.
+documents. Where sources disagree, `conflict` says who says what, and what was chosen.
 
 Every write of the manual uses specifier 0x22, which does not tell the length of the value; the sizes of its rows
 come from the replies it prints, those of the others from what the drivers send.
@@ -52,14 +52,14 @@ _version = partial(
 _MANUAL_ROWS = (
     _version(
         name="firmware_version", address=0x100A, source=f"{MANUAL}, command 8",
-        note="four letters, the first in the lowest byte; CiA 301 has text of any length here, sent in segments, so "
-        "newer firmware may do that; some firmware has its version in 0x100B",
+        conflict="the manual: four letters; CiA 301: text of any length, sent in segments. Chosen: four letters",
+        note="the first letter in the lowest byte; newer firmware may do as CiA 301; some has its version in 0x100B",
     ),
     _kept(
         name="store", address=0x1010, subindex=1, size=4, access=Access.WRITE, high=0xFFFFFFFF, protected=True,
         choices={SAVE: "save"}, source=f"{MANUAL}, command 3; CiA 301, object 1010h",
-        note="the manual says that it is not answered, CiA 301 demands an answer: one that comes is accepted. Keeps "
-        "node id and bit rate (and travel limits and function bits), never the goal position",
+        conflict="the manual: it is not answered; CiA 301 demands an answer. Chosen: one that comes is accepted",
+        note="keeps node id and bit rate (and travel limits and function bits), never the goal position",
     ),
     _kept(
         name="node_id", address=0x3000, low=1, high=127, default=DEFAULT_NODE, effect=Effect.IDENTITY,
@@ -75,8 +75,8 @@ _MANUAL_ROWS = (
     _angle(
         name="present_position", address=0x6002, access=Access.READ, storage=Storage.RAM, low=-900, high=900,
         source=f"{MANUAL}, command 6",
-        note="command 7 of the manual reads the status by this very frame and answers alike; four public drivers "
-        "read it at 0x6005, so the manual's is taken for a slip and this object for the position",
+        conflict="the manual, command 7: the status, by this very frame and with an answer alike; four public drivers "
+        "read that at 0x6005. Chosen: the position, as in command 6",
     ),
     _angle(
         name="goal_position", address=0x6003, access=Access.READ_WRITE, storage=Storage.RAM, low=-900, high=900,
@@ -89,7 +89,7 @@ _MANUAL_ROWS = (
 _LATER_ROWS = (
     _version(
         name="software_version", address=0x100B, source=DEMO,
-        note="the manual has the version in 0x100A: ask both",
+        conflict="the manual: the version is in 0x100A; the demo driver: here. Chosen: both are asked",
     ),
     Entry(
         name="report_interval", address=0x2200, subindex=0, size=1, access=Access.WRITE, storage=Storage.RAM,
@@ -120,8 +120,8 @@ _LATER_ROWS = (
     Entry(
         name="status", address=0x6005, subindex=0, size=4, access=Access.READ, storage=Storage.RAM,
         high=0xFFFFFFFF, source=f"{FLIGHT}; {DEMO}",
-        note="bytes 0 and 1 current (0.01 A, unsigned), byte 2 temperature (°C, signed), byte 3 unused; not in the "
-        "manual, which reads a status at 0x6002",
+        conflict="the manual reads a status at 0x6002; four public drivers here. Chosen: here",
+        note="bytes 0 and 1 current (0.01 A, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
 )  # fmt: skip
 
@@ -156,12 +156,13 @@ XQPOWER: Final = KST_EXT.derive(
     changed(
         KST_EXT["mid_point"],
         source=XQPOWER_DRIVER,
-        note="makes the present position the zero, and is then to be saved; the module writes 1 without a length, the "
-        "tools four bytes with it",
+        conflict="the PX4 module: writes 1 without a length; the tools: four bytes with it. Chosen: the tools",
+        note="makes the present position the zero, and is then to be saved",
     ),
     changed(
         KST_EXT["status"],
         source=XQPOWER_DRIVER,
+        conflict="",
         note="bytes 0 and 1 current (1 mA, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
     *_reaching(KST, 800, pi / 3240, f"{XQPOWER_DRIVER} (18 counts per degree, by test on hardware)"),

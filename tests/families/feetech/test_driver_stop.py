@@ -1,0 +1,194 @@
+"""Standing still on demand: what each mode is told, by the mode of this moment, and who is better left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from motorbus.core.operation import Pause, Rank
+from motorbus.errors import RequestError, VerificationFailed
+from motorbus.families.feetech import Servo
+from motorbus.families.feetech.driver import Node, Promise, move, stop
+from motorbus.families.feetech.table import CONTROL, TABLES, Mode
+from tests.families.feetech.driver_script import (
+    Line,
+    Played,
+    low_high,
+    play,
+    prepared,
+    prepares,
+    reads,
+    unheard,
+    watch,
+    writes,
+)
+from tests.families.feetech.maps import simulated
+
+IS_ON = reads(3, 40, 1)
+
+
+def stands(raw: int) -> Line:
+    return reads(3, 56, *low_high(raw))
+
+
+def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
+    wish = stop(prepared())
+    played = watch(wish, prepares(), stands(777), writes(3, 42, *low_high(777)))
+    assert played.exchanges[2].rank is Rank.CONTROL
+    hold = play(stop(prepared()), prepares(), stands(777), writes(3, 42, *low_high(777)))
+    assert hold is Promise.HOLD_ACCEPTED
+    assert "not verified" in Promise.HOLD_ACCEPTED.value
+
+
+def test_stop_is_not_refused_for_standing_outside_the_limits_with_torque() -> None:
+    played = Played([prepares(at_12=0), stands(900), IS_ON, writes(3, 42, *low_high(900))])
+    assert played.run(stop(prepared(at_12=0))) is Promise.OUTSIDE_ACCEPTED
+    (goal,) = played.exchanges[3].goals
+    assert goal.low == goal.value == goal.high
+    assert "only torque off ends that" in Promise.OUTSIDE_ACCEPTED.value
+
+
+@pytest.mark.parametrize("switch", [0, 2])
+def test_stop_leaves_a_limp_servo_outside_its_limits_alone(switch: int) -> None:
+    told = play(stop(prepared(at_12=0)), prepares(at_12=0), stands(900), reads(3, 40, switch))
+    assert told is Promise.LIMP
+    assert "nothing was sent" in Promise.LIMP.value
+
+
+def test_stop_leaves_a_limp_servo_alone_whose_turn_nobody_knows() -> None:
+    turns = prepares(at_11=0, at_12=0)
+    assert play(stop(Node(3)), turns, stands(900), reads(3, 40, 0)) is Promise.LIMP
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "line", "promise"),
+    [
+        (0, 1, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
+        (3, 1, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
+        (1, 2, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+    ],
+)
+def test_stop_goes_by_the_mode_of_this_moment(before: int, now: int, line: Line, promise: Promise) -> None:
+    assert play(stop(prepared(at_33=before)), prepares(at_33=now), line) is promise
+
+
+def test_what_was_a_goal_is_no_step() -> None:
+    for order in (stop(prepared()), move(prepared(), 1.0)):
+        with pytest.raises(RequestError, match="step"):
+            play(order, prepares(at_33=3))
+
+
+@pytest.mark.parametrize(
+    ("mode", "line", "promise"),
+    [
+        (1, writes(3, 46, 0, 0), Promise.ZERO_VELOCITY_ACCEPTED),
+        (2, writes(3, 44, 0, 0), Promise.ZERO_DUTY_ACCEPTED),
+    ],
+)
+def test_stop_in_other_modes_says_what_it_promises(mode: int, line: Line, promise: Promise) -> None:
+    assert play(stop(prepared(at_33=mode)), prepares(at_33=mode), line) is promise
+
+
+@pytest.mark.parametrize(("mode", "message"), [(3, "step mode"), (9, "operating mode 9")])
+def test_stop_where_nothing_is_known_to_stop_it_names_the_way_out(mode: int, message: str) -> None:
+    with pytest.raises(RequestError, match=message) as caught:
+        play(stop(prepared(at_33=mode)), prepares(at_33=mode))
+    assert "disable_torque()" in caught.value.advice
+
+
+def test_a_stop_that_got_lost_where_no_acknowledgement_is_due_is_said_again_from_where_it_is_then() -> None:
+    def said(raw: int, found: int) -> list[Line]:
+        goal = low_high(raw)
+        return [stands(raw), unheard(writes(3, 42, *goal)), reads(3, 42, *low_high(found))]
+
+    asked = prepares(at_8=0)
+    told = play(stop(Node(3)), asked, *said(700, 3000), *said(800, 3000), *said(900, 900))
+    assert told is Promise.HOLD_ACCEPTED
+    with pytest.raises(VerificationFailed):
+        play(stop(Node(3)), asked, *said(700, 3000) * 3)
+    zero = [
+        unheard(writes(3, 46, 0, 0)),
+        reads(3, 46, 9, 0),
+        unheard(writes(3, 46, 0, 0)),
+        reads(3, 46, 0, 0),
+    ]
+    assert play(stop(Node(3)), prepares(at_8=0, at_33=1), *zero) is Promise.ZERO_VELOCITY_ACCEPTED
+
+
+def test_stop_of_a_new_servo_asks_it_first() -> None:
+    play(stop(Node(3)), prepares(), stands(0), writes(3, 42, 0, 0))
+
+
+# -- simulated servos ----------------------------------------------------------------------------------------
+
+
+def later(servo: Any, seconds: float) -> None:
+    servo.bus.run(iter(Pause(seconds)))
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_limp_servo_outside_its_limits_stays_where_it_is_and_limp(name: str) -> None:
+    with simulated(name) as (real, servo):
+        count = TABLES[name]["goal_position"].scale
+        servo.write(min_position_limit=300 * count, max_position_limit=600 * count)
+        real.raw_position = 100
+        assert servo.stop() is Promise.LIMP
+        later(servo, 2.0)
+        assert (real.raw_position, real.memory["torque_enable"]) == (100, 0)
+        servo.enable_torque(jump=400 * count)
+        assert servo.stop() in (Promise.OUTSIDE_ACCEPTED, Promise.HOLD_ACCEPTED)
+        later(servo, 2.0)
+        assert 100 <= real.raw_position <= 300
+
+
+@pytest.mark.parametrize("name", ["sts", "smbl", "hls"])
+def test_so_does_one_that_was_turned_out_of_its_turn(name: str) -> None:
+    with simulated(name) as (real, servo):
+        real.memory["phase"] |= 1 << 4
+        real.raw_position = 6015
+        assert servo.stop() is Promise.LIMP
+        later(servo, 2.0)
+        assert (real.raw_position, real.memory["torque_enable"]) == (6015, 0)
+
+
+CHANGES = [
+    (name, before, now)
+    for name in TABLES
+    for before in CONTROL[name].has
+    for now in CONTROL[name].has
+    if before is not now and CONTROL[name].modes and Mode.PWM not in (before, now)
+]
+
+
+@pytest.mark.parametrize(("name", "before", "now"), CHANGES, ids=lambda value: getattr(value, "value", value))
+def test_another_object_has_changed_the_mode_since(name: str, before: Mode, now: Mode) -> None:
+    """Nothing that was an order in the mode before is given, and a stop does what it promises."""
+    with simulated(name) as (real, servo):
+        servo.set_mode(before)
+        servo.prepare()
+        other = Servo(servo.bus, 3)
+        other.set_mode(now)
+        other.enable_torque()
+        stood = real.motion.position(servo.bus.link.now())
+        orders: dict[Mode, Callable[[], object]] = {
+            Mode.POSITION: lambda: servo.move(1.0),
+            Mode.STEP: lambda: servo.step(1.0),
+            Mode.VELOCITY: lambda: servo.set_velocity(1.0),
+            Mode.CURRENT: lambda: servo.set_current(1.0),
+        }
+        with pytest.raises(RequestError, match=f"in operating mode {now.value}"):
+            orders[before]()
+        later(servo, 1.0)
+        assert real.motion.position(servo.bus.link.now()) == pytest.approx(stood, abs=1)
+        if now is Mode.VELOCITY:
+            other.set_velocity(1.0)
+            later(servo, 0.5)
+        if now is not Mode.STEP:
+            servo.prepare()
+            assert servo.settings is not None
+            servo.settings = servo.settings._replace(mode=before)
+            servo.stop()
+            later(servo, 1.0)
+            assert not real.motion.moving(servo.bus.link.now())
