@@ -9,6 +9,7 @@ made (`scripts/proof.py`). `python -m scripts.coverage` writes the page, with `-
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,6 +35,7 @@ class Command(NamedTuple):
     `answers`  whether a device answers; if not, `changes` names what it changes
     `restarts` what it changes shows after a power cycle
     `map`      the register map of the simulated device; the first when left out
+    `later`    what is said where there is no API or no command of the shell yet
     """
 
     name: str
@@ -47,6 +49,7 @@ class Command(NamedTuple):
     changes: str = ""
     restarts: bool = False
     map: str = ""
+    later: str = ""
 
 
 class Unsent(NamedTuple):
@@ -87,7 +90,10 @@ class Object(NamedTuple):
 
 
 class Coverage(NamedTuple):
-    """One family: what there is of its manual. `maps` holds the options of the simulator for each register map."""
+    """One family: what there is of its manual. `maps` holds the options of the simulator for each register map.
+
+    `alike` says of rows that are not listed to which of those that are they are alike.
+    """
 
     family: Family
     title: str
@@ -97,6 +103,7 @@ class Coverage(NamedTuple):
     objects: tuple[Object, ...]
     maps: Mapping[str, Mapping[str, str]]
     unsent: tuple[Unsent, ...] = ()
+    alike: str = ""
 
     def settings(self, map_: str) -> dict[str, object]:
         """What a bus of these devices must be told."""
@@ -118,13 +125,22 @@ def load(name: str) -> Coverage:
     unsent = tuple(_unsent(one) for one in told.get("unsent", ()))
     cells: list[Command | Object] = [*commands, *objects]
     for one in cells:
-        if not (one.api and one.cli and all(tests_of(one))):
+        reached = (one.api and one.cli) or (isinstance(one, Command) and one.later)
+        if not (reached and all(tests_of(one))):
             raise ValueError(f"{name}: a cell of {_name(one)} is empty")
     for no in unsent:
         if not all(no[: len(no) - len(Unsent._field_defaults)]):
             raise ValueError(f"{name}: a cell of {no.name} is empty")
     return Coverage(
-        family, told["title"], told["device"], told["ids"], commands, objects, told["maps"], unsent
+        family,
+        told["title"],
+        told["device"],
+        told["ids"],
+        commands,
+        objects,
+        told["maps"],
+        unsent,
+        told.get("alike", {}).get("because", ""),
     )
 
 
@@ -142,20 +158,26 @@ def _unsent(told: Mapping[str, Any]) -> Unsent:
 
 def _objects(family: Family, told: Mapping[str, Any]) -> Iterator[Object]:
     rows: dict[str, list[str]] = {}
+    alike = told.get("alike", {}).get("rows", "")
     for table_name in told["maps"]:  # of a map without a simulator nothing can be claimed
         for name in family.tables[table_name]:
-            rows.setdefault(name, []).append(table_name)
+            if not (alike and re.fullmatch(alike, name)):
+                rows.setdefault(name, []).append(table_name)
     strangers = set(told.get("object", {})) - set(rows)
     if strangers:
         raise ValueError(f"no table has {', '.join(sorted(strangers))}")
     for name, maps in rows.items():
-        yield _object([family.tables[map_][name] for map_ in maps], tuple(maps), told)
+        written = hasattr(family.devices.blocking, "write")
+        yield _object([family.tables[map_][name] for map_ in maps], tuple(maps), told, written=written)
 
 
-def _object(rows: Sequence[Entry], maps: tuple[str, ...], told: Mapping[str, Any]) -> Object:
+def _object(
+    rows: Sequence[Entry], maps: tuple[str, ...], told: Mapping[str, Any], *, written: bool = True
+) -> Object:
+    """What there is of a row; `written` says whether devices of this family are written by name."""
     row = rows[0]
     own = told.get("object", {}).get(row.name, {})
-    plain = row.writable and not row.protected
+    plain = row.writable and not row.protected and written
     verbs = [verb for verb, can in (("read", row.readable), ("write", plain)) if can]
     api = [f"{told['device']}.{verb}" for verb in verbs] + own.get("api", [])
     cli = [
@@ -229,6 +251,7 @@ def _section(name: str) -> str:
             *_never_sent(told, frames),
             "\n### Objects\n",
             *_left_out(told),
+            *([f"{told.alike}\n"] if told.alike else []),
             "| object | address | maps | access | API | shell | simulator | decoder | test |",
             "|---|---|---|---|---|---|---|---|---|",
             *objects,
@@ -276,8 +299,8 @@ def _command_row(one: Command, frames: Mapping[str, str]) -> str:
         one.name,
         one.manual,
         sent,
-        _code(one.api),
-        _shell(one.cli),
+        _code(one.api) or one.later,
+        _shell(one.cli) or one.later,
         simulator,
         "explains",
         _test(one.test),

@@ -69,7 +69,8 @@ def by_name(device: Device, row: Entry) -> Proof:
         told = [record.data for record in records if record.direction == "rx"]
         good = bool(asked) and bool(told) and not faults(bus.family, told)
         before = [record.data for record in met][: -len(records)]
-        return Proof("answers" if good else "", named(bus.family, asked, row.name, before))
+        decoder = named(bus.family, asked, row.name, before) or labelled(bus.family, told, row.name)
+        return Proof("answers" if good else "", decoder)
 
 
 def _read_and_written(one: Any, row: Entry) -> None:
@@ -136,6 +137,16 @@ def named(family: Family, frames: Iterable[Data], name: str, before: Iterable[Da
     good = [one for one in explained if not one.fault]
     found = any(re.search(rf"\b{name}\b", part.meaning) for one in good for part in one.parts)
     return "names it" if found else ""
+
+
+def labelled(family: Family, frames: Iterable[Data], name: str) -> str:
+    """The same where a request names no row and its reply brings many: a part of the reply that is called so."""
+    good = [one for data in frames for one in family.explain(_flat(data)) if not one.fault]
+    return (
+        "names it"
+        if any(part.name == name and len(one.parts) > 9 for one in good for part in one.parts)
+        else ""
+    )
 
 
 def _flat(data: Data) -> bytes:

@@ -16,7 +16,8 @@ from motorbus.cli import build, parse
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("changelog.d/*.md")])
 WITHOUT_HARDWARE = re.compile(
-    r"(feetech|kst):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$|^motorbus feetech (registers|models)"
+    r"(feetech|kst|stepper):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$"
+    r"|^motorbus feetech (registers|models)|^motorbus stepper \w+ \S+\.toml$"
 )
 
 

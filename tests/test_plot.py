@@ -87,3 +87,57 @@ def test_no_global_state_is_touched(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, str(tmp_path / "x.png")]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert ended.stdout == "False\n"
+
+
+# --- a program over time -------------------------------------------------------------------------------------------
+
+CURVES = {"position (mm)": [0.0, 5.0, 5.0], "speed (rpm)": [0.0, 60.0, 0.0]}
+LANES = {"gripper": [False, True, True], "lamp": [True, True, False]}
+SPANS = [plot.Span(0.0, 0.5, "1"), plot.Span(0.5, 1.0, "wait", waiting=True)]
+
+
+def test_a_sequence_names_curves_lanes_and_spans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    plot.sequence(tmp_path / "p.svg", TIMES, CURVES, LANES, SPANS, title="Feed", remark="predicted")
+    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
+    for word in (*CURVES, *LANES, "wait", "Feed", "predicted", "time (s)"):
+        assert word in text
+
+
+def test_a_sequence_is_a_png_of_its_height(tmp_path: Path) -> None:
+    for name, lanes in (("few", {}), ("many", {f"input {n}": [True] * 3 for n in range(5)})):
+        plot.sequence(tmp_path / f"{name}.png", TIMES, CURVES, lanes)
+    few, many = ((tmp_path / f"{name}.png").read_bytes() for name in ("few", "many"))
+    assert few.startswith(b"\x89PNG\r\n\x1a\n")
+    assert int.from_bytes(few[20:24], "big") < int.from_bytes(many[20:24], "big")
+
+
+def test_one_sample_of_a_sequence_is_enough(tmp_path: Path) -> None:
+    plot.sequence(tmp_path / "one.png", [0.0], {"x": [1.0]}, {"on": [True]})
+    assert (tmp_path / "one.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(("curves", "lanes"), [({}, LANES), ({"x": [1.0]}, {}), (CURVES, {"on": [True]})])
+def test_a_sequence_that_does_not_fit_together_is_refused(
+    tmp_path: Path, curves: dict[str, list[float]], lanes: dict[str, list[bool]]
+) -> None:
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.sequence(tmp_path / "x.png", TIMES, curves, lanes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_program_is_drawn_as_its_file_names_things(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    from motorbus.families.stepper import Program
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    program = Program.load(str(Path(__file__).parent.parent / "examples" / "pick_and_place.toml"))
+    picture = program.picture(wait=1.5)
+    spans = [plot.Span(*span) for span in picture.spans]
+    plot.sequence(tmp_path / "p.svg", picture.times, picture.curves, picture.lanes, spans, title=program.name)
+    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
+    for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "wait", "Pick and place"):
+        assert word in text

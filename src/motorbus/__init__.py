@@ -36,7 +36,7 @@ from motorbus.errors import (
 )
 
 if TYPE_CHECKING:
-    from motorbus.families import feetech, kst
+    from motorbus.families import feetech, kst, stepper
     from motorbus.session import open, open_async, simulate
 
 __version__ = "0.1.0"
@@ -66,6 +66,7 @@ __all__ = [
     "open",
     "open_async",
     "simulate",
+    "stepper",
 ]
 
 _LAZY = {"open": "motorbus.session", "open_async": "motorbus.session", "simulate": "motorbus.session"}

@@ -5,12 +5,12 @@ It draws with the Agg canvas and no global state, so it needs no display and dis
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 _INK: Final = "#24292f"
@@ -56,20 +56,105 @@ def trajectory(
     figure.savefig(path)
 
 
+class Span(NamedTuple):
+    """A stretch of time with a name; a `waiting` one is nobody's doing and as long as somebody likes."""
+
+    begin: float
+    end: float
+    name: str
+    waiting: bool = False
+
+
+def sequence(
+    path: Path | str,
+    times: Sequence[float],
+    curves: Mapping[str, Sequence[float]],
+    lanes: Mapping[str, Sequence[bool]],
+    spans: Sequence[Span] = (),
+    *,
+    title: str = "",
+    remark: str = "",
+) -> None:
+    """Draw what a program does over time: a panel for each curve, what is on or off as lanes, its steps as spans.
+
+    `times` in s, and each curve (its name is the label of its axis, unit and all) and lane has one value for each. The
+    suffix of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data do not fit together and
+    MotorbusError when matplotlib is not installed.
+    """
+    columns = [*curves.values(), *lanes.values()]
+    if not curves or any(len(column) != len(times) for column in columns):
+        raise RequestError(
+            "the data do not fit together",
+            expected="at least one curve, and one value in each curve and lane for each time",
+        )
+    heights = [*([3.0] * len(curves)), *([0.5 + 0.3 * len(lanes)] if lanes else [])]
+    figure, axes = _figure(title, remark, heights, height=2.0 + 0.65 * sum(heights), pad=16)
+    for axis, (name, values) in zip(axes, curves.items(), strict=False):
+        axis.plot(times, values, color=_COLOURS[0], linewidth=1.6)
+        axis.axhline(0, color=_FAINT, linewidth=0.8)
+        axis.set_ylabel(name, fontsize=10, color=_INK)
+        axis.margins(y=0.12)
+    if lanes:
+        _draw_lanes(axes[-1], times, lanes)
+    _draw_spans(axes, spans)
+    axes[-1].set_xlabel("time (s)", fontsize=10, color=_INK)
+    if len(times) > 1:
+        axes[-1].set_xlim(times[0], times[-1])
+    figure.align_ylabels()
+    figure.savefig(path)
+
+
+def _draw_lanes(axes: Any, times: Sequence[float], lanes: Mapping[str, Sequence[bool]]) -> None:
+    for row, values in enumerate(lanes.values()):
+        base, top = -row - 0.35, -row + 0.35
+        axes.hlines(base, times[0], times[-1], color=_GRID, linewidth=0.8)
+        levels = [top if value else base for value in values]
+        colour = _COLOURS[1 + row % (len(_COLOURS) - 1)]
+        axes.fill_between(times, base, levels, color=colour, alpha=0.75, linewidth=0)
+    axes.set_yticks([-row for row in range(len(lanes))], list(lanes))
+    axes.set_ylim(0.6 - len(lanes), 0.6)
+    axes.grid(visible=False, axis="y")
+    axes.tick_params(axis="y", length=0)
+
+
+def _draw_spans(axes: Sequence[Any], spans: Sequence[Span]) -> None:
+    whole = max((span.end for span in spans), default=0.0)
+    for number, span in enumerate(spans):
+        for axis in axes:
+            if span.waiting:
+                axis.axvspan(span.begin, span.end, facecolor="#fff3d6", edgecolor="none", zorder=0)
+            elif number % 2:
+                axis.axvspan(span.begin, span.end, facecolor="#f3f5f7", edgecolor="none", zorder=0)
+        if span.end - span.begin > whole / 60:  # else its name would lie upon the next one
+            axes[0].text(
+                (span.begin + span.end) / 2, 1.0, span.name, transform=axes[0].get_xaxis_transform(),
+                ha="center", va="bottom", fontsize=7.5, color=_FAINT,
+            )  # fmt: skip
+
+
 def _sheet(title: str, simulated: bool) -> tuple[Any, Any]:
+    return _figure(title, "simulated" if simulated else "", [3, 1], height=5.2)
+
+
+def _figure(
+    title: str, remark: str, heights: Sequence[float], height: float, pad: int = 12
+) -> tuple[Any, Any]:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as missing:
         raise MotorbusError(_MISSING, advice="pip install 'motorbus[plot]'") from missing
-    figure = Figure(figsize=(9.0, 5.2), dpi=160, layout="constrained", facecolor="white")
+    figure = Figure(figsize=(9.0, height), dpi=160, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1]})
+    axes = figure.subplots(
+        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+    )
+    axes = axes[:, 0]
     for one in axes:
         _style(one)
-    axes[0].set_title(title, loc="left", fontsize=13, fontweight="bold", color=_INK, pad=12)
-    if simulated:
-        axes[0].set_title("simulated", loc="right", fontsize=11, fontstyle="italic", color=_FAINT, pad=12)
+    axes[0].set_title(title, loc="left", fontsize=13, fontweight="bold", color=_INK, pad=pad)
+    if remark:
+        axes[0].set_title(remark, loc="right", fontsize=11, fontstyle="italic", color=_FAINT, pad=pad)
     return figure, axes
 
 

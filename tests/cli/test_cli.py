@@ -20,7 +20,7 @@ from tests.cli.conftest import Run
 
 APP = build()
 COMMANDS = [name for name in APP if not name.startswith("-")]
-OF_ONE_FAMILY = ("feetech", "kst")
+OF_ONE_FAMILY = ("feetech", "kst", "stepper")
 FAMILY_COMMANDS = [
     (family, name) for family in OF_ONE_FAMILY for name in APP[family] if not name.startswith("-")
 ]
@@ -37,7 +37,7 @@ def examples(words: tuple[str, ...]) -> list[str]:
 
 
 EXAMPLES = sorted({line for words in ALL for line in examples(words)})
-SIMULATED = [line for line in EXAMPLES if re.search(r"(feetech|kst):sim", line) and " > " not in line]
+SIMULATED = [line for line in EXAMPLES if re.search(r"(feetech|kst|stepper):sim", line) and " > " not in line]
 
 
 def arguments(line: str) -> list[str]:

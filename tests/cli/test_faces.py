@@ -6,7 +6,7 @@ from motorbus.cli import faces
 
 
 def test_a_face_is_a_module_of_the_familys_name() -> None:
-    assert faces.names() == ["feetech", "kst"]
+    assert faces.names() == ["feetech", "kst", "stepper"]
 
 
 def test_what_a_face_offers() -> None:

@@ -1,5 +1,7 @@
 """Runs each test once for every family or subject it suits, and each test of vectors once for every vector.
 
+Of subjects there are also `shared`, on whose line are several devices, and `writer`, whose devices are written by name.
+
 A test asks by name: `family`, where no device matters; `subject`, a family with simulated devices of one kind, of which
 it may have several. And some subjects: `lockable`, whose EEPROM has a lock; `mover`, whose devices move; `limp`,
 whose devices can be let go; `reporter`, whose devices say something unasked; `reporting_mover`, whose devices report a
@@ -14,7 +16,7 @@ from collections.abc import Callable
 import pytest
 
 from motorbus.core.family import Family
-from tests.conformance.subjects import FAMILIES, SUBJECTS, Vector, tables_of, vectors
+from tests.conformance.subjects import FAMILIES, SUBJECTS, Line, Vector, line_of, tables_of, vectors
 from tests.conformance.world import has, has_torque_switch, locks, moves, plain, reports
 
 
@@ -26,13 +28,17 @@ def _is_request(vector: Vector) -> bool:
     return vector.direction == "instruction"
 
 
-VECTORS: dict[str, Callable[[Vector], bool]] = {
-    "vector": lambda vector: True,
-    "reply": _is_reply,
-    "request_": _is_request,
-    "bad": lambda vector: not vector.valid,
+VECTORS: dict[str, Callable[[Vector, Line], bool]] = {
+    "vector": lambda vector, line: True,
+    "reply": lambda vector, line: _is_reply(vector),
+    "checked_reply": lambda vector, line: _is_reply(vector) and line.checksum,
+    "request_": lambda vector, line: _is_request(vector),
+    "bad": lambda vector, line: not vector.valid and (line.checksum or vector.direction == "status"),
 }
-"""Which vectors a test gets that asks by this name."""
+"""Which vectors a test gets that asks by this name.
+
+Without a checksum in replies a bad request may begin like a good reply, and no receiver can know better.
+"""
 SUITS: dict[str, Callable[[Family], object]] = {
     "lockable": locks,
     "mover": moves,
@@ -40,6 +46,8 @@ SUITS: dict[str, Callable[[Family], object]] = {
     "limp": has_torque_switch,
     "reporting_mover": lambda family: moves(family) and reports(family) and not has(family, "start_reports"),
     "plain_one": lambda subject: any(plain(table) for table in tables_of(subject)),
+    "shared": lambda subject: line_of(subject).devices != 1,
+    "writer": lambda subject: line_of(subject).writes,
     "subject": bool,
 }
 """Which subjects a test gets that asks by this name."""
@@ -58,10 +66,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             metafunc.parametrize(name, suitable.values(), ids=suitable)
 
 
-def _vectors(wanted: Callable[[Vector], bool]) -> list[object]:
+def _vectors(wanted: Callable[[Vector, Line], bool]) -> list[object]:
     return [
         pytest.param(family, vector, id=f"{name}-{vector.id}")
         for name, family in FAMILIES.items()
         for vector in vectors(name)
-        if wanted(vector)
+        if wanted(vector, line_of(family))
     ]

@@ -62,6 +62,42 @@ PACKAGES: dict[str, str] = {name: package for name, (_, package) in _FOUND.items
 """The package that each comes from."""
 
 
+class Line(NamedTuple):
+    """What is peculiar to the line of a family, as [line] of tests/coverage/FAMILY.toml says; else it is as here.
+
+    `devices`   how many a line can hold; 0: as many as there are ids
+    `probes`    how many probes there are whose replies differ
+    `checksum`  whether a damaged reply can be told by itself; where not, its exchange judges what it is told
+    `writes`    whether its devices are written by name
+    """
+
+    devices: int = 0
+    probes: int = 16
+    checksum: bool = True
+    writes: bool = True
+
+
+def _line(name: str) -> Line:
+    file = KINDS / f"{name}.toml"
+    told = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    return Line(**told.get("line", {}))
+
+
+LINES: dict[str, Line] = {name: _line(name) for name in FAMILIES}
+"""By the name of the family."""
+
+
+def line_of(family: Family) -> Line:
+    """What is peculiar to the line of this family."""
+    return LINES[family.name]
+
+
+def possible(family: Family, ids: tuple[int, ...]) -> tuple[int, ...]:
+    """These ids, or where a line holds fewer devices than that, theirs, which count from 1."""
+    most = line_of(family).devices
+    return tuple(range(1, most + 1)) if most and len(ids) >= most else ids
+
+
 class Kind:
     """A family in all things, whose simulated devices are of one kind: `options` of its simulator say which.
 

@@ -31,7 +31,8 @@ def said_unasked(family: Family) -> list[Data]:
     return [
         vector.data
         for vector in vectors(family.name)
-        if any(isinstance(event, Notice) for event in family.receiver().feed(vector.data))
+        if vector.direction == "status"
+        and any(isinstance(event, Notice) for event in family.receiver().feed(vector.data))
     ]
 
 
@@ -42,7 +43,12 @@ def test_notices_disturb_nothing(reporter: Family) -> None:
         for line.notices in ([], said_unasked(reporter)):
             device = there.device(NODE)
             with sent(there.bus) as frames:
-                values = [device.ping(), device.identify(), device.read(), there.bus.run(reporter.scan(IDS))]
+                values = [
+                    device.ping(),
+                    device.identify(),
+                    device.read(),
+                    there.bus.run(reporter.scan(there.ids)),
+                ]
             looked.append((values, frames))
         assert line.fired
         assert looked[0] == looked[1]
@@ -58,7 +64,7 @@ def test_a_notice_names_its_node_and_reaches_who_listens(reporter: Family) -> No
         there.link.advance(0.1)
         assert there.device(NODE).ping() is True
         assert list(heard)[: len(expected)] == expected
-    assert {notice.node for notice in expected} <= set(IDS)
+    assert {notice.node for notice in expected} <= set(there.ids)
 
 
 def test_who_listens_in_vain_goes_on_in_time(reporter: Family) -> None:

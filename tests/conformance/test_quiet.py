@@ -13,6 +13,7 @@ from motorbus.bus.trace import TraceRecord
 from motorbus.core.family import Family, Found
 from motorbus.core.operation import Effect, Exchange, Operation, Progress, Runnable, Together
 from motorbus.errors import NoReply
+from tests.conformance.subjects import possible
 from tests.conformance.world import IDS, Cut, Steps, World, has, said, sent, world
 
 NODE = IDS[0]
@@ -23,7 +24,7 @@ def looks(there: World) -> dict[str, Runnable[Any]]:
     """Everything that only looks, not yet begun."""
     device = there.device(NODE)
     found: dict[str, Runnable[Any]] = {verb: said(device, verb) for verb in LOOKS if has(there.family, verb)}
-    found |= {"scan": there.family.scan(IDS), "scan of all": there.family.scan()}
+    found |= {"scan": there.family.scan(there.ids), "scan of all": there.family.scan()}
     found |= {"identify by family": there.family.identify(NODE), "probe": there.family.probe(NODE, 0)}
     test = there.family.echo_test()
     return found | ({"echo test": test} if test is not None else {})
@@ -54,24 +55,33 @@ def is_group(exchange: Exchange[Any]) -> bool:
 
 def test_identify_says_what_is_there(subject: Family) -> None:
     with world(subject) as there:
-        for node in IDS:
+        for node in there.ids:
             identity = there.bus.run(subject.identify(node))
             assert identity.node == node
             assert identity.model
             assert identity.firmware
             assert identity.table in subject.tables
             assert there.device(node).identify() == identity
+
+
+def test_who_is_not_there_is_silent(shared: Family) -> None:
+    with world(shared) as there:
         with pytest.raises(NoReply) as raised:
-            there.bus.run(subject.identify(9))
+            there.bus.run(shared.identify(9))
         assert raised.value.node == 9
+        assert there.device(9).ping() is False
 
 
 def test_ping_says_who_is_there(subject: Family) -> None:
     with world(subject) as there:
-        there.simulator.nodes[IDS[1]].unplug()
-        assert [there.device(node).ping() for node in (*IDS, 9)] == [True, False, True, False]
-        there.simulator.nodes[IDS[1]].plug()
-        assert there.device(IDS[1]).ping() is True
+        for gone in there.ids:
+            there.simulator.nodes[gone].unplug()
+            assert [there.device(node).ping() for node in there.ids] == [node != gone for node in there.ids]
+            with pytest.raises(NoReply) as raised:
+                there.bus.run(subject.identify(gone))
+            assert raised.value.node == gone
+            there.simulator.nodes[gone].plug()
+            assert there.device(gone).ping() is True
 
 
 @pytest.mark.parametrize("ids", [IDS, (2, 5, 9), (7,)], ids=str)
@@ -79,23 +89,30 @@ def test_ping_says_who_is_there(subject: Family) -> None:
 def test_a_scan_finds_exactly_who_is_there(
     subject: Family, ids: tuple[int, ...], asked: tuple[int, ...]
 ) -> None:
-    with world(subject, ids=ids) as there:
-        found = there.bus.run(subject.scan(asked))
-        assert sorted(one.node for one in found) == list(ids)
+    with world(subject, ids=possible(subject, ids)) as there:
+        found = there.bus.run(subject.scan(possible(subject, asked)))
+        assert sorted(one.node for one in found) == list(there.ids)
         assert {one.rate for one in found} == {subject.link.rate}
         for one in found:
             assert one.identity == there.bus.run(subject.identify(one.node))
 
 
-def test_a_scan_finds_nobody_where_nobody_is(subject: Family) -> None:
-    with world(subject, ids=(20,)) as there:
-        assert there.bus.run(subject.scan(IDS)) == []
-        assert there.bus.run(subject.scan((20,)))
+def test_a_scan_finds_nobody_where_nobody_is(shared: Family) -> None:
+    with world(shared, ids=(20,)) as there:
+        assert there.bus.run(shared.scan(IDS)) == []
+        assert there.bus.run(shared.scan((20,)))
 
 
-def test_a_scan_tells_early(subject: Family) -> None:
+def test_a_scan_finds_nobody_where_all_are_gone(subject: Family) -> None:
+    with world(subject) as there:
+        for node in there.ids:
+            there.simulator.nodes[node].unplug()
+        assert there.bus.run(subject.scan(there.ids)) == []
+
+
+def test_a_scan_tells_early(shared: Family) -> None:
     """The first that is found is reported while others have still to be asked; what is found last, before the end."""
-    with world(subject, ids=(1, 2, 19)) as there, sent(there.bus) as frames:
+    with world(shared, ids=(1, 2, 19)) as there, sent(there.bus) as frames:
         when: list[tuple[Found, int]] = []
         watch = there.bus.trace.subscribe(limit=1_000_000)
         left = 0
@@ -107,7 +124,7 @@ def test_a_scan_tells_early(subject: Family) -> None:
             if isinstance(event, Found):
                 when.append((event, left))
 
-        found = there.bus.run(subject.scan(tuple(range(1, 20))), report)
+        found = there.bus.run(shared.scan(tuple(range(1, 20))), report)
     assert {(one.node, one.rate) for one, _ in when} == {(one.node, one.rate) for one in found}
     assert when[0][1] < when[-1][1] < len(frames)
     progress = [event for event in there.events if isinstance(event, Progress)]
@@ -118,18 +135,18 @@ def test_a_scan_tells_early(subject: Family) -> None:
 def test_a_scan_finds_at_each_rate_who_is_there(subject: Family) -> None:
     with world(subject) as there:
         rates = subject.link.rates
-        found = there.bus.run(subject.scan(IDS, rates))
-        assert {(one.node, one.rate) for one in found} == {(node, subject.link.rate) for node in IDS}
+        found = there.bus.run(subject.scan(there.ids, rates))
+        assert {(one.node, one.rate) for one in found} == {(node, subject.link.rate) for node in there.ids}
         assert there.device(NODE).ping() is True
 
 
 def test_a_scan_leaves_the_rate_as_it_was(subject: Family) -> None:
     usual, other = subject.link.rate, subject.link.rates[-1]
     with world(subject, rate=other) as there:
-        found = there.bus.run(subject.scan(IDS, (usual,)))
-        assert {(one.node, one.rate) for one in found} == {(node, usual) for node in IDS}
+        found = there.bus.run(subject.scan(there.ids, (usual,)))
+        assert {(one.node, one.rate) for one in found} == {(node, usual) for node in there.ids}
         assert (there.bus.rate, there.link.rate) == (other, other)
-        assert bool(there.bus.run(subject.scan(IDS))) == (usual == other)
+        assert bool(there.bus.run(subject.scan(there.ids))) == (usual == other)
 
 
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
@@ -139,7 +156,7 @@ def test_a_scan_that_is_cut_leaves_the_rate_as_it_was(subject: Family, before: b
         with world(subject) as there:
             steps = Steps(there.bus, cut_at=number, before=before)
             with suppress(Cut):
-                steps.run(subject.scan(IDS, subject.link.rates))
+                steps.run(subject.scan(there.ids, subject.link.rates))
             assert (there.bus.rate, there.link.rate) == (subject.link.rate, subject.link.rate)
             number, cuts = number + 7, steps.cuts
 
@@ -152,14 +169,14 @@ def test_looking_is_the_same_blocking_and_async(subject: Family) -> None:
             await device.ping(),
             await device.identify(),
             await device.read(),
-            await bus.run(subject.scan(IDS)),
+            await bus.run(subject.scan(there.ids)),
         ]
         await bus.close()
         return found
 
     with world(subject) as there:
         device = there.device(NODE)
-        found = [device.ping(), device.identify(), device.read(), there.bus.run(subject.scan(IDS))]
+        found = [device.ping(), device.identify(), device.read(), there.bus.run(subject.scan(there.ids))]
         assert asyncio.run(looked(there)) == found
 
 
@@ -178,20 +195,20 @@ def test_the_same_said_is_the_same_heard(subject: Family) -> None:
 
 def test_what_a_simulated_node_says_of_itself_is_plain_data(subject: Family) -> None:
     with world(subject) as there:
-        for node in IDS:
+        for node in there.ids:
             status = there.simulator.nodes[node].status()
             assert json.loads(json.dumps(status)) == status
 
 
 def test_nodes_that_go_and_come_are_noticed(subject: Family) -> None:
     def everyone() -> Operation[list[bool]]:
-        return (yield from Together([said(there.device(node), "ping") for node in IDS]))
+        return (yield from Together([said(there.device(node), "ping") for node in there.ids]))
 
     with world(subject) as there:
-        assert there.bus.run(everyone()) == [True] * len(IDS)
-        for node in IDS:
+        assert there.bus.run(everyone()) == [True] * len(there.ids)
+        for node in there.ids:
             there.simulator.nodes[node].unplug()
-        assert there.bus.run(everyone()) == [False] * len(IDS)
-        for node in IDS:
+        assert there.bus.run(everyone()) == [False] * len(there.ids)
+        for node in there.ids:
             there.simulator.nodes[node].plug()
-        assert there.bus.run(everyone()) == [True] * len(IDS)
+        assert there.bus.run(everyone()) == [True] * len(there.ids)

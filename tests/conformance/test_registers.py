@@ -29,7 +29,7 @@ def wrong_after(there: World, row: Entry, raw: int) -> str:
 
 def test_every_readable_row_reads_as_it_is(subject: Family) -> None:
     with world(subject) as there:
-        for node in IDS:
+        for node in there.ids:
             table = there.table(node)
             names = [row.name for row in table.values() if row.readable]
             values = there.device(node).read(*names)
@@ -56,20 +56,20 @@ def test_every_plain_row_takes_values_up_to_both_ends(plain_one: Family) -> None
             )
 
 
-def test_every_kept_row_takes_values_up_to_both_ends_and_outlives_a_power_cut(subject: Family) -> None:
-    with world(subject) as there:
+def test_every_kept_row_takes_values_up_to_both_ends_and_outlives_a_power_cut(writer: Family) -> None:
+    with world(writer) as there:
         rows = kept(there.table(NODE))
-    assert rows or not [row for row in subject.tables.values() if "lock" in row]
+    assert rows or not [row for row in writer.tables.values() if "lock" in row]
     for row in rows:
         for raw in samples(row):
-            with world(subject) as there:
+            with world(writer) as there:
                 assert wrong_after(there, row, raw) == "", row.name
                 there.simulator.nodes[NODE].power_cycle()
                 assert there.memory(NODE)[row.name] == raw, row.name
 
 
-def test_what_is_not_kept_is_as_shipped_after_a_power_cut(subject: Family) -> None:
-    with world(subject) as there:
+def test_what_is_not_kept_is_as_shipped_after_a_power_cut(writer: Family) -> None:
+    with world(writer) as there:
         rows = [row for row in plain(there.table(NODE)) if row.storage is Storage.RAM]
         before = {row.name: there.memory(NODE)[row.name] for row in rows}
         for row in rows:
@@ -78,8 +78,8 @@ def test_what_is_not_kept_is_as_shipped_after_a_power_cut(subject: Family) -> No
         assert {row.name: there.memory(NODE)[row.name] for row in rows} == before
 
 
-def test_writing_one_node_changes_no_other(subject: Family) -> None:
-    with world(subject) as there:
+def test_writing_one_node_changes_no_other(writer: Family) -> None:
+    with world(writer) as there:
         others = {node: settings for node, settings in there.settings().items() if node != NODE}
         for row in (*plain(there.table(NODE)), *kept(there.table(NODE))):
             write(there, row, samples(row)[-1])
@@ -96,23 +96,23 @@ def refused(there: World, name: str, value: float) -> None:
     assert (frames, there.settings()) == ([], before)
 
 
-def test_what_can_only_be_read_refuses_to_be_written(subject: Family) -> None:
-    with world(subject) as there:
+def test_what_can_only_be_read_refuses_to_be_written(writer: Family) -> None:
+    with world(writer) as there:
         rows = [row for row in there.table(NODE).values() if not row.writable]
         assert rows
         for row in rows:
             refused(there, row.name, row.to_value(row.high))
 
 
-def test_what_is_protected_refuses_to_be_written_by_name(subject: Family) -> None:
-    with world(subject) as there:
+def test_what_is_protected_refuses_to_be_written_by_name(writer: Family) -> None:
+    with world(writer) as there:
         for row in there.table(NODE).values():
             if row.protected and row.writable:
                 refused(there, row.name, row.to_value(row.high))
 
 
-def test_what_is_out_of_range_refuses_to_be_written(subject: Family) -> None:
-    with world(subject) as there:
+def test_what_is_out_of_range_refuses_to_be_written(writer: Family) -> None:
+    with world(writer) as there:
         table = there.table(NODE)
         for row in (*plain(table), *kept(table)):
             for raw in (row.low - 1, row.high + 1):
@@ -120,9 +120,14 @@ def test_what_is_out_of_range_refuses_to_be_written(subject: Family) -> None:
             refused(there, row.name, float("nan"))
 
 
-def test_a_name_that_does_not_exist_is_refused(subject: Family) -> None:
-    with world(subject) as there:
+def test_a_name_that_does_not_exist_is_not_written(writer: Family) -> None:
+    with world(writer) as there:
         refused(there, "no_such_row", 1)
+
+
+def test_a_name_that_does_not_exist_is_not_read(subject: Family) -> None:
+    with world(subject) as there:
+        there.device(NODE).identify()
         with sent(there.bus) as frames, pytest.raises(RequestError, match="no_such_row"):
             there.device(NODE).read("no_such_row")
         assert frames == []

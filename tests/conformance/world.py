@@ -19,9 +19,10 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.conformance.subjects import tables_of, vectors
+from tests.conformance.subjects import possible, tables_of, vectors
 
 IDS = (1, 2, 3)
+"""The devices of a world, where a line holds so many; a world knows its `ids`."""
 
 
 class Memory(Protocol):
@@ -43,8 +44,8 @@ class World:
         rate: int = 0,
     ) -> None:
         self.family = family
-        self.ids = ids
-        self.simulator = family.simulator(ids)
+        self.ids = possible(family, ids)
+        self.simulator = family.simulator(self.ids)
         self.link = link(self.simulator, rate=rate or family.link.rate, line=line)
         self.events: list[object] = []
         self.bus = Bus(self.link, family, admit=Gate(), report=self.events.append)
@@ -143,7 +144,8 @@ def switch_on(device: Any) -> None:
 
 def reports(family: Family) -> list[Notice]:
     """What devices of this family are known to say on their own account."""
-    events = [event for vector in vectors(family.name) for event in family.receiver().feed(vector.data)]
+    told = [vector.data for vector in vectors(family.name) if vector.direction == "status"]
+    events = [event for data in told for event in family.receiver().feed(data)]
     return [event for event in events if isinstance(event, Notice)]
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from motorbus.errors import LinkError, PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
+from motorbus.families.stepper import simulator as stepper
 from motorbus.simulation.control import LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import Mount
@@ -66,9 +67,10 @@ def test_power_cycle_of_one_and_of_all() -> None:
 
 
 def test_help_names_every_order() -> None:
-    bus = simulate((1,))
+    bus = stepper.simulate((1,))  # it has inputs, and all else that any other has
     for word in obey(bus, "help").split(" | "):
-        assert not obey(bus, word.replace("[ID]", "").replace("ID", "1")).startswith("error")
+        order = word.replace("[ID]", "").replace("ID", "1").replace("INPUT on|off", "2 on")
+        assert not obey(bus, order).startswith("error")
 
 
 @pytest.mark.parametrize(
@@ -80,6 +82,7 @@ def test_help_names_every_order() -> None:
         ("plug 1 2", "error: the order is: plug ID"),
         ("status now", "error: the order is: status"),
         ("power-cycle 1 2", "error: the order is: power-cycle [ID]"),
+        ("set-input 1 2 on", "error: node 1 has no inputs"),
         ("unplug 9", "error: there is no node 9; there are: 1, 3"),
         ("unplug one", "error: there is no node one"),
     ],

@@ -15,7 +15,7 @@ import atexit
 import contextlib
 import json
 import socket
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
@@ -26,7 +26,7 @@ from motorbus.bus.crank import crank, retune
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.family import Stop
-from motorbus.core.operation import ANY, Answer, Exchange, Timeout, Tune
+from motorbus.core.operation import ANY, Answer, Due, Exchange, Timeout, Tune
 from motorbus.errors import DeviceError, LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
 
@@ -153,7 +153,8 @@ class Stopper:
             for flight in [flight for flight in asking if flight.done]:
                 asking.remove(flight)
                 limit = self._submit(self._following(flight), flights, limit)
-        missing = [flight for flight in flights if not self._settled(flight, acknowledged)]
+        missing = [flight for flight in flights if not self._settled(flight)]
+        acknowledged += _obeyed(flights, missing, acknowledged)
         while _answered(flight.exchange for flight in missing) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
 
@@ -180,16 +181,12 @@ class Stopper:
         air = turns.family.air_time(exchange, turns.rate) + turns.family.turnaround(exchange)
         return air + turns.latency + MARGIN[Timeout.SCAN]
 
-    def _settled(self, flight: Flight, acknowledged: list[int]) -> bool:
+    def _settled(self, flight: Flight) -> bool:
+        """Whether it was answered, by everyone it asks, and not refused."""
         with self.turns.lock:
             if not flight.done:
                 self.turns.abandon(flight)
-        exchange = flight.exchange
-        if flight.error is not None or not _nodes(exchange) or _refused(flight):
-            return False
-        if exchange.effect in GATED:  # what only asks stops nobody
-            acknowledged += [node for node in _nodes(exchange) if node not in acknowledged]
-        return True
+        return flight.error is None and bool(_nodes(flight.exchange)) and not _refused(flight)
 
     # -- the thread -----------------------------------------------------------------------------------------
 
@@ -258,6 +255,22 @@ class Stopper:
 def _nodes(exchange: Exchange[Answer]) -> list[int]:
     """Who acknowledges this."""
     return [] if exchange.replies is ANY else [due.node for due in exchange.replies]
+
+
+def _obeyed(flights: Iterable[Flight], missing: Sequence[Flight], before: Sequence[int]) -> list[int]:
+    """Who has given every kind of reply that stopping it calls for; several frames may call for one and the same.
+
+    A frame that only asks stops nobody.
+    """
+    wanted: dict[int, set[Due]] = {}
+    given: set[Due] = set()
+    for flight in flights:
+        dues = flight.exchange.replies
+        if flight.exchange.effect in GATED and dues is not ANY:
+            given |= set(dues) if flight not in missing else set()
+            for due in dues:
+                wanted.setdefault(due.node, set()).add(due)
+    return [node for node, dues in wanted.items() if dues <= given and node not in before]
 
 
 def _refused(flight: Flight) -> bool:

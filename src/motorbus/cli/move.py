@@ -12,7 +12,7 @@ from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
-from motorbus.cli.target import able, face, opened, takes, target
+from motorbus.cli.target import able, face, offers, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -100,7 +100,8 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
     found: dict[str, Goals] = {}
     for text in texts:
         devices, _, position = text.rpartition("=")
-        bus, _, nodes = target(devices) if "#" in devices else _nowhere(text)
+        bus, family, nodes = target(devices) if "#" in devices else _nowhere(text)
+        offers(family, "move")
         goals = found.setdefault(bus, {})
         if not goals.keys().isdisjoint(nodes):
             raise RequestError(f"{text}: a device is named twice", advice="nothing was sent")

@@ -14,6 +14,7 @@ from cyclopts import App, Parameter
 
 from motorbus import families, session
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -36,10 +37,13 @@ app = App(
 removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
-status, power-cycle [ID], unplug ID, plug ID, help.
+status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off, help.
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
+
+The file of --inputs has one change on each line, as "2.5 1 on": input 1
+turns on 2.5 s after power-on.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
@@ -51,11 +55,31 @@ Examples:
     motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
     motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
+    motorbus simulate stepper --link /tmp/stepper --inputs buttons.txt
     motorbus simulate feetech --switches""",
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
-_OWN = ("ids", "model", "link", "tcp", "socketcand", "can", "pace", "baud", "bitrate", "control", "switch")
+Inputs = Annotated[
+    Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
+]
+Switched = Annotated[
+    tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
+]
+_OWN = (
+    "ids",
+    "model",
+    "link",
+    "tcp",
+    "socketcand",
+    "can",
+    "pace",
+    "baud",
+    "bitrate",
+    "control",
+    "inputs",
+    "switch",
+)
 
 
 class Ways(NamedTuple):
@@ -81,10 +105,9 @@ def simulate(
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
     baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
+    inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
-    switch: Annotated[
-        tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
-    ] = (),
+    switch: Switched = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **flags: Annotated[str, Parameter(help="A switch of the family, as --NAME VALUE.")],
@@ -100,6 +123,7 @@ def simulate(
     usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
     rate = asked or usual
     simulator.tune(rate)
+    _scripted(simulator, inputs, family)
     if usual != found.link.rate and found.link.kind == "bytes":
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
@@ -116,6 +140,17 @@ def simulate(
         output.text(f"ready: {names}  (simulated: {len(nodes)} {family} devices, ids {ids})")
         mount.serve(stop)
     return Exit.OK
+
+
+def _scripted(simulator: object, path: Path | None, family: str) -> None:
+    """Let the inputs change as this file says. Raises RequestError for a bad one, or where there are no inputs."""
+    if path is None:
+        return
+    script = getattr(simulator, "script", None)
+    if script is None:
+        raise RequestError(f"--inputs {path}: simulated {family} devices have no inputs")
+    with usable(path, "read"):
+        script(path.read_bytes().decode(errors="replace"))
 
 
 def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[tuple[Place, str]]:

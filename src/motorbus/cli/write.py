@@ -12,7 +12,7 @@ from motorbus.cli.consent import consent_to, consent_to_ways, goals_among, refus
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
-from motorbus.cli.target import check_names, device, face, opened, table_of
+from motorbus.cli.target import check_names, device, face, offers, opened, table_of
 from motorbus.core.entry import Storage
 from motorbus.core.operation import Effect
 from motorbus.errors import LimitExceeded, RequestError
@@ -81,6 +81,7 @@ def write(
         Any option of the bus string, as a flag.
     """
     bus, family, (node,) = device(device_)
+    offers(family, "write")
     wanted = _wanted(assignments, family, raw)
     with opened(bus, options, output) as opening:
         rehearsal = dry.DryBus(opening)

@@ -154,7 +154,8 @@ class SimulatedNode(Protocol):
 class Simulator(Protocol):
     """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own.
 
-    One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s).
+    One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s). One whose
+    devices have inputs takes what happens there as `script(text)`.
     """
 
     @property

@@ -4,7 +4,7 @@ THE RULE: a family is a folder here, or a package named by an entry point in the
 has four rooms, each a module or a package of that name: `wire` (what the bytes mean), `table` (what can be
 addressed), `driver` (what to say to get a thing done), `simulator` (how a real one behaves). Its `__init__`
 holds `FAMILY`, which fulfils `motorbus.core.family.Family`. `driver` and `simulator` never reach each other.
-Nothing else in motorbus names a family.
+Nothing else in motorbus names a family. A folder here that lacks a room is not finished and passed over.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "motorbus.families"
+ROOMS = frozenset({"wire", "table", "driver", "simulator"})
 
 
 def names() -> list[str]:
@@ -42,7 +43,12 @@ def load(name: str) -> Family:
 
 
 def _inside() -> set[str]:
-    return {module.name for module in iter_modules(__path__) if module.ispkg}
+    return {module.name for module in iter_modules(__path__) if module.ispkg and _is_whole(module.name)}
+
+
+def _is_whole(name: str) -> bool:
+    folders = [f"{path}/{name}" for path in __path__]
+    return {module.name for module in iter_modules(folders)} >= ROOMS
 
 
 def _outside() -> list[EntryPoint]:

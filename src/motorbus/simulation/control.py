@@ -20,7 +20,7 @@ from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 LONGEST_LINE = 4096
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
-HELP = "status | power-cycle [ID] | unplug ID | plug ID | help"
+HELP = "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | help"
 
 
 class ControlSocket:
@@ -135,6 +135,20 @@ def _plug(simulator: Simulator, words: list[str]) -> str:
     return "ok"
 
 
+def _set_input(simulator: Simulator, words: list[str]) -> str:
+    """Of a node that has inputs, and so the method `set_input(number, active)`."""
+    form = "set-input ID INPUT on|off"
+    _expect(words, at_least=3, at_most=3, order=form)
+    node = _node(simulator, words[0])
+    press: Callable[[int, bool], None] | None = getattr(node, "set_input", None)
+    if press is None:
+        raise RequestError(f"node {words[0]} has no inputs")
+    if not words[1].isdecimal() or words[2] not in ("on", "off"):
+        raise RequestError(f"the order is: {form}")
+    press(int(words[1]), words[2] == "on")
+    return "ok"
+
+
 def _help(simulator: Simulator, words: list[str]) -> str:
     return HELP
 
@@ -144,6 +158,7 @@ _ORDERS: dict[str, Callable[[Simulator, list[str]], str]] = {
     "power-cycle": _power_cycle,
     "unplug": _unplug,
     "plug": _plug,
+    "set-input": _set_input,
     "help": _help,
 }
 

@@ -1,0 +1,54 @@
+"""What the commands of this family share: a program from a file of any kind, and how a controller is taken to be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.files import usable
+from motorbus.core.switches import options, switched
+from motorbus.errors import RequestError
+from motorbus.families.stepper import Behaviour, Program
+
+NAME: Final = "stepper"
+LONGEST: Final = 1 << 20
+
+app = App(name=NAME, help="What only stepper controllers can do.", help_epilogue="")
+
+File = Annotated[
+    Path, Parameter(name="FILE", help="A program (.toml), or a dump: 226 or 220 bytes, or in hexadecimal.")
+]
+Readings = Annotated[
+    str,
+    Parameter(
+        help="How a question that the manual leaves open is taken: --ramp pulse, --rounding carry, --seg-loop extra "
+        "and the other switches of the simulator that concern a run."
+    ),
+]
+
+
+def loaded(path: Path) -> Program:
+    """The program in this file. Raises RequestError, with the name of the file, for what cannot be."""
+    is_text = path.suffix.lower() == ".toml"
+    with usable(path, "read"):
+        data = path.read_bytes()
+    if len(data) > LONGEST:
+        raise RequestError(f"{path} has {len(data)} bytes", expected=f"{LONGEST} at most")
+    try:
+        return Program.parse(data.decode()) if is_text else Program.from_dump(data, name=path.stem)
+    except UnicodeDecodeError as error:
+        raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
+    except RequestError as error:
+        error.summary = f"{path}: {error.summary}"
+        raise
+
+
+def reading(said: dict[str, str]) -> Behaviour:
+    """How a controller is taken to be. Raises RequestError for a switch or a value that there is not."""
+    known = {option.name for option in options(Behaviour)}
+    given = {name.replace("-", "_"): value for name, value in said.items()}
+    if unknown := sorted(given.keys() - known):
+        raise RequestError(f"there is no --{unknown[0]}", expected=f"one of {', '.join(sorted(known))}")
+    return switched(Behaviour, NAME, given)

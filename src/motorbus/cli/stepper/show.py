@@ -1,0 +1,103 @@
+"""`motorbus stepper show`: a program step by step, and its picture over time. Opens no port."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
+from motorbus.cli.parameters import Silent
+from motorbus.cli.stepper.files import File, Readings, app, loaded, reading
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from motorbus.families.stepper import Behaviour, Plan, Program
+
+_COLUMNS = (
+    *(">step", ">times", ">units", ">pulses", ">Hz", "shape", ">motion s", ">pause s", "output", "waits for"),
+    "ends at",
+)
+
+
+@app.command(
+    help_epilogue="""The picture shows position, speed, outputs and inputs over time, with an
+operator who takes --wait seconds at each input; the suffix of its name says
+of which kind it is (.png, .svg, .pdf). It needs matplotlib.
+
+Examples:
+
+    motorbus stepper show examples/pick_and_place.toml
+    motorbus stepper show examples/pick_and_place.toml --output feed.svg
+    motorbus stepper show backup/project1.bin --json""",
+)
+def show(
+    file: File,
+    *,
+    output_: Path | None = None,
+    wait: float = 1.0,
+    passes: int = 1,
+    output: Silent,
+    **readings: Readings,
+) -> Exit:
+    """Show what a program does, step by step, and draw it.
+
+    Parameters
+    ----------
+    output_
+        A picture to draw.
+    wait
+        s that an operator takes at each input, in the picture.
+    passes
+        How many passes of an endless program are drawn.
+    """
+    if not 0 <= wait <= 1e6 or passes < 1:
+        raise RequestError("--wait and --passes: that is not possible", expected="0 s or more, 1 or more")
+    how = reading(readings)
+    program = loaded(file)
+    plan = program.plan(how)
+    if output_ is not None:
+        _draw(program, how, output_, wait, passes)
+    facts = {name: value for name, value in plan.data().items() if name != "schema"}
+    output.document("motorbus.stepper.plan/1", {**facts, "picture": str(output_) if output_ else None})
+    output.table(program.name or str(file), _COLUMNS, _rows(plan, program))
+    net = (
+        f"a pass ends {plan.net_units:+d} units from where it began"
+        if plan.net_units
+        else "a pass ends where it began"
+    )
+    output.text(f"{plan.estimate}\n{net}" + (f"\ndrawn: {output_}" if output_ else ""))
+    return Exit.OK
+
+
+def _rows(plan: Plan, program: Program) -> Iterator[tuple[object, ...]]:
+    from motorbus.families.stepper.program.names import input_name, output_name
+
+    for step in plan.steps:
+        output = output_name(step.output, program.outputs) if step.output else ""
+        waits, ends = (
+            input_name(port, program.inputs) if port else "" for port in (step.start_input, step.stop_input)
+        )
+        yield (
+            *(step.number, step.times, step.units, step.sent, f"{step.frequency:.6g}", step.shape),
+            *(f"{step.motion:.3f}", f"{step.delay:g}", output, waits, ends),
+        )
+
+
+def _draw(program: Program, how: Behaviour, path: Path, wait: float, passes: int) -> None:
+    from motorbus import plot
+
+    picture = program.picture(how, wait=wait, passes=passes)
+    spans = [plot.Span(*span) for span in picture.spans]
+    with usable(path, "written"):
+        plot.sequence(
+            path,
+            picture.times,
+            picture.curves,
+            picture.lanes,
+            spans,
+            title=program.name or path.stem,
+            remark="predicted",
+        )

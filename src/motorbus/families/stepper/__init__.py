@@ -1,0 +1,136 @@
+"""A programmable controller for one stepper motor: 27 commands, four stored projects of up to ten steps.
+
+It answers with an acknowledgement, a project dump, the level of one input, and one message of its own: a project that
+was started has ended. There is no position, no state and no error to ask for, so what a host shows while the motor
+turns is a model. That model is `execution`, a pure function; `program` makes it a file that can be checked and timed
+before a motor turns, and `simulator` makes it a device.
+
+    Program      a project as a file, an image or frames: read, checked, timed, planned
+    Conditions   what a project is judged against
+    Behaviour    how a controller carries a project out where nobody knows
+    Controller   what a real one has stored, the level of an input, and an end to whatever it does
+
+`FAMILY` is what the rest of motorbus knows of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, Final
+
+from motorbus.core.entry import Table
+from motorbus.core.family import (
+    Devices,
+    Explanation,
+    Found,
+    Identity,
+    LinkNeeds,
+    Option,
+    Receiver,
+    Simulator,
+    Stop,
+)
+from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.errors import RequestError
+from motorbus.families.stepper import driver, wire
+from motorbus.families.stepper.driver import (
+    AsyncController,
+    Controller,
+    Promise,
+    Sends,
+    line,
+    presence,
+    stopping,
+)
+from motorbus.families.stepper.execution import Behaviour
+from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
+from motorbus.families.stepper.table import RATE, TABLES
+
+__all__ = [
+    "FAMILY",
+    "AsyncController",
+    "Behaviour",
+    "Conditions",
+    "Controller",
+    "Estimate",
+    "Finding",
+    "Plan",
+    "Program",
+    "Promise",
+    "Sends",
+    "Stepper",
+]
+
+_SETTINGS: Final = (
+    Option("motor", int, wire.MOTOR, "the number that motor commands name; the manual knows 3 only"),
+)
+
+
+class Stepper:
+    """The family of the stepper controller; see `motorbus.core.family.Family` for each member. It keeps nothing."""
+
+    name: Final = "stepper"
+    tables: Final[Mapping[str, Table]] = TABLES
+    devices: Final = Devices(Controller, AsyncController)
+
+    def __init__(self, motor: int = wire.MOTOR) -> None:
+        self._motor = motor
+
+    @cached_property
+    def link(self) -> LinkNeeds:
+        from motorbus.families.stepper.simulator import OPTIONS
+
+        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS)
+
+    def configured(self, **settings: object) -> Stepper:
+        for name in settings.keys() - {"motor"}:
+            raise RequestError(f"a stepper bus has no setting {name!r}", expected="motor")
+        return Stepper(driver.checked_motor(settings["motor"])) if settings else self
+
+    def lane(self, node: int) -> int:
+        return 0
+
+    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+        return line.air_time(exchange, rate)
+
+    def turnaround(self, exchange: Exchange[Any]) -> float:
+        return line.turnaround(exchange)
+
+    def quiet_time(self, rate: int) -> float:
+        return line.quiet_time(rate)
+
+    def echo_test(self) -> Exchange[bytes]:
+        return driver.dump_once(driver.Node(motor=self._motor), 1)
+
+    def explain(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.stepper.explain import explain
+
+        return explain(data)
+
+    def receiver(self) -> Receiver:
+        return wire.Receiver()
+
+    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+        return presence.probe(driver.Node(node, self._motor), attempt)
+
+    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+        return stopping.stop_all(nodes, self._motor)
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        return driver.identify(driver.Node(node, self._motor))
+
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+        return driver.scan(ids, rates, self._motor)
+
+    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
+        return {}  # no position to ask for; what moves comes with the verbs that move
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        from motorbus.families.stepper.simulator import simulate
+
+        options.setdefault("motor", self._motor)
+        return simulate(ids, model, **options)
+
+
+FAMILY: Final = Stepper()

@@ -1,0 +1,50 @@
+"""The controller as a user holds it: one list of verbs, blocking on `Controller`, awaitable on `AsyncController`.
+
+It looks and it stops. Verbs that write, run or jog are not here, and absent rather than refused: what a controller
+without status, position and checksum can honestly do of them is another work.
+"""
+
+from __future__ import annotations
+
+from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver import presence, reading, stopping
+from motorbus.families.stepper.driver.node import Node
+
+
+class ControllerVerbs(Node):
+    """What can be said to a controller. Values are in rad, rad/s and s, lengths in the user units of the project.
+
+    Making one costs nothing and sends nothing.
+    """
+
+    ping = verb(presence.ping)
+    identify = verb(presence.identify)
+    read = verb(reading.read)
+    read_raw = verb(reading.read_raw)
+    read_project = verb(reading.read_project)
+    read_input = verb(reading.read_input)
+    dump = verb(reading.dump)
+    stop = verb(stopping.stop)
+
+
+class Controller(ControllerVerbs, Blocking):
+    """The controller of a blocking bus: `Controller(bus).read_project(1)`."""
+
+    def __init__(self, bus: BlockingRunner, node: int = wire.ONLY) -> None:
+        ControllerVerbs.__init__(self, node, _motor(bus))
+        Blocking.__init__(self, bus)
+
+
+class AsyncController(ControllerVerbs, Awaiting):
+    """The controller of an async bus: `await AsyncController(bus).read_project(1)`."""
+
+    def __init__(self, bus: AsyncRunner, node: int = wire.ONLY) -> None:
+        ControllerVerbs.__init__(self, node, _motor(bus))
+        Awaiting.__init__(self, bus)
+
+
+def _motor(bus: object) -> int:
+    """The number of the motor that this bus was opened with."""
+    number: int = getattr(getattr(bus, "family", None), "_motor", wire.MOTOR)
+    return number

@@ -1,0 +1,60 @@
+"""One command as an exchange: checked before it is sent, its reply known to the last byte that can be.
+
+A reply has no checksum. So what is due is worked out beforehand and is the key by which the bus tells replies apart:
+one of another command, project, step or port is not this one's, whatever it may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from motorbus.core.operation import Answer, Due, Exchange, Rank, Timeout
+from motorbus.errors import UnexpectedReply
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.table import ORDERS, check
+
+T = TypeVar("T")
+
+
+def command(
+    node: Node,
+    name: str,
+    read: Callable[[bytes], T],
+    *,
+    rank: Rank = Rank.POLL,
+    timeout: Timeout | None = None,
+    **values: int,
+) -> Exchange[T]:
+    """A command by its name and its numbers; `read` makes a value of the whole reply, once that is the right one.
+
+    Raises RequestError, naming the field and its range, for a number that may not be sent. The exchange raises
+    UnexpectedReply when the reply differs from what is due.
+    """
+    check(name, values)
+    order = ORDERS[name]
+    request = wire.encode(name, motor=node.motor, **values)
+
+    def judged(answer: Answer) -> T:
+        reply = answer.replies[0].data
+        if different := wire.difference(request, reply):
+            raise UnexpectedReply(
+                f"the reply to {name} is not the one that is due: {different}",
+                sent=request,
+                received=reply,
+                cause="a byte was changed on the way, or it answers something else; replies have no checksum",
+                advice="say it again",
+                node=node.node,
+            )
+        return read(reply)
+
+    return Exchange(
+        request,
+        (Due(node.node, wire.key_due(request), wire.reply_length(order.command)),),
+        judged,
+        rank=rank,
+        effect=order.effect,
+        timeout=order.timeout if timeout is None else timeout,
+        repeatable=order.repeatable,
+    )

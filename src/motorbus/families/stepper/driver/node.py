@@ -1,0 +1,66 @@
+"""The one controller of a line, as far as a host can know it: which motor it has, and the map of its projects.
+
+There is no address in its frames, so there is one of them on a line, and it is called 1. The motor's number, which
+does stand in its frames, is another thing: the manual has 3 in all of them.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from motorbus.core.entry import Entry, Table, Value
+from motorbus.errors import RequestError
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.table import TABLE
+
+
+class Node:
+    """The controller of a line. `motor` is the number that motor commands name. Raises RequestError for another id."""
+
+    def __init__(self, node: int = wire.ONLY, motor: int = wire.MOTOR) -> None:
+        self.node: Final = checked_id(node)
+        self.motor: Final = checked_motor(motor)
+
+    @property
+    def alarm(self) -> tuple[str, ...]:
+        """Always empty: the protocol has no word for an error."""
+        return ()
+
+    @property
+    def table(self) -> Table:
+        """The parameters of one project."""
+        return TABLE
+
+    def value(self, row: Entry, raw: int) -> Value:
+        """Raw value of a parameter -> value in the row's unit."""
+        return row.to_value(raw)
+
+    def raw(self, row: Entry, value: Value) -> int:
+        """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
+        return row.to_raw(value)
+
+
+def checked_id(node: int) -> int:
+    """The id of the only controller. Raises RequestError for every other one."""
+    if isinstance(node, int) and not isinstance(node, bool) and node == wire.ONLY:
+        return node
+    raise RequestError(
+        f"{node!r} is not the id of a stepper controller",
+        expected=f"{wire.ONLY}: there is one of them on a line",
+        cause="its frames carry no address",
+        advice="open a line for each of them; nothing was sent",
+    )
+
+
+def checked_motor(number: object) -> int:
+    """The number of a motor, also as text. Raises RequestError for one that no frame can name."""
+    try:
+        found = int(str(number), 0)
+    except ValueError:
+        found = 0
+    if found not in wire.MOTORS:
+        raise RequestError(
+            f"motor={number} is not the number of a motor",
+            expected="1 to 255, not ending in E in hex; the manual knows 3 only",
+        )
+    return found

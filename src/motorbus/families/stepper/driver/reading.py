@@ -1,0 +1,109 @@
+"""What a controller tells: its projects, and the level of an input. Nothing here writes.
+
+A dump has 226 bytes and no checksum. So it is read until two readings are the same, or until of at most five each
+byte has been the same in two, and more often than any other: of a line that changes one byte in a hundred thousand
+that lets one dump in some hundred millions pass wrong. What is beyond that is said to be a bad line, and no value.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+from motorbus.core.entry import Entry, Value
+from motorbus.core.operation import Exchange, Operation, Timeout
+from motorbus.errors import FramingError, RequestError, UnexpectedReply
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.exchanges import command
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.program import Program
+from motorbus.families.stepper.table import INPUTS, STEPS
+
+READINGS: Final = 5
+"""How often a dump is read at most until it is believed."""
+_NUMBER: Final = 0
+_TOTAL: Final = 1
+
+
+def dump_once(node: Node, project: int, timeout: Timeout | None = None) -> Exchange[bytes]:
+    """The 226 bytes of a project, 1 to 4, as they come once."""
+    return command(node, "read_project", bytes, project=project, timeout=timeout)
+
+
+def dump(node: Node, project: int = 1) -> Operation[bytes]:
+    """The 226 bytes of a project, 1 to 4, as two readings agree on them; about 0.5 s.
+
+    Raises FramingError when the line is too bad for that, UnexpectedReply when what came twice is the image of another
+    project. Reading changes nothing; with unsaved edits it shows those, or so it is assumed.
+    """
+    seen: list[bytes] = []
+    agreed = b""
+    while not agreed and len(seen) < READINGS:
+        seen.append((yield from dump_once(node, project)))
+        agreed = vote(seen)
+    if not agreed:
+        raise FramingError(
+            f"project {project} came differently each of {READINGS} times it was read",
+            expected="two readings that agree",
+            cause="the line changes bytes, and a dump has no checksum",
+            advice="see to the cable and its ground; nothing was written",
+            node=node.node,
+        )
+    _plausible(node, agreed, project)
+    return agreed
+
+
+def vote(readings: Sequence[bytes]) -> bytes:
+    """What of these dumps holds, byte by byte: twice the same, and more often than anything else; b"" if not all do."""
+    found = bytearray()
+    for column in zip(*readings, strict=True):
+        (value, times), *others = Counter(column).most_common(2)
+        if times < 2 or (others and others[0][1] == times):
+            return b""
+        found.append(value)
+    return bytes(found)
+
+
+def _plausible(node: Node, data: bytes, project: int) -> None:
+    image = data[wire.REPLY_LENGTH :]
+    if image[_NUMBER] not in (0, project) or image[_TOTAL] > STEPS:
+        raise UnexpectedReply(
+            f"the dump of project {project} says project {image[_NUMBER]} with {image[_TOTAL]} steps",
+            received=data,
+            expected=f"project {project}, or 0 when it was cleared, and up to {STEPS} steps",
+            cause="a line that changes the same byte each time, or another device",
+            advice="see that this port leads to a stepper controller",
+            node=node.node,
+        )
+
+
+def read_project(node: Node, project: int = 1) -> Operation[Program]:
+    """A stored project, 1 to 4, as a program: checked, timed, drawn and kept as a file like any other.
+
+    Raises RequestError when it holds what no project can, FramingError and UnexpectedReply as `dump`.
+    """
+    return Program.from_dump((yield from dump(node, project)), name=f"project {project}")
+
+
+def read(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, Value]]:
+    """Parameters of a project in API units by name, all when none is named.
+
+    Raises as `dump`, and RequestError for an unknown name.
+    """
+    raws = yield from read_raw(node, *names, project=project)
+    return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
+
+
+def read_raw(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, int]]:
+    """The same as raw values."""
+    rows: list[Entry] = [node.table[name] for name in names or node.table]
+    image = (yield from dump(node, project))[wire.REPLY_LENGTH :]
+    return {row.name: row.decode(image[row.address : row.address + row.size]) for row in rows}
+
+
+def read_input(node: Node, port: int) -> Exchange[bool]:
+    """Whether an input, 1 to 5, is active. Raises RequestError for another."""
+    if port not in range(1, INPUTS + 1):
+        raise RequestError(f"there is no input {port}", expected=f"1 to {INPUTS}", advice="nothing was sent")
+    return command(node, "read_input", lambda reply: bool(reply[5]), port=port)

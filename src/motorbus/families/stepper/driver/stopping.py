@@ -1,0 +1,74 @@
+"""How a controller is brought to rest, and what that is worth.
+
+Two commands, for nobody knows whether "stop project" ends a jog as well: 5E for the project, then 03 0D for the motor.
+Both are harmless when nothing moves. What is acknowledged is that it was heard. Whether the motor slows down or stops
+at once is its stop mode, and nothing tells that it rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import Final
+
+from motorbus.core.family import Stop
+from motorbus.core.operation import Answer, Exchange, Operation, Rank, outcome
+from motorbus.errors import MotorbusError
+from motorbus.families.stepper.driver.exchanges import command
+from motorbus.families.stepper.driver.node import Node
+
+STOPS: Final = ("stop_project", "stop_motor")
+TRIES: Final = 3
+"""How often each is said until it is accepted."""
+
+
+class Promise(Enum):
+    """What an acknowledged stop promises, and no more than that."""
+
+    STOP_ACCEPTED = (
+        "stop accepted: project and motor; it slows down or stops at once, as its stop mode says, and nothing tells "
+        "when it rests"
+    )
+
+
+def stop(node: Node) -> Operation[Promise]:
+    """End the project, then any other motion. Returns what was promised.
+
+    Each is said up to three times, the second also when the first was not accepted. Raises OutcomeUnknown
+    when one of them never was, for it may have been heard all the same.
+    """
+    failures = []
+    for name in STOPS:
+        told = yield from _insisted(node, name)
+        failures += [told] if isinstance(told, MotorbusError) else []
+    if failures:
+        raise failures[0]
+    return Promise.STOP_ACCEPTED
+
+
+def _insisted(node: Node, name: str) -> Operation[MotorbusError | None]:
+    told: MotorbusError | None = None
+    for _ in range(TRIES):
+        told = yield from outcome(command(node, name, _nothing, rank=Rank.STOP))
+        if told is None:
+            break
+    return told
+
+
+def _nothing(reply: bytes) -> None:
+    """An acknowledgement carries no value."""
+
+
+def stop_all(nodes: Mapping[int, Answer | None], motor: int) -> Stop:
+    """Both commands; where nobody has answered yet, without waiting for an answer."""
+    frames = tuple(
+        Exchange[Answer](
+            said.request,
+            said.replies if nodes else (),
+            rank=Rank.STOP,
+            effect=said.effect,
+            repeatable=True,
+        )
+        for said in (command(Node(motor=motor), name, _nothing, rank=Rank.STOP) for name in STOPS)
+    )
+    return Stop(frames, Promise.STOP_ACCEPTED.value)

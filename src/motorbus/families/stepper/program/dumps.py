@@ -1,0 +1,111 @@
+"""Raw dumps as files hold them, and lists of command frames, taken in and given out.
+
+A dump file is the 226 bytes that a controller sent, or the 220 of the image alone, as they are or in hexadecimal. There
+is no checksum, so what can be checked is: that the project is said twice alike, that a range is one, that no number is
+outside what its field may hold. What fails is told with field and range, for a bit that has turned over in a file is
+not to be sent to a motor.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Final, NamedTuple
+
+from motorbus.errors import RequestError
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.table import Order, Project, decode_image, edited, edits, refusals
+
+_HEX: Final = re.compile(rb"[\s0-9A-Fa-f]+")
+_AFTER: Final = frozenset({"save_project"})
+
+
+class Raw(NamedTuple):
+    """A project and the 220 bytes it came from; `asked` is the project its reply names, 0 for a bare image."""
+
+    project: Project
+    image: bytes
+    asked: int
+
+
+def from_dump(data: bytes, *, order: Order = "little", strict: bool = True, expert: bool = True) -> Raw:
+    """A dump of 226 bytes, or an image of 220, or either of them in hexadecimal.
+
+    With `strict` every named field must hold what it may. Raises RequestError, naming the field and its range.
+    """
+    image, asked = _image(_binary(data))
+    project = decode_image(image, order)
+    if strict:
+        for text, expected in faults(project, asked, expert=expert):
+            raise RequestError(
+                f"this dump cannot be right: {text}",
+                expected=expected,
+                cause="bytes were lost, or a bit has changed; a dump has no checksum",
+                advice="read the project from the controller again",
+            )
+    return Raw(project, image, asked)
+
+
+def faults(project: Project, asked: int = 0, *, expert: bool = True) -> Iterator[tuple[str, str]]:
+    """What in a dump cannot be: what is wrong, and what may be. A project that has been cleared is right."""
+    if project == Project() or project == Project(number=project.number):
+        return
+    if asked and project.number != asked:
+        yield f"number: the reply says project {asked} and its image {project.number}", f"{asked} twice"
+    for error in refusals(project, expert=expert):
+        yield error.summary, error.expected
+    first, last, total = project.loop_first, project.loop_last, project.total_steps
+    if (first or last) and not 1 <= first <= last <= total:
+        yield (
+            f"loop_first, loop_last: {first} to {last} of {total} steps",
+            f"1 <= first <= last <= {total}, or 0 0",
+        )
+
+
+def frames(project: Project, *, motor: int = wire.MOTOR, save: bool = True) -> list[bytes]:
+    """The requests that write a project and, with `save`, keep it: 9 + 7n of them for n steps."""
+    found = [edit.frame(motor) for edit in edits(project)]
+    return [*found, wire.encode("save_project", project=project.number)] if save else found
+
+
+def from_frames(requests: Iterable[bytes]) -> Project:
+    """The project that these requests write. Raises RequestError for a frame that is none, or writes nothing."""
+    project = Project()
+    for number, data in enumerate(requests, start=1):
+        request = wire.decode_request(data)
+        if request is None:
+            raise RequestError(
+                f"frame {number} is no request", sent=data, expected="11 bytes with their checksum"
+            )
+        name = request.command.name
+        if name in _AFTER:
+            continue
+        if not request.command.name.startswith(("set_", "select_")) or name == "set_output":
+            raise RequestError(f"frame {number}, {name}, writes no parameter", sent=data)
+        project = edited(project, name, request.values)
+    return project
+
+
+def _binary(data: bytes) -> bytes:
+    if len(data) in (wire.DUMP_LENGTH, wire.IMAGE_LENGTH) or not _HEX.fullmatch(data):
+        return data
+    digits = b"".join(data.split())
+    if len(digits) % 2:
+        raise RequestError(
+            f"a dump in hexadecimal of {len(digits)} digits ends in half a byte", expected="226 bytes, or 220"
+        )
+    return bytes.fromhex(digits.decode("ascii"))
+
+
+def _image(data: bytes) -> tuple[bytes, int]:
+    if len(data) == wire.IMAGE_LENGTH:
+        return data, 0
+    if fault := wire.dump_fault(data):
+        raise RequestError(
+            f"this is no dump of a project: {fault}",
+            received=data[:12],
+            expected="226 bytes that begin with FF AA 3E and the project, or the 220 bytes behind them",
+            cause="bytes were lost, or the file is another one",
+        )
+    dump = wire.decode_dump(data)
+    return dump.image, dump.project

@@ -1,0 +1,244 @@
+"""What a project will do, before it does it: in which order, how long, and where it ends.
+
+A controller tells nothing while it works, so the plan is also the only progress there can be. Time has three parts:
+motion and pauses, which are known but for the open questions; what an operator takes at an input, which nobody knows
+and which is counted; and what a stop input may take away. So an estimate says "at least 41.6 s + 6 waits", and gives a
+band over the readings of the one constant that the manual leaves out: per what the frequency grows.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import inf
+from typing import Any, Final, NamedTuple
+
+from motorbus.families.stepper import execution
+from motorbus.families.stepper.execution import USUAL, Behaviour
+from motorbus.families.stepper.program.lint import net_units
+from motorbus.families.stepper.table import PARAMETERS, Project
+
+SCHEMA: Final = "motorbus.stepper.plan/1"
+READINGS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "per pulse": {"ramp": "pulse"},
+    "per 1 ms": {"ramp": "time", "ramp_tick_ms": 1.0},
+    "per 10 ms": {"ramp": "time", "ramp_tick_ms": 10.0},
+}
+"""The readings of the acceleration that give the manual's example a plausible move: 0.82 s, 0.69 s and 1.43 s."""
+
+
+class StepPlan(NamedTuple):
+    """One step: what it sends and how long it takes.
+
+    `exact` and `sent` are pulses, before and after rounding; `frequency` and `peak` Hz, wanted and reached; `motion`
+    and `delay` s; `times` how often it is carried out in a pass; `units` its signed distance.
+    """
+
+    number: int
+    exact: Fraction
+    sent: int
+    frequency: float
+    shape: str
+    peak: float
+    motion: float
+    delay: float
+    times: int
+    units: int
+    start_input: int
+    stop_input: int
+    output: int
+
+    @property
+    def seconds(self) -> float:
+        """Motion and pause, once."""
+        return self.motion + self.delay
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """How long a project takes.
+
+    `seconds`  motion and pauses in all, of one pass when it is `endless`
+    `waits`    how often it waits for an input, in the same time, at least `seconds` being without them
+    `cuts`     how often a stop input may end a motion early, so that it takes less
+    `low`, `high`  the same in the readings of the acceleration, `readings` says each
+    """
+
+    seconds: float
+    waits: int
+    cuts: int
+    endless: bool
+    readings: Mapping[str, float]
+
+    @property
+    def low(self) -> float:
+        """The shortest of the readings (s)."""
+        return min(self.seconds, *self.readings.values())
+
+    @property
+    def high(self) -> float:
+        """The longest of the readings (s)."""
+        return max(self.seconds, *self.readings.values())
+
+    def __str__(self) -> str:
+        waits = f" + {self.waits} wait{'s' if self.waits > 1 else ''}" if self.waits else ""
+        text = f"at least {duration(self.seconds)}{waits}" + (
+            " for each pass, without an end" if self.endless else ""
+        )
+        if duration(self.low) != duration(self.high):
+            text += f" ({duration(self.low)} to {duration(self.high)}, as the acceleration is meant)"
+        if self.cuts:
+            times = "once" if self.cuts == 1 else f"{self.cuts} times"
+            text += f"; less where a stop input ends a step early, {times} at most"
+        return text
+
+    def data(self) -> dict[str, Any]:
+        """As plain data."""
+        return {
+            "seconds": self.seconds,
+            "waits": self.waits,
+            "cuts": self.cuts,
+            "endless": self.endless,
+            "low": self.low,
+            "high": self.high,
+            "readings": dict(self.readings),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """Everything that can be said of a project before it runs.
+
+    `order` are the steps of one pass, `passes` how often (None: endless), `net_units` where a pass ends from where it
+    began; `name` is that of the program.
+    """
+
+    name: str
+    project: Project
+    how: Behaviour
+    steps: tuple[StepPlan, ...]
+    order: tuple[int, ...]
+    passes: int | None
+    net_units: int
+    estimate: Estimate
+
+    @property
+    def pass_seconds(self) -> float:
+        """Motion and pauses of one pass."""
+        return sum(step.seconds * step.times for step in self.steps)
+
+    def data(self) -> dict[str, Any]:
+        """As plain data, with names and units in the keys."""
+        turn = self.project.turn_distance
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "project": self.project.number,
+            "order": list(self.order),
+            "passes": self.passes,
+            "pass_seconds": self.pass_seconds,
+            "net_units_per_pass": self.net_units,
+            "net_turns_per_pass": self.net_units / turn if turn else None,
+            "estimate": self.estimate.data() | {"text": str(self.estimate)},
+            "steps": [_step_data(step) for step in self.steps],
+        }
+
+    def json(self) -> str:
+        """As one JSON document."""
+        return json.dumps(self.data(), indent=2, ensure_ascii=False) + "\n"
+
+
+def plan(project: Project, how: Behaviour = USUAL, *, name: str = "") -> Plan:
+    """The plan of a project, under the readings of `how`."""
+    steps = _steps(project, how)
+    return Plan(
+        name=name,
+        project=project,
+        how=how,
+        steps=steps,
+        order=tuple(place.step for place in execution.one_pass(project, how)),
+        passes=execution.passes(project, how),
+        net_units=net_units(project, how),
+        estimate=_estimate(project, how, steps),
+    )
+
+
+def estimate(project: Project, how: Behaviour = USUAL) -> Estimate:
+    """How long a project takes, under the readings of `how`, with a band over the readings of the acceleration."""
+    return _estimate(project, how, _steps(project, how))
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 41.6 s, 4 min 12 s, 2 h 5 min."""
+    if seconds == inf:
+        return "for ever"
+    if seconds < 99.95:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"
+
+
+def _estimate(project: Project, how: Behaviour, steps: tuple[StepPlan, ...]) -> Estimate:
+    times = execution.passes(project, how) or 1
+    return Estimate(
+        seconds=_in_all(steps) * times,
+        waits=sum(step.times for step in steps if step.start_input) * times,
+        cuts=sum(step.times for step in steps if step.stop_input and step.sent) * times,
+        endless=project.is_endless,
+        readings={
+            text: _in_all(_steps(project, replace(how, **changes))) * times
+            for text, changes in READINGS.items()
+        },
+    )
+
+
+def _in_all(steps: tuple[StepPlan, ...]) -> float:
+    return sum(step.seconds * step.times for step in steps)
+
+
+def _steps(project: Project, how: Behaviour) -> tuple[StepPlan, ...]:
+    return tuple(_step(project, number, how) for number in range(1, execution.last_step(project) + 1))
+
+
+def _step(project: Project, number: int, how: Behaviour) -> StepPlan:
+    step = project.step(number)
+    sent, _ = execution.pulses(project, step, how)
+    endless = not step.distance and how.zero_distance == "endless"
+    move = execution.move(project, step, None if endless else sent, how)
+    return StepPlan(
+        number=number,
+        exact=execution.exact_pulses(project, step),
+        sent=sent,
+        frequency=execution.frequency(project, step),
+        shape=move.shape,
+        peak=move.peak,
+        motion=move.duration,
+        delay=step.delay / 1000,
+        times=execution.times_in_a_pass(project, number, how),
+        units=step.sign * step.distance,
+        start_input=step.start_input,
+        stop_input=step.stop_input,
+        output=step.output,
+    )
+
+
+def _step_data(step: StepPlan) -> dict[str, Any]:
+    return {
+        "step": step.number,
+        "times_per_pass": step.times,
+        "units": step.units,
+        "pulses": step.sent,
+        "pulses_exact": float(step.exact),
+        "frequency_hz": step.frequency,
+        "peak_hz": step.peak,
+        "shape": step.shape,
+        "motion_seconds": step.motion if step.motion != inf else None,
+        "delay_seconds": step.delay,
+        "wait_for_input": step.start_input or None,
+        "stop_on_input": step.stop_input or None,
+        "output": PARAMETERS["output"].choices.get(step.output, f"action {step.output}"),
+    }

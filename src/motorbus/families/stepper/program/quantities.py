@@ -1,0 +1,199 @@
+"""What people write for a distance, a speed, a frequency or a pause, and the whole number it is for the controller.
+
+Arithmetic is exact: 0.3 turns of 1600 units are 480 units and not 479.99999. What does not come out whole is refused,
+with the two values on either side, for a file that says one thing and a motor that does another are worse than a
+question. Every quantity has its unit in the file; a bare number could be anything.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from math import ceil, floor
+from typing import Final, NamedTuple
+
+from motorbus.errors import RequestError
+from motorbus.families.stepper.table import Project
+
+_NUMBER: Final = re.compile(r"\s*([+-]?)\s*(\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})\s*", re.ASCII)
+_PART: Final = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})\s*([a-zµμ]+)\s*", re.ASCII)
+TIME: Final[Mapping[str, Fraction]] = {
+    "ms": Fraction(1),
+    "s": Fraction(1000),
+    "min": Fraction(60_000),
+    "h": Fraction(3_600_000),
+}
+"""ms of each unit of time."""
+LENGTH: Final[Mapping[str, Fraction]] = {
+    "mm": Fraction(1),
+    "um": Fraction(1, 1000),
+    "µm": Fraction(1, 1000),
+    "μm": Fraction(1, 1000),
+    "cm": Fraction(10),
+    "m": Fraction(1000),
+}
+"""mm of each unit of length."""
+DISTANCES: Final = ("units", "pulses", "turns", "deg", *LENGTH)
+SPEEDS: Final = ("rpm", "Hz", "deg/s", "mm/s")
+_SAME: Final = {
+    "unit": "units",
+    "pulse": "pulses",
+    "turn": "turns",
+    "°": "deg",
+    "degrees": "deg",
+    "RPM": "rpm",
+}
+
+
+class Geometry(NamedTuple):
+    """What one turn of the motor is: in pulses, in user units, and in mm where a lead is given."""
+
+    pulses: Fraction
+    units: int
+    lead: Fraction | None = None
+
+    @classmethod
+    def of(cls, project: Project, lead: Fraction | None = None) -> Geometry:
+        """That of a project whose geometry makes sense."""
+        return cls(project.pulses_per_turn or Fraction(0), project.turn_distance, lead)
+
+    def turns(self, unit: str) -> Fraction | None:
+        """Turns of the motor in one of this unit of distance; None when it is unknown, or mm without a lead."""
+        if unit == "units":
+            return Fraction(1, self.units)
+        if unit == "pulses":
+            return 1 / self.pulses
+        if unit in ("turns", "deg"):
+            return Fraction(1, 1 if unit == "turns" else 360)
+        if unit in LENGTH and self.lead:
+            return LENGTH[unit] / self.lead
+        return None
+
+
+class Amount(NamedTuple):
+    """A number and its unit, as written; `negative` also tells -0 from 0."""
+
+    number: Fraction
+    unit: str
+    negative: bool
+
+
+def refuse(what: str, expected: str, why: str = "") -> RequestError:
+    """The error for something in a file that cannot be."""
+    return RequestError(what, expected=expected, cause=why, advice="correct the file; nothing was sent")
+
+
+def amount(text: object, where: str, expected: str) -> Amount:
+    """`-12.5 mm` taken apart. Raises RequestError, naming `where`, for what is no number with a unit."""
+    if not isinstance(text, str):
+        raise refuse(f"{where}: {text!r} has no unit", expected)
+    match = _NUMBER.match(text)
+    unit = text[match.end() :].strip() if match else ""
+    if match is None or not unit:
+        raise refuse(f"{where}: {text!r} is no number with a unit", expected)
+    number = Fraction(match[2] + "0" if match[2].endswith(".") else match[2])
+    negative = match[1] == "-"
+    return Amount(-number if negative else number, _SAME.get(unit, unit), negative)
+
+
+def whole(number: Fraction, where: str, said: object, unit: str, back: Callable[[int], str] = str) -> int:
+    """The whole number, or a RequestError with the two on either side of it; `back` says them as the file would."""
+    if number.denominator == 1:
+        return int(number)
+    low, high = floor(number), ceil(number)
+    raise refuse(
+        f"{where}: {said!r} is {float(number):.6g} {unit}, and only whole ones can be said",
+        f"{back(low)} or {back(high)}",
+        "the controller counts in whole numbers",
+    )
+
+
+def distance(text: object, where: str, geometry: Geometry) -> tuple[int, bool]:
+    """A signed distance -> user units, and whether it is in reverse (also for -0)."""
+    expected = f"a number with one of {', '.join(DISTANCES)}"
+    said = amount(text, where, expected)
+    turns = geometry.turns(said.unit)
+    if turns is None:
+        why = "millimetres need `lead` in [motor]" if said.unit in LENGTH else ""
+        raise refuse(f"{where}: {text!r} has no unit of distance that is known here", expected, why)
+    units = abs(said.number) * turns * geometry.units
+    return whole(units, where, text, "units", lambda count: f"{count} units"), said.negative
+
+
+def speed(text: object, where: str, geometry: Geometry) -> int:
+    """A speed -> RPM."""
+    expected = f"a number with one of {', '.join(SPEEDS)}"
+    said = amount(text, where, expected)
+    if said.unit == "rpm":
+        rpm = said.number
+    else:
+        per, _, time = said.unit.rpartition("/")
+        turns = geometry.turns("pulses" if said.unit == "Hz" else per)
+        if turns is None or (said.unit != "Hz" and time != "s"):
+            why = "mm/s needs `lead` in [motor]" if per in LENGTH else ""
+            raise refuse(f"{where}: {text!r} has no unit of speed that is known here", expected, why)
+        rpm = said.number * turns * 60
+    if rpm < 0:
+        raise refuse(f"{where}: {text!r} is negative", expected, "the sign of `move` says which way it turns")
+    return whole(rpm, where, text, "rpm", lambda count: f"{count} rpm")
+
+
+def hertz(text: object, where: str) -> int:
+    """A frequency of pulses -> Hz."""
+    said = amount(text, where, "a number with Hz or kHz")
+    scale = {"Hz": 1, "kHz": 1000}.get(said.unit)
+    if scale is None or said.number < 0:
+        raise refuse(f"{where}: {text!r} is no frequency", "a number with Hz or kHz")
+    return whole(said.number * scale, where, text, "Hz", lambda count: f"{count} Hz")
+
+
+def milliseconds(text: object, where: str) -> int:
+    """A pause, such as `500 ms` or `4 h 39 min`, -> ms."""
+    expected = "numbers with ms, s, min or h, such as 1.5 s or 2 min 30 s"
+    total, rest = Fraction(0), text if isinstance(text, str) else ""
+    while match := _PART.match(rest):
+        if match[2] not in TIME:
+            break
+        total += Fraction(match[1] + "0" if match[1].endswith(".") else match[1]) * TIME[match[2]]
+        rest = rest[match.end() :]
+    if rest or not isinstance(text, str) or not text.strip():
+        raise refuse(f"{where}: {text!r} is no time", expected)
+    return whole(total, where, text, "ms", lambda count: f"{count} ms")
+
+
+def hundredths(text: object, where: str) -> int:
+    """A step angle, such as `1.8 deg`, -> hundredths of a degree."""
+    said = amount(text, where, "an angle such as 1.8 deg")
+    if said.unit != "deg" or said.number < 0:
+        raise refuse(f"{where}: {text!r} is no angle", "an angle such as 1.8 deg")
+    return whole(said.number * 100, where, text, "hundredths", lambda count: f"{count / 100:g} deg")
+
+
+def millimetres(text: object, where: str) -> Fraction:
+    """A length above 0 -> mm, exact."""
+    said = amount(text, where, "a length such as 5 mm")
+    if said.unit not in LENGTH or said.number <= 0:
+        raise refuse(f"{where}: {text!r} is no length", "a length such as 5 mm")
+    return said.number * LENGTH[said.unit]
+
+
+def motor_of(full_steps: int, microsteps: int, where: str) -> tuple[int, int]:
+    """Step angle (hundredths of a degree) and microsteps that give a motor of so many full steps its pulses per turn.
+
+    One byte holds the angle, so 2.55 degrees are the most; a motor of 48 full steps (7.5 degrees) at 25 microsteps has
+    1200 pulses a turn, which 1.8 degrees and 6 microsteps give too. That only the pulses count is an assumption: a unit
+    with a driver of its own may set that by the microsteps. Raises RequestError when no pair gives them.
+    """
+    pulses = full_steps * microsteps
+    exact = Fraction(36000, full_steps) if full_steps > 0 else Fraction(0)
+    wanted = [int(exact)] if exact.denominator == 1 and 1 <= exact <= 255 else []
+    for angle in (*wanted, 180, 90, *range(255, 0, -1)):
+        found = Fraction(pulses * angle, 36000)
+        if found.denominator == 1 and 1 <= found <= 0xFFFF:
+            return angle, int(found)
+    raise refuse(
+        f"{where}: {full_steps} full steps of {microsteps} microsteps are {pulses} pulses a turn, "
+        "which the controller cannot be told",
+        "36000 * microsteps / step angle, with 1 to 65535 and 1 to 255",
+    )

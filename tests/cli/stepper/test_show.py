@@ -1,0 +1,55 @@
+"""A program step by step, and its picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Run
+from tests.cli.stepper.conftest import EXAMPLE
+from tests.families.stepper.program.projects import file
+
+
+def test_every_step_is_a_row(run: Run) -> None:
+    ran = run("stepper", "show", EXAMPLE)
+    assert ran.code == 0, ran.err
+    lines = ran.out.splitlines()
+    assert lines[0] == "Pick and place"
+    assert [line.split()[0] for line in lines[2:12]] == [str(n) for n in range(1, 11)]
+    for word in (
+        "gripper on",
+        "tray",
+        "part",
+        "trapezoid",
+        "at least 52.8 s + 6 waits",
+        "a pass ends where it began",
+    ):
+        assert word in ran.out
+
+
+def test_the_plan_is_the_document(run: Run) -> None:
+    document = run("stepper", "show", EXAMPLE, "--json").document
+    assert document["schema"] == "motorbus.stepper.plan/1"
+    assert (document["name"], len(document["steps"]), document["picture"]) == ("Pick and place", 10, None)
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_it_is_drawn(run: Run, tmp_path: Path, suffix: str) -> None:
+    picture = tmp_path / f"feed.{suffix}"
+    ran = run("stepper", "show", EXAMPLE, "--output", str(picture), "--wait", "2")
+    assert ran.code == 0, ran.err
+    assert ran.out.endswith(f"drawn: {picture}\n")
+    assert picture.stat().st_size > 10_000
+
+
+def test_where_a_pass_ends_is_said(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "walk.toml"
+    path.write_text(file(top="repeat = 2"), encoding="utf-8")
+    assert "a pass ends +10000 units from where it began" in run("stepper", "show", str(path)).out
+
+
+@pytest.mark.parametrize("words", [("--wait", "-1"), ("--passes", "0"), ("--output", "/nowhere/at/all.png")])
+def test_what_cannot_be_ends_with_2(run: Run, words: tuple[str, ...]) -> None:
+    ran = run("stepper", "show", EXAMPLE, *words)
+    assert (ran.code, ran.out) == (2, "")

@@ -1,0 +1,112 @@
+"""Stopping: two commands, each until it is accepted, and no more is promised than that they were heard."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.errors import OutcomeUnknown
+from motorbus.families.stepper import FAMILY, Promise
+from motorbus.families.stepper.execution import Phase
+from tests.families.stepper.bench import Bench, Tampering, bench
+
+PROJECT = "FF AA 5E 00 00 00 00 00 00 00 07"
+MOTOR = "FF AA 03 0D 00 00 00 00 00 00 B9"
+JOG = "FF AA 03 0A 00 00 00 00 00 00 B6"
+START = "FF AA 4E 01 00 00 00 00 00 00 F8"
+
+
+class Losing(Tampering):
+    """Swallows replies that begin so, as often as said."""
+
+    def __init__(self, begin: str, times: int = 1_000_000) -> None:
+        super().__init__()
+        self.begin, self.times = bytes.fromhex(begin), times
+
+    def change(self, data: bytes, number: int) -> bytes:
+        if data.startswith(self.begin) and self.times:
+            self.times -= 1
+            return b""
+        return data
+
+
+def turning(there: Bench, request: str = JOG) -> None:
+    assert there.device.ping()
+    there.press(request)
+    assert there.simulated.moving
+    there.sent()
+
+
+def at_rest(there: Bench) -> bool:
+    there.link.advance(1.0)
+    before = there.simulated.position
+    there.link.advance(1.0)
+    return there.simulated.position == before and there.simulated.state.phase is Phase.IDLE
+
+
+def test_both_commands_are_said_in_order() -> None:
+    with bench() as there:
+        turning(there, START)
+        assert there.device.stop() is Promise.STOP_ACCEPTED
+        assert there.sent() == [PROJECT, MOTOR]
+        assert at_rest(there)
+
+
+def test_a_jog_is_stopped() -> None:
+    with bench() as there:
+        turning(there)
+        there.device.stop()
+        assert at_rest(there)
+
+
+def test_no_more_is_promised_than_that_it_was_accepted() -> None:
+    assert Promise.STOP_ACCEPTED.value.startswith("stop accepted")
+    assert "nothing tells when it rests" in FAMILY.stop({}).promise
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_what_was_not_accepted_is_said_again(times: int) -> None:
+    with bench(line=Losing("FF AA 5E", times)) as there:
+        turning(there)
+        assert there.device.stop() is Promise.STOP_ACCEPTED
+        assert there.sent() == [PROJECT] * (times + 1) + [MOTOR]
+
+
+def test_the_second_is_said_though_the_first_never_was_accepted() -> None:
+    with bench(line=Losing("FF AA 5E")) as there:
+        turning(there)
+        with pytest.raises(OutcomeUnknown):
+            there.device.stop()
+        assert there.sent() == [PROJECT] * 3 + [MOTOR]
+        assert at_rest(there)
+
+
+@pytest.mark.parametrize("request_", [JOG, START])
+def test_an_emergency_stop_ends_a_project_and_a_jog(request_: str) -> None:
+    with bench() as there:
+        turning(there, request_)
+        outcome = there.bus.estop()
+        assert (outcome.acknowledged, outcome.silent, outcome.rounds) == ((1,), (), 1)
+        assert there.sent() == [PROJECT, MOTOR]
+        assert at_rest(there)
+
+
+def test_an_emergency_stop_goes_before_anybody_has_answered() -> None:
+    with bench() as there:
+        there.press(JOG)
+        there.bus.estop()
+        assert there.sent()[:2] == [PROJECT, MOTOR]
+        assert at_rest(there)
+
+
+@pytest.mark.parametrize("lost", ["FF AA 5E", "FF AA 03 0D"])
+def test_an_emergency_stop_is_acknowledged_when_both_are_and_not_before(lost: str) -> None:
+    with bench(line=Losing(lost)) as there:
+        turning(there)
+        outcome = there.bus.estop()
+        assert (outcome.acknowledged, outcome.silent, outcome.rounds) == ((), (1,), 5)
+        assert there.sent() == [PROJECT, MOTOR] * 5
+        assert at_rest(there)
+    with bench(line=Losing(lost, 1)) as there:
+        turning(there)
+        outcome = there.bus.estop()
+        assert (outcome.acknowledged, outcome.silent, outcome.rounds) == ((1,), (), 2)
