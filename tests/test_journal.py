@@ -220,7 +220,8 @@ def test_a_record_whose_facts_are_others_belongs_to_another_change(path: Path) -
 
 
 @pytest.mark.parametrize(
-    "line", [b"[1]", b'"x"', b'{"state": "x", "facts": [1]}', b'{"state": "x", "facts": {"node": "3"}}', b"[" * 9999]
+    "line",
+    [b"[1]", b'"x"', b'{"state": "x", "facts": [1]}', b'{"state": "x", "facts": {"node": "3"}}', b"[" * 9999],
 )
 def test_a_journal_with_odd_contents_is_borne_told_and_forgotten(path: Path, line: bytes) -> None:
     head = b'{"format": 1, "bus": "feetech:/dev/ttyACM7"}\n'

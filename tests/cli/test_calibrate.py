@@ -52,7 +52,7 @@ def test_a_dry_run_shows_the_whole_sequence_and_changes_nothing(run: Run, arm: S
         ran = run("calibrate", f"{arm.url}#3", *words, "--dry-run", "--json")
         assert ran.code == 0, ran.err
         meanings = [one["meaning"] for one in ran.document["withheld"]]
-        assert "lock 0" in meanings[1]
+        assert ["lock 0" in meanings[0], "torque_enable 0" in meanings[1]] == [True, True]
         assert ("homing_offset" if words else "call the present position 2048") in meanings[2]
         assert "lock 1" in meanings[-1]
     assert arm[3].memory["homing_offset"] == 0

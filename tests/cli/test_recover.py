@@ -240,3 +240,56 @@ def test_a_journal_of_a_later_version_is_told_and_touched_by_nobody(run: Run, se
         assert ran.code == 2
         assert "version that wrote it" in ran.err
     assert path.read_text() == '{"format": 2}\n'
+
+
+def test_what_is_told_of_a_changed_id_has_the_rate_it_answers_at(run: Run, served: Simulated) -> None:
+    """The change was made at another rate than the one at which the bus is opened now."""
+    assert run("set-baud", served.bus, "500000", "--yes", "--among", "1-9").code == 0
+    killed("written 7", "set-id", f"{served.bus},baud=500000#3", "7", "--yes", "--among", "1-9")
+    ran = run("recover", served.bus, "--yes", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.document["address"] == f"{served.bus},baud=500000#7"
+    assert run("ping", ran.document["address"]).code == 0
+
+
+@pytest.mark.parametrize("line", ['{"state": "x"}', '{"state": "x", "facts": [1]}', "{", ""])
+@pytest.mark.parametrize("head", ['{"format": 1, "bus": "feetech:/dev/ttyACM42"}', '{"format": 2}', "[]"])
+def test_a_damaged_journal_hinders_no_stop_and_can_be_forgotten(
+    head: str, line: str, run: Run, served: Simulated
+) -> None:
+    path = journal_path(served.bus.partition(":")[2])
+    path.write_text(f"{head}\n{line}\n")
+    assert run("stop", f"{served.bus}#1").code == 0
+    assert run("recover").code in (0, 2)
+    assert run("recover", served.bus, "--yes").code in (0, 2)
+    assert run("recover", served.bus, "--forget", "--yes").code == 0
+    assert run("recover").out == "nothing is unfinished\n"
+    assert run("set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9").code == 0
+
+
+def test_a_journal_that_cannot_be_read_hides_no_other(run: Run, served: Simulated) -> None:
+    killed("written 7", "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
+    journal_path("/dev/ttyACM42").write_text('{"format": 2}\n')
+    ran = run("recover")
+    assert ran.code == 2
+    assert served.bus in ran.out
+    assert "version that wrote it" in ran.err
+
+
+def test_a_recovery_elsewhere_that_finds_nobody_can_be_said_again_and_given_up(
+    run: Run, served: Simulated
+) -> None:
+    """The journal of another port; what is begun on this one is kept whole, and not without its facts."""
+    killed("writing 7", "set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
+    here, gone = journal_path(served.bus.partition(":")[2]), journal_path("/dev/ttyACM42")
+    text = here.read_text().replace(served.bus, "feetech:/dev/ttyACM42")
+    gone.write_text(text.replace('"node": 3, "new": 7', '"node": 200, "new": 201'))
+    assert '"node": 200' in gone.read_text()
+    here.unlink()
+    assert run("recover", served.bus, "--of", "feetech:/dev/ttyACM42", "--yes").code == 5
+    listed = run("recover", "--json").document["changes"]
+    assert [(one["id"], one["new"]) for one in listed] == [(200, 201), (200, 201)]
+    assert run("recover", served.bus, "--yes").code == 5
+    for bus in (served.bus, "feetech:/dev/ttyACM42"):
+        assert run("recover", bus, "--forget", "--yes").code == 0
+    assert run("recover").out == "nothing is unfinished\n"

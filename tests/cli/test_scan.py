@@ -138,3 +138,13 @@ def test_one_model_with_several_firmware_versions_is_a_note(run: Run, arm: Simul
     assert ran.code == 0
     assert ran.document["notes"] == [said]
     assert f"note: {said}" in ran.err
+
+
+@pytest.mark.parametrize("said", ["7", "1000000,7", "2M"])
+def test_a_rate_that_no_servo_has_is_refused_and_nothing_is_asked(
+    said: str, run: Run, arm: Simulation
+) -> None:
+    ran = run("scan", arm.url, "--baud", said, "-vv")
+    assert (ran.code, ran.out) == (2, "")
+    assert "is no rate of feetech devices" in ran.err
+    assert " tx " not in ran.err

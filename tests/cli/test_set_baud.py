@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import motorbus
+from motorbus.cli import identity
 from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
@@ -89,3 +92,21 @@ def test_a_dry_run_of_a_kst_servo_shows_what_is_written_and_sees_who_else_is_the
         ran = run("set-baud", f"{simulation.url}#37", "1M", "--dry-run")
     assert ran.code == 2
     assert "is not alone" in ran.err
+
+
+def test_ctrl_c_in_the_middle_of_several_says_who_is_done(
+    run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    carried_out, begun = identity.carried_out, list[int]()
+
+    def interrupted(bus: Any, node: int, *args: Any, **more: Any) -> Any:
+        begun.append(node)
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        return carried_out(bus, node, *args, **more)
+
+    monkeypatch.setattr("motorbus.cli.set_baud.carried_out", interrupted)
+    ran = run("set-baud", arm.url, "500000", "--yes", "--among", "1-9")
+    assert ran.code == 10
+    assert f"done before that: {arm.url},baud=500000#1+2" in ran.err
+    assert sorted(rates(arm)) == [500_000, 500_000, 1_000_000]

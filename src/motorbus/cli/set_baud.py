@@ -117,9 +117,7 @@ def _cut_off(name: str, bus: Bus, done: list[Any], rate: int, output: Output) ->
     """Say who has the new rate already: nobody who asks at the old one finds them."""
     if done:
         ids = "+".join(str(one.node) for one in done)
-        output.note(
-            f"note: done before that: {address(name, bus.family, rate=rate)}#{ids}; nobody behind them"
-        )
+        output.note(f"note: done before that: {address(name, bus.family, rate=rate)}#{ids}")
 
 
 def _told(

@@ -110,7 +110,9 @@ def test_what_is_said_to_end_a_goal_torque_of_0_ends_it(mode: str, protection: i
             memory.memory["goal_torque"], memory.memory["protection_current"] = 0, protection
             servo.forget_settings()
             (told,) = [told for told in servo.blockers() if told.startswith("goal_torque")]
-            assert [call for call in HELD if call in told] == said + ["write(protection_current=…)"][protection:]
+            assert [call for call in HELD if call in told] == said + ["write(protection_current=…)"][
+                protection:
+            ]
             HELD[way](servo)
             assert memory.memory["goal_torque"] == (500 if "write" not in way and mode != "current" else 100)
             assert not [told for told in servo.blockers() if told.startswith("goal_torque")]

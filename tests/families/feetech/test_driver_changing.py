@@ -9,13 +9,16 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, Data, Journal
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import INTENT, Alone, Data, Journal
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
+from motorbus.families.feetech.driver import Node, prepare
+from motorbus.families.feetech.driver.changing import guarded
 from motorbus.families.feetech.driver.placing import called
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.named import Simulation
-from tests.families.feetech.cuts import NEVER, VERBS, Cut, Doomed, World
+from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, Doomed, World
 
 
 def sent(verb: str) -> int:
@@ -207,3 +210,21 @@ def test_one_that_gets_the_id_as_shipped_meanwhile_is_noticed() -> None:
         ids = sorted(simulation.simulator.nodes)
         failed = [end for end in ends if isinstance(end, Exception)]
         assert (len(failed), ids) in ((1, [1, 3]), (0, [1, 7]))
+
+
+def test_an_interruption_when_all_is_over_says_that_it_is() -> None:
+    world = World("set_id", {})
+    done = world.job()
+    operation = guarded(done, Node(OLD))
+    step = next(operation)
+    assert isinstance(step, Alone)
+
+    def work(bus: Bus) -> None:
+        bus.run(prepare(Node(OLD)))
+        bus.run(step.operation)
+
+    world.run(work)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        operation.throw(KeyboardInterrupt())
+    assert caught.value.__notes__ == ["the servo is 7, and locked"]
+    assert world.faults(None) == []

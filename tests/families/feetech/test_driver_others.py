@@ -20,7 +20,8 @@ def test_the_id_as_shipped_is_asked_although_nobody_names_it() -> None:
 
 def test_one_that_misses_the_first_question_is_asked_again() -> None:
     with motorbus.simulate("feetech", ids="3+4") as simulation, motorbus.open(simulation.url) as bus:
-        receive, missed = simulation.simulator.receive, []
+        receive = simulation.simulator.receive
+        missed: list[bytes] = []
 
         def deaf(data: bytes | CanFrame, at: float) -> None:
             assert isinstance(data, bytes)

@@ -56,7 +56,14 @@ def test_the_journal_is_closed_and_tells_each_step() -> None:
         bus.run(set_id(Node(3), 7))
         assert session.unfinished(bus) is None
     told = [event for event in events if isinstance(event, Journal)]
-    assert [event.state for event in told] == ["asked", "asked", "intent", "writing 7", "written 7", "outcome"]
+    assert [event.state for event in told] == [
+        "asked",
+        "asked",
+        "intent",
+        "writing 7",
+        "written 7",
+        "outcome",
+    ]
     assert told[2].facts["node"] == 3
     assert told[2].facts["new"] == 7
     assert told[-1].facts == {"outcome": "new", "node": 3, "new": 7, "new_rate": 1_000_000}

@@ -137,8 +137,8 @@ def test_silence_is_no_second_servo_and_nobody_at_all_is_no_reply() -> None:
         asked(simulation, 20)
 
 
-@pytest.mark.parametrize("polls", [0, -1])
-def test_less_than_one_question_is_none(polls: int) -> None:
+@pytest.mark.parametrize("polls", [0, -1, 100_001, 10**12])
+def test_less_than_one_question_is_none_and_too_many_are_refused(polls: int) -> None:
     with pytest.raises(RequestError):
         play(duplicates(Node(3), polls))
 

@@ -40,17 +40,23 @@ def guarded(job: Job, node: Node) -> Operation[None]:
 
     Raises RequestError then, with nothing written; otherwise as `changed`.
     """
+    done: list[str] = []
     try:
-        yield from Alone(_once_more(job, node))
+        yield from Alone(_once_more(job, node, done))
+    except BaseException as error:
+        for end in done:  # an interruption that came when all was over
+            error.add_note(_became(job, end))
+        raise
     finally:
         node.forget_settings()
 
 
-def _once_more(job: Job, node: Node) -> Operation[None]:
+def _once_more(job: Job, node: Node, done: list[str]) -> Operation[None]:
     yield from Report(Journal(job.verb, ASKED, {}))
     yield from afterwards(_unchanged(job), lambda: iter(Tune(job.old.rate)))
     learn(node, job.image)
     yield from changed(job, node, Course(job))
+    done.append("new")
 
 
 def _unchanged(job: Job) -> Operation[None]:
