@@ -53,6 +53,18 @@ def trajectory(
         apart = [was - goal for was, goal in zip(present, goals[index], strict=True)]
         error.plot(times, apart, color=colour, linewidth=1.2)
     _finish(position, error, times)
+    _saved(figure, path)
+
+
+def _saved(figure: Any, path: Path | str) -> None:
+    """Write the picture. Raises RequestError for a name that does not say which kind of picture it shall be."""
+    kinds = (".png", ".svg", ".pdf")
+    if not str(path).lower().endswith(kinds):
+        raise RequestError(
+            f"{path}: what kind of picture shall that be?",
+            expected=f"a name that ends in {', '.join(kinds)}",
+            advice="nothing was drawn",
+        )
     figure.savefig(path)
 
 
@@ -101,7 +113,7 @@ def sequence(
     if len(times) > 1:
         axes[-1].set_xlim(times[0], times[-1])
     figure.align_ylabels()
-    figure.savefig(path)
+    _saved(figure, path)
 
 
 def _draw_lanes(axes: Any, times: Sequence[float], lanes: Mapping[str, Sequence[bool]]) -> None:

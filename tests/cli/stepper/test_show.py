@@ -53,3 +53,23 @@ def test_where_a_pass_ends_is_said(run: Run, tmp_path: Path) -> None:
 def test_what_cannot_be_ends_with_2(run: Run, words: tuple[str, ...]) -> None:
     ran = run("stepper", "show", EXAMPLE, *words)
     assert (ran.code, ran.out) == (2, "")
+
+
+@pytest.mark.parametrize("command", ["show", "estimate"])
+def test_a_step_that_never_ends_is_a_document_too(run: Run, tmp_path: Path, command: str) -> None:
+    endless = tmp_path / "endless.toml"
+    endless.write_text(
+        'format = 1\nproject = 2\n[motor]\nmicrosteps = 8\nstep_angle = "1.8 deg"\nturn_distance = 5000\n'
+        '[[step]]\nspeed = "100 rpm"\nstart = "50 Hz"\nacceleration = "30 Hz"\n'
+    )
+    ran = run("stepper", command, str(endless), "--zero-distance", "endless", "--json")
+    assert ran.code == 0, ran.err
+    told = ran.document["estimate"] if command == "show" else ran.document["estimates"][0]
+    assert told["seconds"] is None
+
+
+def test_a_kind_of_picture_that_nobody_draws_is_refused(run: Run, tmp_path: Path) -> None:
+    ran = run("stepper", "show", EXAMPLE, "--output", str(tmp_path / "z.txt"))
+    assert ran.code == 2
+    assert "a name that ends in .png, .svg, .pdf" in ran.err
+    assert not list(tmp_path.iterdir())

@@ -119,3 +119,11 @@ def test_spans_are_the_steps_and_their_waits() -> None:
     assert [name for _, _, name, _ in spans] == ["1", "wait", "2", "3", "wait", "2", "3"] * 3
     assert [waiting for _, _, _, waiting in spans[:3]] == [False, True, False]
     assert all(one[1] == other[0] for one, other in pairwise(spans))
+
+
+@pytest.mark.parametrize("wait", [0.0, 0.05])
+def test_a_hand_that_is_still_on_the_input_lets_go_before_it_presses_again(wait: float) -> None:
+    nothing = project(step(distance=0, start_input=1), project_loop=3)
+    found = course(nothing, Behaviour(start_input="edge"), wait=wait)
+    assert [one.kind for one in found.told].count("waits") == 3
+    assert found.told[-1].kind == "completed"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -143,3 +145,14 @@ def test_no_bytes_do_more_than_be_refused(data: bytes) -> None:
 @given(st.binary(min_size=220, max_size=220))
 def test_any_image_is_taken_when_nobody_judges_it(image: bytes) -> None:
     assert dumps.from_dump(image, strict=False).image == image
+
+
+def test_a_cleared_project_has_no_frames_to_write() -> None:
+    """Its first frames would be ignored, and the rest written into whichever project is selected."""
+    with pytest.raises(RequestError, match="cleared: there is nothing to write"):
+        dumps.frames(Project(number=3))
+
+
+def test_numbers_that_a_controller_ignores_make_no_frames() -> None:
+    with pytest.raises(RequestError, match="number: 5"):
+        dumps.frames(replace(decode_image(DUMP_B[6:]), number=5))

@@ -181,8 +181,8 @@ class Course:
 
     @property
     def following(self) -> bool:
-        """The second id may have been written, with the lock open or not."""
-        return any(state.startswith(SECOND) for state in self.reached)
+        """The second id may have been written, with the lock open or not; once an outcome is told, it has been seen."""
+        return OUTCOME not in self.reached and any(state.startswith(SECOND) for state in self.reached)
 
     def doubtful(self, place: Place) -> bool:
         """A servo that is at this place and has its lock closed may not be there after the next power-off.

@@ -181,6 +181,8 @@ def _phases(
     while state.busy:
         waiting = state.phase is Phase.WAIT
         due = state.since + wait if waiting else execution.due(state)
+        if waiting and release < inf:
+            due = max(due, release)  # the hand is still there: it lets go before it presses again
         end = max(now, min(due, release))
         if end == inf:
             raise RequestError(

@@ -63,7 +63,19 @@ def faults(project: Project, asked: int = 0, *, expert: bool = True) -> Iterator
 
 
 def frames(project: Project, *, motor: int = wire.MOTOR, save: bool = True) -> list[bytes]:
-    """The requests that write a project and, with `save`, keep it: 9 + 7n of them for n steps."""
+    """The requests that write a project and, with `save`, keep it: 9 + 7n of them for n steps.
+
+    Raises RequestError for a project that has been cleared, and for a number that a controller would ignore: it would
+    then write the rest into whichever project is selected.
+    """
+    if project == Project(number=project.number):
+        raise RequestError(
+            f"project {project.number} has been cleared: there is nothing to write",
+            expected="at least one step",
+            advice="a controller clears a project by one order, 1E",
+        )
+    for error in refusals(project, expert=True):
+        raise error
     found = [edit.frame(motor) for edit in edits(project)]
     return [*found, wire.encode("save_project", project=project.number)] if save else found
 

@@ -95,15 +95,15 @@ class Estimate:
         return text
 
     def data(self) -> dict[str, Any]:
-        """As plain data."""
+        """As plain data; a time without end is None."""
         return {
-            "seconds": self.seconds,
+            "seconds": finite(self.seconds),
             "waits": self.waits,
             "cuts": self.cuts,
             "endless": self.endless,
-            "low": self.low,
-            "high": self.high,
-            "readings": dict(self.readings),
+            "low": finite(self.low),
+            "high": finite(self.high),
+            "readings": {name: finite(seconds) for name, seconds in self.readings.items()},
         }
 
 
@@ -138,7 +138,7 @@ class Plan:
             "project": self.project.number,
             "order": list(self.order),
             "passes": self.passes,
-            "pass_seconds": self.pass_seconds,
+            "pass_seconds": finite(self.pass_seconds),
             "net_units_per_pass": self.net_units,
             "net_turns_per_pass": self.net_units / turn if turn else None,
             "estimate": self.estimate.data() | {"text": str(self.estimate)},
@@ -148,6 +148,11 @@ class Plan:
     def json(self) -> str:
         """As one JSON document."""
         return json.dumps(self.data(), indent=2, ensure_ascii=False) + "\n"
+
+
+def finite(seconds: float) -> float | None:
+    """None for a time without end, which JSON cannot say."""
+    return None if seconds == inf else seconds
 
 
 def plan(project: Project, how: Behaviour = USUAL, *, name: str = "") -> Plan:
