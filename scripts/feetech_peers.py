@@ -66,7 +66,7 @@ def _differences(everything: list[Session]) -> Iterator[str]:
     for session in everything:
         for step in [*session.steps(PORT), *session.generated()]:
             for name in step.why.split():
-                seen.setdefault(name, {})[session.library.name] = None
+                seen.setdefault(name, {})[session.peer.name] = None
     yield "## Differences\n"
     rows = [
         [f'<a id="{name}"></a>{name}', ", ".join(seen.get(name, {})) or "all three", note.they, note.we]
@@ -82,7 +82,7 @@ def _left_out() -> Iterator[str]:
 
 def _library(library: Library, everything: list[Session]) -> Iterator[str]:
     yield f"## {library.name} {library.version}\n"
-    mine = [session for session in everything if session.library is library]
+    mine = [session for session in everything if session.peer is library]
     subjects = dict.fromkeys(session.subject for session in mine)
     for subject in subjects:
         group = [session for session in mine if session.subject == subject]

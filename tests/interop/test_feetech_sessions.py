@@ -40,7 +40,7 @@ def test_gives_and_leaves_what_is_due(
     session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    with Twin(tmp_path, *session.kinds) as twin, Peer(session.library) as peer:
+    with Twin(tmp_path, *session.kinds) as twin, Peer(session.peer) as peer:
         session.prepare(peer, twin.port)
         for step in [*session.generated(), *session.steps(twin.port)]:
             carry_out(step, peer, twin)
@@ -48,7 +48,7 @@ def test_gives_and_leaves_what_is_due(
 
 def called(library: Library, owner: str) -> set[str]:
     """The names that sessions with this library call of this class."""
-    mine = [session for session in ALL if session.library is library]
+    mine = [session for session in ALL if session.peer is library]
     return {
         call.name
         for session in mine

@@ -29,12 +29,12 @@ PONG: Final = [0xFF, 0xFF, 1, 2, 0, 0xFC]
 class Sdk(NamedTuple):
     """One of the two, at a servo of one kind: `old` takes the port with every call."""
 
-    library: Library
+    peer: Library
     kind: Kind
 
     @property
     def old(self) -> bool:
-        return self.library is OLD_SDK
+        return self.peer is OLD_SDK
 
     @property
     def end(self) -> int:

@@ -34,7 +34,7 @@ class Session(NamedTuple):
     of the steps that belong to generated calls, which the page sums up by register.
     """
 
-    library: Library
+    peer: Library
     subject: str
     kinds: tuple[Kind, ...]
     prepare: Callable[[Peer, str], None]
@@ -45,7 +45,7 @@ class Session(NamedTuple):
     def id(self) -> str:
         """Its name for tests."""
         servos = self.kinds[0].model if len(self.kinds) == 1 else "three kinds"
-        return f"{self.library.name} {self.subject} {servos}".replace("  ", " ")
+        return f"{self.peer.name} {self.subject} {servos}".replace("  ", " ")
 
     def owner(self, handle: str) -> str:
         """The class of what is kept under this handle."""
