@@ -10,7 +10,8 @@ from motorbus.core.family import Explanation
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.explain import explain
 from tests.families.feetech.test_wire_stream import STREAMS
-from tests.families.feetech.vectors import INVALID, REPLIES, REQUESTS, VALID, Vector, name_of
+from tests.families.feetech.vectors import INVALID, REPLIES, REQUESTS, VALID, name_of
+from tests.families.vectors import Vector
 
 
 def told(text: str) -> list[Explanation]:

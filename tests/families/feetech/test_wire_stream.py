@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from motorbus.core.family import Receiver
 from motorbus.core.operation import CanFrame, Noise, Reply
 from motorbus.families.feetech import wire
-from tests.families.feetech.vectors import REPLIES, Vector, name_of
+from tests.families.feetech.vectors import REPLIES, name_of
+from tests.families.vectors import Vector
 
 Event = TypeVar("Event")
 HELD = 4096

@@ -16,9 +16,9 @@ from tests.families.feetech.vectors import (
     REPLIES,
     REQUESTS,
     VALID,
-    Vector,
     name_of,
 )
+from tests.families.vectors import Vector
 
 # Each of these ends where the packet begins; the last three look like packets that would swallow it.
 BEFORE = [

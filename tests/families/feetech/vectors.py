@@ -6,50 +6,10 @@ should have been; `further` what the manual does not show. Sums of `further` wer
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any, NamedTuple
+from tests.families.vectors import Vector, load
 
-FOLDER = Path(__file__).parent.parent.parent / "vectors" / "feetech"
-
-
-class Vector(NamedTuple):
-    """One packet, which way it goes, whether it is one at all, and what its fields say."""
-
-    id: str
-    errata: str
-    data: bytes
-    direction: str
-    valid: bool
-    meaning: str
-    source: str
-    expected: dict[str, Any]
-
-    @property
-    def parameters(self) -> bytes:
-        return bytes.fromhex(self.expected["parameters"])
-
-
-def load(name: str) -> list[Vector]:
-    """The vectors of one file."""
-    rows = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    return [
-        Vector(
-            row["id"],
-            row["errata"],
-            bytes.fromhex(row["hex"]),
-            row["direction"],
-            row["verdict"] == "valid",
-            row["meaning"],
-            row["source"],
-            row["expected"],
-        )
-        for row in rows
-    ]
-
-
-MANUAL = load("manual")
-ALL = [*MANUAL, *load("corrected"), *load("further")]
+MANUAL = load("feetech", "manual")
+ALL = [*MANUAL, *load("feetech", "corrected"), *load("feetech", "further")]
 VALID = [vector for vector in ALL if vector.valid]
 INVALID = [vector for vector in ALL if not vector.valid]
 REPLIES = [vector for vector in VALID if vector.direction == "status"]

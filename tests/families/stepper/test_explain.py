@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from motorbus.core.family import Explanation
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.explain import explain
-from tests.families.stepper.vectors import ALL, DUMP_A, DUMP_B, INVALID, VALID, Vector, name_of
+from tests.families.stepper.vectors import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
+from tests.families.vectors import Vector
 
 KNOWN = st.sampled_from([vector.data for vector in ALL])
 

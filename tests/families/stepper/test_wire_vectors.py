@@ -19,9 +19,9 @@ from tests.families.stepper.vectors import (
     REPLIES,
     REQUESTS,
     VALID,
-    Vector,
     name_of,
 )
+from tests.families.vectors import Vector
 
 PAIRS = [
     (request, reply)

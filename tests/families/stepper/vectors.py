@@ -9,45 +9,11 @@ of motorbus.
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-FOLDER = Path(__file__).parent.parent.parent / "vectors" / "stepper"
+from tests.families.vectors import VECTORS, Vector, load
 
-
-class Vector(NamedTuple):
-    """One frame, which way it goes, whether it is one at all, and what its fields say."""
-
-    id: str
-    errata: str
-    data: bytes
-    direction: str
-    valid: bool
-    meaning: str
-    source: str
-    expected: dict[str, Any]
-
-    @property
-    def command(self) -> str:
-        return str(self.expected["command"])
-
-
-def load(name: str) -> list[Vector]:
-    """The vectors of one file."""
-    rows = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    return [
-        Vector(
-            row["id"],
-            row["errata"],
-            bytes.fromhex(row["hex"]),
-            row["direction"],
-            row["verdict"] == "valid",
-            row["meaning"],
-            row["source"],
-            row["expected"],
-        )
-        for row in rows
-    ]
+FOLDER = VECTORS / "stepper"
 
 
 def behaviour(name: str) -> list[dict[str, Any]]:
@@ -58,9 +24,9 @@ def behaviour(name: str) -> list[dict[str, Any]]:
     return found
 
 
-MANUAL = load("manual")
-DUMPS = load("dumps")
-ALL = [*MANUAL, *load("further"), *DUMPS, *load("invalid")]
+MANUAL = load("stepper", "manual")
+DUMPS = load("stepper", "dumps")
+ALL = [*MANUAL, *load("stepper", "further"), *DUMPS, *load("stepper", "invalid")]
 VALID = [vector for vector in ALL if vector.valid]
 INVALID = [vector for vector in ALL if not vector.valid]
 REQUESTS = [vector for vector in VALID if vector.direction == "instruction"]

@@ -24,7 +24,8 @@ from tests.families.stepper.simulator.host import (
     step,
     written,
 )
-from tests.families.stepper.vectors import DUMP_A, DUMP_B, MANUAL, REQUESTS, Vector, name_of
+from tests.families.stepper.vectors import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
+from tests.families.vectors import Vector
 
 EXAMPLES = [
     (request, reply)
