@@ -55,7 +55,7 @@ def test_what_a_listener_raises_is_its_own() -> None:
     script.turns.submit(good, script.now)
     script.turns._take(Notice(1, "end", b""), script.now)
     assert isinstance(bad.error, ZeroDivisionError)
-    assert good.value == Notice(1, "end", b"")
+    assert good.value == Notice(1, "end", b"", script.now)
 
 
 def test_a_write_that_never_left_is_no_unknown_outcome() -> None:

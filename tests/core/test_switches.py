@@ -21,6 +21,7 @@ class Doubts:
     byte: int = switch(0, "a byte", source="an assumption", span=(0, 255))
     wait: float = switch(0.1, "seconds", source="an assumption")
     name: str = switch("", "any text", source="an assumption")
+    echo: str = switch("no", "what comes back", "no", "yes", "half", source="an assumption")
 
 
 def test_text_and_values_mean_the_same() -> None:
@@ -31,6 +32,11 @@ def test_text_and_values_mean_the_same() -> None:
     )
     assert text == Doubts(reply="old", keeps=False, rate=250, byte=16, wait=1.0, name="x")
     assert switched(Doubts, "any", {}) == Doubts()
+
+
+def test_yes_and_no_may_be_said_as_truth_where_there_are_more_choices() -> None:
+    said = [switched(Doubts, "any", {"echo": value}).echo for value in (True, False, "half")]
+    assert said == ["yes", "no", "half"]
 
 
 @pytest.mark.parametrize(
@@ -56,6 +62,14 @@ def test_what_is_impossible_is_refused_by_name(name: str, value: str, says: str,
 def test_every_switch_is_an_option_with_its_choices_and_its_source() -> None:
     found = options(Doubts)
     assert found[0] == Option("reply", str, "new", "which id answers", ("new", "old"), "not documented")
-    assert [option.choices for option in found] == [("new", "old"), (), (250, 500), (), (), ()]
+    assert [option.choices for option in found] == [
+        ("new", "old"),
+        (),
+        (250, 500),
+        (),
+        (),
+        (),
+        ("no", "yes", "half"),
+    ]
     assert all(option.source for option in found)
-    assert [option.kind for option in found] == [str, bool, int, int, float, str]
+    assert [option.kind for option in found] == [str, bool, int, int, float, str, str]

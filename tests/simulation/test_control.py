@@ -70,6 +70,7 @@ def test_help_names_every_order() -> None:
     bus = stepper.simulate((1,))  # it has inputs, and all else that any other has
     for word in obey(bus, "help").split(" | "):
         order = word.replace("[ID]", "").replace("ID", "1").replace("INPUT on|off", "2 on")
+        order = order.replace("[NAME=VALUE …]", "echo=six seed=3")
         assert not obey(bus, order).startswith("error")
 
 
@@ -83,6 +84,9 @@ def test_help_names_every_order() -> None:
         ("status now", "error: the order is: status"),
         ("power-cycle 1 2", "error: the order is: power-cycle [ID]"),
         ("set-input 1 2 on", "error: node 1 has no inputs"),
+        ("fault 1 echo=yes", "error: node 1 has no faults to switch"),
+        ("notice 1", "error: node 1 has nothing to say unasked"),
+        ("log 1", "error: node 1 has no log"),
         ("unplug 9", "error: there is no node 9; there are: 1, 3"),
         ("unplug one", "error: there is no node one"),
     ],
@@ -91,6 +95,63 @@ def test_a_bad_order_gets_one_clear_line(text: str, says: str) -> None:
     answer = obey(simulate((1, 3)), text)
     assert answer.startswith(says)
     assert "\n" not in answer
+
+
+def test_faults_come_and_go() -> None:
+    bus = stepper.simulate((1,))
+    assert obey(bus, "fault 0x1 reply_fault=lost fault-every=3") == "ok"
+    faults = json.loads(obey(bus, "fault 1"))
+    assert (faults["schema"], faults["simulated"]) == ("motorbus.simulator-faults/1", True)
+    assert faults["faults"]["reply_fault"] == "lost"
+    assert faults["faults"]["fault_every"] == 3
+    assert obey(bus, "fault 1 reply_fault=none") == "ok"
+    assert (bus.switches.reply_fault, bus.switches.fault_every) == ("none", 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("fault", "error: the order is: fault ID [NAME=VALUE …]"),
+        ("fault 1 echo", "error: the order is: fault ID [NAME=VALUE …], each name once"),
+        ("fault 1 echo=", "error: the order is: fault ID [NAME=VALUE …], each name once"),
+        ("fault 1 echo=six echo=no", "error: the order is: fault ID [NAME=VALUE …], each name once"),
+        (
+            "fault 1 echo=six reply_fault=torn",
+            "error: option reply_fault: 'torn' is not possible; expected one of",
+        ),
+        (
+            "fault 1 echo=six reply_falt=bit",
+            "error: a simulated stepper bus has no option 'reply_falt'; expected",
+        ),
+        (
+            "fault 1 echo=six ramp=pulse",
+            "error: option ramp cannot be changed while the controller runs; expected",
+        ),
+        ("fault 7 echo=six", "error: there is no node 7; there are: 1"),
+        ("notice", "error: the order is: notice ID"),
+        ("log 1 2", "error: the order is: log [ID]"),
+    ],
+)
+def test_a_bad_fault_gets_one_clear_line_and_changes_nothing(text: str, says: str) -> None:
+    bus = stepper.simulate((1,))
+    answer = obey(bus, text)
+    assert answer.startswith(says)
+    assert "\n" not in answer
+    assert bus.switches == stepper.Switches()
+
+
+def test_the_log_gives_the_latest_remarks() -> None:
+    bus = stepper.simulate((1,))
+    bus.advance(1000.0)
+    bus.advance(1002.5)
+    for number in range(25):
+        bus.controller.remark(f"again {number}")
+    for order in ("log", "log 1"):
+        found = json.loads(obey(bus, order))
+        assert (found["schema"], found["simulated"]) == ("motorbus.simulator-log/1", True)
+        assert [one["number"] for one in found["remarks"]] == list(range(6, 26))
+        assert found["remarks"][-1] == {"id": 1, "number": 25, "at": 2.5, "text": "again 24"}
+    assert json.loads(obey(simulate((1, 2)), "log"))["remarks"] == []
 
 
 def test_ids_may_be_hexadecimal() -> None:

@@ -177,8 +177,9 @@ class Air:
             self._take_reply(event, now)
         elif isinstance(event, Notice):
             self.statistics.other["notices"] += 1
-            self.notices.put(event)
-            self._heard(event)
+            arrived = event._replace(at=now)
+            self.notices.put(arrived)
+            self._heard(arrived)
         else:
             self._take_noise(event, now)
 

@@ -294,7 +294,7 @@ class Turns(Air):
         for timer in list(self._timers) if self._timers else ():
             if now >= timer.deadline:
                 self._timers.remove(timer)
-                self._settle(timer)
+                self._settle(timer, now if isinstance(timer, Timer) else None)
 
     def _landed(self) -> None:
         self._grant_claim()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
-from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Rank, Together, Tune
+from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Pause, Rank, Together, Tune
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
@@ -104,7 +104,9 @@ class DryBus:
             return self._bus.run(
                 iter(step)
             )  # on CAN whoever speaks at another rate disturbs the bus: only ask there
-        return None  # a pause, a report, another rate: nothing is sent
+        if isinstance(step, Pause):
+            return self.link.now()
+        return None  # a report, another rate: nothing is sent
 
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:

@@ -25,6 +25,7 @@ from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
+from motorbus.simulation.remarks import Remarks
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -37,7 +38,11 @@ app = App(
 removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
-status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off, help.
+status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
+fault ID [NAME=VALUE …], notice ID, log [ID], help.
+
+What devices remark and tell no host, such as a number out of range, is said
+on stderr with its moment, in seconds from the start; --quiet leaves it out.
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
@@ -56,6 +61,7 @@ Examples:
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
     motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
     motorbus simulate stepper --link /tmp/stepper --inputs buttons.txt
+    motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost
     motorbus simulate feetech --switches""",
 )
 
@@ -78,6 +84,7 @@ _OWN = (
     "bitrate",
     "control",
     "inputs",
+    "quiet",
     "switch",
 )
 
@@ -107,6 +114,7 @@ def simulate(
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
     inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
+    quiet: Annotated[Flag, Parameter(help="Do not say on stderr what they remark.")] = False,
     switch: Switched = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
@@ -138,8 +146,21 @@ def simulate(
         output.document("motorbus.simulate/1", facts)
         names = " and ".join(buses)
         output.text(f"ready: {names}  (simulated: {len(nodes)} {family} devices, ids {ids})")
-        mount.serve(stop)
+        if quiet:
+            mount.serve(stop)
+        else:
+            _serve(mount, stop, output)
     return Exit.OK
+
+
+def _serve(mount: Mount, stop: int, output: Output) -> None:
+    """Serve until told to stop, and say what the devices remark."""
+    remarks = Remarks(mount.simulator)
+    while not mount.step(stop):
+        for line in remarks.lines(time.monotonic()):
+            output.note(line)
+    for line in (*remarks.lines(time.monotonic()), *remarks.rest()):
+        output.note(line)
 
 
 def _scripted(simulator: object, path: Path | None, family: str) -> None:

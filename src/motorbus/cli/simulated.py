@@ -40,7 +40,10 @@ class Simulated:
             *(["--link", str(link)] if link else []),
             *(["--tcp", tcp] if tcp else []),
         ]
-        words += ["--pace"] if pace else []
+        words += [
+            "--quiet",
+            *(["--pace"] if pace else []),
+        ]  # nobody reads its stderr, and a full pipe would stop it
         words += [word for name, value in more.items() for word in (f"--{name}", value)]
         self._command = [sys.executable, "-m", "motorbus.cli", "simulate", *words, "--json"]
         self._process: subprocess.Popen[str] | None = None

@@ -139,8 +139,25 @@ class RawMemory(Protocol):
     def __getitem__(self, name: str, /) -> int: ...
 
 
+class Remark(NamedTuple):
+    """What a simulated device notes and tells no host: what it ignored, what a fault has done.
+
+    `number` counts its remarks from 1, `at` is s since the simulation began, as in a script of inputs.
+    """
+
+    number: int
+    at: float
+    text: str
+
+
 class SimulatedNode(Protocol):
-    """One simulated device, as a test or a control socket pokes it. `memory` is what it holds at this moment."""
+    """One simulated device, as a test or a control socket pokes it. `memory` is what it holds at this moment.
+
+    What only some have: `set_input(number, active)`. `log`, their latest `Remark`s in order. `notice()`, which lets the
+    device say what it says unasked although nothing has caused it. `switch(**changes)`, which changes switches while it
+    runs, as far as that makes sense, and gives all such switches as they are then; for an impossible name or value it
+    raises RequestError and has changed nothing.
+    """
 
     @property
     def memory(self) -> RawMemory: ...

@@ -122,11 +122,15 @@ class Reply(NamedTuple):
 
 
 class Notice(NamedTuple):
-    """A frame the device sent on its own account: a report, an alarm, the end of a program."""
+    """A frame the device sent on its own account: a report, an alarm, the end of a program.
+
+    `at` is when it arrived, s on the link's clock; the bus fills it in, for who makes a notice has no clock.
+    """
 
     node: int
     kind: str
     data: bytes
+    at: float = 0.0
 
 
 class Noise(NamedTuple):
@@ -264,15 +268,16 @@ class Alone(Generic[T_co]):
 
 
 class Pause:
-    """Let at least `seconds` pass on the link's clock."""
+    """Let at least `seconds` pass on the link's clock; gives the moment (s) it is over. 0 only asks what time it is."""
 
     __slots__ = ("seconds",)
 
     def __init__(self, seconds: float) -> None:
         self.seconds: Final = seconds
 
-    def __iter__(self) -> Generator[Step, Any, None]:
-        yield self
+    def __iter__(self) -> Generator[Step, Any, float]:
+        moment: float = yield self
+        return moment
 
 
 class Listen:

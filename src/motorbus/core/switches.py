@@ -60,7 +60,7 @@ def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
 
 def _value(one: Field[Any], value: object) -> object:
     choices, span = one.metadata["choices"], one.metadata["span"]
-    found: object = str(value)
+    found: object = ("no", "yes")[value] if isinstance(value, bool) else str(value)
     if isinstance(one.default, bool):
         return _truth(one.name, value)
     if isinstance(one.default, int | float):

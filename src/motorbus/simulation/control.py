@@ -1,4 +1,4 @@
-"""A local socket that takes orders while a simulator is served: look at it, cut its power, pull a plug.
+"""A local socket that takes orders while a simulator is served: look at it, cut its power, pull a plug, do it harm.
 
 One line is one order and gets one line back, so that `socat - UNIX-CONNECT:PATH` is all the client it needs. The
 socket is for its owner alone (mode 0600).
@@ -13,6 +13,7 @@ import socket
 import stat
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
@@ -20,7 +21,14 @@ from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 LONGEST_LINE = 4096
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
-HELP = "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | help"
+FAULTS = "motorbus.simulator-faults/1"
+LOG = "motorbus.simulator-log/1"
+LATEST = 20
+"""Remarks of each node that `log` gives."""
+HELP = (
+    "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | fault ID [NAME=VALUE …] | notice ID"
+    " | log [ID] | help"
+)
 
 
 class ControlSocket:
@@ -107,7 +115,7 @@ def obey(simulator: Simulator, line: str) -> str:
             raise RequestError(f"{line.strip()!r} is not an order; there are: {HELP}")
         return _ORDERS[words[0]](simulator, words[1:])
     except MotorbusError as error:
-        return f"error: {error.summary}"
+        return f"error: {error.summary}" + (f"; expected {error.expected}" if error.expected else "")
 
 
 def _status(simulator: Simulator, words: list[str]) -> str:
@@ -139,14 +147,54 @@ def _set_input(simulator: Simulator, words: list[str]) -> str:
     """Of a node that has inputs, and so the method `set_input(number, active)`."""
     form = "set-input ID INPUT on|off"
     _expect(words, at_least=3, at_most=3, order=form)
-    node = _node(simulator, words[0])
-    press: Callable[[int, bool], None] | None = getattr(node, "set_input", None)
-    if press is None:
-        raise RequestError(f"node {words[0]} has no inputs")
+    press: Callable[[int, bool], None] = _able(simulator, words[0], "set_input", "no inputs")
     if not words[1].isdecimal() or words[2] not in ("on", "off"):
         raise RequestError(f"the order is: {form}")
     press(int(words[1]), words[2] == "on")
     return "ok"
+
+
+def _fault(simulator: Simulator, words: list[str]) -> str:
+    """Of a node that has switches which can be changed, and so the method `switch(**changes)`."""
+    form = "fault ID [NAME=VALUE …]"
+    _expect(words, at_least=1, at_most=100, order=form)
+    change: Callable[..., dict[str, object]] = _able(simulator, words[0], "switch", "no faults to switch")
+    pairs = [word.partition("=")[::2] for word in words[1:]]
+    names = [name.replace("-", "_") for name, _ in pairs]
+    if not all(name and value for name, value in pairs) or len(set(names)) < len(names):
+        raise RequestError(f"the order is: {form}, each name once")
+    now = change(**dict(zip(names, (value for _, value in pairs), strict=True)))
+    return "ok" if pairs else json.dumps({"schema": FAULTS, "simulated": True, "faults": now})
+
+
+def _notice(simulator: Simulator, words: list[str]) -> str:
+    """Of a node that says something unasked, and so has the method `notice()`."""
+    _expect(words, at_least=1, at_most=1, order="notice ID")
+    say: Callable[[], None] = _able(simulator, words[0], "notice", "nothing to say unasked")
+    say()
+    return "ok"
+
+
+def _log(simulator: Simulator, words: list[str]) -> str:
+    """Of nodes that have a `log`."""
+    _expect(words, at_most=1, order="log [ID]")
+    if words:
+        _able(simulator, words[0], "log", "no log")
+    nodes = {int(words[0], 0): _node(simulator, words[0])} if words else simulator.nodes
+    said = [
+        {"id": id, **remark._asdict()}
+        for id in sorted(nodes)
+        for remark in getattr(nodes[id], "log", [])[-LATEST:]
+    ]
+    return json.dumps({"schema": LOG, "simulated": True, "remarks": said})
+
+
+def _able(simulator: Simulator, id: str, name: str, lacks: str) -> Any:
+    """What this node has under a name that only some have."""
+    found = getattr(_node(simulator, id), name, None)
+    if found is None:
+        raise RequestError(f"node {id} has {lacks}")
+    return found
 
 
 def _help(simulator: Simulator, words: list[str]) -> str:
@@ -159,6 +207,9 @@ _ORDERS: dict[str, Callable[[Simulator, list[str]], str]] = {
     "unplug": _unplug,
     "plug": _plug,
     "set-input": _set_input,
+    "fault": _fault,
+    "notice": _notice,
+    "log": _log,
     "help": _help,
 }
 

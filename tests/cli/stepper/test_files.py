@@ -8,6 +8,8 @@ import pytest
 
 from motorbus.cli.stepper.files import loaded, reading
 from motorbus.errors import RequestError
+from motorbus.families.stepper import Program
+from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
 from tests.families.stepper.vectors import DUMP_B
 
@@ -43,3 +45,38 @@ def test_readings_are_switches_by_their_names() -> None:
     assert reading({"seg-loop": "extra", "ramp_tick_ms": "10"}).ramp_tick_ms == 10
     with pytest.raises(RequestError, match="there is no --turnaround"):
         reading({"turnaround": "1"})  # of the line, and not of a run
+
+
+def test_a_dump_with_the_highest_byte_first_is_read_as_such(tmp_path: Path) -> None:
+    program = Program.load(EXAMPLE)
+    path = tmp_path / "big.bin"
+    path.write_bytes(program.dump("big"))
+    assert loaded(path, "big").project == program.project
+    assert loaded(path).project != program.project
+    with pytest.raises(RequestError, match="dump_order='middle' is not possible"):
+        loaded(path, "middle")
+
+
+@pytest.mark.parametrize("command", ["check", "estimate", "order", "show", "convert"])
+def test_every_command_takes_the_order_of_a_dump(run: Run, tmp_path: Path, command: str) -> None:
+    text, big, little = (tmp_path / name for name in ("same.toml", "same.bin", "same.img"))
+    program = Program.from_dump(DUMP_B, name="same")
+    text.write_text(program.text(), encoding="utf-8")
+    big.write_bytes(program.dump("big"))
+    little.write_bytes(program.dump())
+    told = [
+        run("stepper", command, str(path), *words).out.replace(str(path), "FILE")
+        for path, words in ((text, ()), (big, ("--dump-order", "big")), (little, ()))
+    ]
+    assert [" ".join(one.split()) for one in told] == [" ".join(told[0].split())] * 3
+    assert told[0]
+
+
+def test_a_dump_is_written_and_explained_in_that_order_too(run: Run, tmp_path: Path) -> None:
+    big = tmp_path / "big.bin"
+    words = ("stepper", "convert", EXAMPLE, "--to", "dump", "--dump-order", "big", "--output", str(big))
+    assert run(*words).code == 0
+    assert big.read_bytes() == Program.load(EXAMPLE).dump("big")
+    ran = run("decode", "--family", "stepper", "--dump-order", "big", "--json", big.read_bytes().hex())
+    parts = {part["name"]: part["meaning"] for part in ran.document["frames"][0]["parts"]}
+    assert (ran.code, parts["step_3_distance"]) == (0, "120000 units")

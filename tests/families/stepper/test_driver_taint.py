@@ -124,7 +124,7 @@ def test_a_notice_at_any_moment_reaches_who_listens_and_taints_nobody() -> None:
         assert [asked(there, port) for port in range(1, 6)] == [port in ACTIVE for port in range(1, 6)]
         assert there.device.dump(1) == DUMP_A
         assert len(there.sent()) == 5 + 2, "nothing had to be asked again"
-        assert list(heard) == [Notice(1, "completed", NOTICE)] * 14
+        assert [one._replace(at=0.0) for one in heard] == [Notice(1, "completed", NOTICE)] * 14
         assert there.bus.statistics.nodes[1].errors == {}
 
 
@@ -136,7 +136,7 @@ def test_the_end_of_a_project_is_heard_while_one_listens() -> None:
         assert there.device.ping()
         there.simulated.set_input(3, True)
         begun = there.link.now()
-        assert there.run(waited()) == Notice(1, "completed", NOTICE)
+        assert there.run(waited()) == Notice(1, "completed", NOTICE, there.link.now())
         assert there.link.now() - begun == pytest.approx(1.6876, abs=0.01)  # a turn, then a second
 
 

@@ -8,9 +8,10 @@ from typing import Final
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import Silent
-from motorbus.cli.stepper.files import File, app, loaded
+from motorbus.cli.stepper.files import DumpOrder, File, app, loaded
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Program
+from motorbus.families.stepper.table import Order, checked_order
 
 KINDS: Final = ("toml", "dump", "image", "frames")
 
@@ -26,7 +27,14 @@ Examples:
     motorbus stepper convert examples/pick_and_place.toml --to frames
     motorbus stepper convert pick.toml --to dump --output pick.bin""",
 )
-def convert(file: File, *, to: str = "toml", output_: Path | None = None, output: Silent) -> Exit:
+def convert(
+    file: File,
+    *,
+    to: str = "toml",
+    output_: Path | None = None,
+    dump_order: DumpOrder = "little",
+    output: Silent,
+) -> Exit:
     """Turn a program into another form.
 
     Parameters
@@ -38,7 +46,7 @@ def convert(file: File, *, to: str = "toml", output_: Path | None = None, output
     """
     if to not in KINDS:
         raise RequestError(f"there is no form {to!r}", expected=f"one of {', '.join(KINDS)}")
-    text, data = _made(loaded(file), to)
+    text, data = _made(loaded(file, dump_order), to, checked_order(dump_order))
     if output_ is not None:
         with usable(output_, "written"):
             output_.write_bytes(data)
@@ -48,7 +56,7 @@ def convert(file: File, *, to: str = "toml", output_: Path | None = None, output
     return Exit.OK
 
 
-def _made(program: Program, to: str) -> tuple[str, bytes]:
+def _made(program: Program, to: str, order: Order) -> tuple[str, bytes]:
     """The text of it, and what a file of it holds."""
     if to == "toml":
         text = program.text()
@@ -56,7 +64,7 @@ def _made(program: Program, to: str) -> tuple[str, bytes]:
     if to == "frames":
         text = "\n".join(frame.hex(" ").upper() for frame in program.frames())
         return text, (text + "\n").encode()
-    data = program.dump() if to == "dump" else program.image()
+    data = program.dump(order) if to == "dump" else program.image(order)
     return data.hex(" ").upper(), data
 
 

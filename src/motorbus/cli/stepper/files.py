@@ -11,6 +11,7 @@ from motorbus.cli.files import usable
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
+from motorbus.families.stepper.table import checked_order
 
 NAME: Final = "stepper"
 LONGEST: Final = 1 << 20
@@ -19,6 +20,12 @@ app = App(name=NAME, help="What only stepper controllers can do.", help_epilogue
 
 File = Annotated[
     Path, Parameter(name="FILE", help="A program (.toml), or a dump: 226 or 220 bytes, or in hexadecimal.")
+]
+DumpOrder = Annotated[
+    str,
+    Parameter(
+        help="Which byte of a number comes first in a dump: little (the lowest, an assumption) or big.",
+    ),
 ]
 Readings = Annotated[
     str,
@@ -29,15 +36,21 @@ Readings = Annotated[
 ]
 
 
-def loaded(path: Path) -> Program:
-    """The program in this file. Raises RequestError, with the name of the file, for what cannot be."""
+def loaded(path: Path, order: str = "little") -> Program:
+    """The program in this file, a dump with this order of bytes.
+
+    Raises RequestError, with the name of the file, for what cannot be.
+    """
+    first = checked_order(order)
     is_text = path.suffix.lower() == ".toml"
     with usable(path, "read"):
         data = path.read_bytes()
     if len(data) > LONGEST:
         raise RequestError(f"{path} has {len(data)} bytes", expected=f"{LONGEST} at most")
     try:
-        return Program.parse(data.decode()) if is_text else Program.from_dump(data, name=path.stem)
+        if is_text:
+            return Program.parse(data.decode())
+        return Program.from_dump(data, name=path.stem, order=first)
     except UnicodeDecodeError as error:
         raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
     except RequestError as error:

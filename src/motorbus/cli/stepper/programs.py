@@ -7,15 +7,15 @@ from pathlib import Path
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Flag, Silent
-from motorbus.cli.stepper.files import File, Readings, app, loaded, reading
+from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, loaded, reading
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Conditions, Program
 
 
-def _all(files: tuple[Path, ...]) -> list[tuple[Path, Program]]:
+def _all(files: tuple[Path, ...], order: str) -> list[tuple[Path, Program]]:
     if not files:
         raise RequestError("no file is given", expected="one or more programs")
-    return [(file, loaded(file)) for file in files]
+    return [(file, loaded(file, order)) for file in files]
 
 
 @app.command(
@@ -34,6 +34,7 @@ def check(
     homing: Flag = False,
     unattended: Flag = False,
     strict: Flag = False,
+    dump_order: DumpOrder = "little",
     output: Silent,
     **readings: Readings,
 ) -> Exit:
@@ -54,7 +55,9 @@ def check(
     """
     how = reading(readings)
     conditions = Conditions(highest=highest, longest=longest, homing=homing, unattended=unattended, how=how)
-    found = [(file, finding) for file, program in _all(files) for finding in program.lint(conditions)]
+    found = [
+        (file, finding) for file, program in _all(files, dump_order) for finding in program.lint(conditions)
+    ]
     facts = [
         {
             "file": str(file),
@@ -86,10 +89,10 @@ Examples:
     motorbus stepper estimate examples/pick_and_place.toml
     motorbus stepper estimate --ramp pulse examples/pick_and_place.toml""",
 )
-def estimate(*files: File, output: Silent, **readings: Readings) -> Exit:
+def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say how long a program takes."""
     how = reading(readings)
-    found = [(file, program, program.estimate(how)) for file, program in _all(files)]
+    found = [(file, program, program.estimate(how)) for file, program in _all(files, dump_order)]
     facts = [
         {"file": str(file), "name": program.name, **one.data(), "text": str(one)}
         for file, program, one in found
@@ -105,10 +108,10 @@ def estimate(*files: File, output: Silent, **readings: Readings) -> Exit:
     motorbus stepper order examples/pick_and_place.toml
     motorbus stepper order --seg-loop extra examples/pick_and_place.toml""",
 )
-def order(*files: File, output: Silent, **readings: Readings) -> Exit:
+def order(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say in which order the steps of a program come, and how often."""
     how = reading(readings)
-    plans = [(file, program.plan(how)) for file, program in _all(files)]
+    plans = [(file, program.plan(how)) for file, program in _all(files, dump_order)]
     facts = [{"file": str(file), "order": list(one.order), "passes": one.passes} for file, one in plans]
     output.document("motorbus.stepper.order/1", {"programs": facts})
     _lines(output, [(file, f"{' '.join(map(str, one.order))}  {_passes(one.passes)}") for file, one in plans])

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import Silent
-from motorbus.cli.stepper.files import File, Readings, app, loaded, reading
+from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, loaded, reading
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from motorbus.families.stepper import Behaviour, Plan, Program
+    from motorbus.families.stepper.program import StepPlan
 
 _COLUMNS = (
     *(">step", ">times", ">units", ">pulses", ">Hz", "shape", ">motion s", ">pause s", "output", "waits for"),
@@ -39,6 +40,7 @@ def show(
     output_: Path | None = None,
     wait: float = 1.0,
     passes: int = 1,
+    dump_order: DumpOrder = "little",
     output: Silent,
     **readings: Readings,
 ) -> Exit:
@@ -56,7 +58,7 @@ def show(
     if not 0 <= wait <= 1e6 or passes < 1:
         raise RequestError("--wait and --passes: that is not possible", expected="0 s or more, 1 or more")
     how = reading(readings)
-    program = loaded(file)
+    program = loaded(file, dump_order)
     plan = program.plan(how)
     if output_ is not None:
         _draw(program, how, output_, wait, passes)
@@ -81,9 +83,14 @@ def _rows(plan: Plan, program: Program) -> Iterator[tuple[object, ...]]:
             input_name(port, program.inputs) if port else "" for port in (step.start_input, step.stop_input)
         )
         yield (
-            *(step.number, step.times, step.units, step.sent, f"{step.frequency:.6g}", step.shape),
+            *(step.number, step.times, step.units, _pulses(step), f"{step.frequency:.6g}", step.shape),
             *(f"{step.motion:.3f}", f"{step.delay:g}", output, waits, ends),
         )
+
+
+def _pulses(step: StepPlan) -> str:
+    fewest = min(step.runs)
+    return str(step.sent) if fewest == step.sent else f"{fewest} to {step.sent}"
 
 
 def _draw(program: Program, how: Behaviour, path: Path, wait: float, passes: int) -> None:

@@ -45,7 +45,7 @@ from motorbus.families.stepper.driver import (
 )
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
-from motorbus.families.stepper.table import RATE, TABLES
+from motorbus.families.stepper.table import RATE, TABLES, Order, checked_order
 
 __all__ = [
     "FAMILY",
@@ -64,18 +64,33 @@ __all__ = [
 
 _SETTINGS: Final = (
     Option("motor", int, wire.MOTOR, "the number that motor commands name; the manual knows 3 only"),
-)
+    Option(
+        "dump_order", str, "little", "which byte of a number comes first in a dump, the lowest or the highest",
+        ("little", "big"),
+        "stepper controller serial protocol manual has the lowest first in requests and says nothing of the dump",
+    ),
+)  # fmt: skip
 
 
 class Stepper:
-    """The family of the stepper controller; see `motorbus.core.family.Family` for each member. It keeps nothing."""
+    """The family of the stepper controller; see `motorbus.core.family.Family` for each member.
+
+    `FAMILY` keeps nothing; one that is configured for a bus keeps what was said on it, see `driver.Memory`.
+    """
 
     name: Final = "stepper"
     tables: Final[Mapping[str, Table]] = TABLES
     devices: Final = Devices(Controller, AsyncController)
 
-    def __init__(self, motor: int = wire.MOTOR) -> None:
+    def __init__(
+        self,
+        motor: int = wire.MOTOR,
+        dump_order: Order = "little",
+        memory: driver.Memory | None = None,
+    ) -> None:
         self._motor = motor
+        self._order = dump_order
+        self._memory = memory
 
     @cached_property
     def link(self) -> LinkNeeds:
@@ -84,9 +99,13 @@ class Stepper:
         return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS)
 
     def configured(self, **settings: object) -> Stepper:
-        for name in settings.keys() - {"motor"}:
-            raise RequestError(f"a stepper bus has no setting {name!r}", expected="motor")
-        return Stepper(driver.checked_motor(settings["motor"])) if settings else self
+        for name in settings.keys() - {"motor", "dump_order"}:
+            raise RequestError(f"a stepper bus has no setting {name!r}", expected="motor or dump_order")
+        motor, order = settings.get("motor", self._motor), settings.get("dump_order", self._order)
+        return Stepper(driver.checked_motor(motor), checked_order(order), driver.Memory())
+
+    def _node(self, node: int = wire.ONLY) -> driver.Node:
+        return driver.Node(node, self._motor, self._order, self._memory)
 
     def lane(self, node: int) -> int:
         return 0
@@ -101,24 +120,24 @@ class Stepper:
         return line.quiet_time(rate)
 
     def echo_test(self) -> Exchange[bytes]:
-        return driver.dump_once(driver.Node(motor=self._motor), 1)
+        return driver.dump_once(self._node(), 1)
 
     def explain(self, data: bytes) -> list[Explanation]:
         from motorbus.families.stepper.explain import explain
 
-        return explain(data)
+        return explain(data, self._order)
 
     def receiver(self) -> Receiver:
         return wire.Receiver()
 
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
-        return presence.probe(driver.Node(node, self._motor), attempt)
+        return presence.probe(self._node(node), attempt)
 
     def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
         return stopping.stop_all(nodes, self._motor)
 
     def identify(self, node: int) -> Runnable[Identity]:
-        return driver.identify(driver.Node(node, self._motor))
+        return driver.identify(self._node(node))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
         return driver.scan(ids, rates, self._motor)
@@ -129,7 +148,7 @@ class Stepper:
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.stepper.simulator import simulate
 
-        options.setdefault("motor", self._motor)
+        options = {"motor": self._motor, "dump_order": self._order, **options}
         return simulate(ids, model, **options)
 
 

@@ -34,10 +34,11 @@ class Field(NamedTuple):
     meaning: str
 
 
-def explain(data: bytes) -> list[Explanation]:
+def explain(data: bytes, order: table.Order = "little") -> list[Explanation]:
     """Every frame in a run of bytes, in order, in parts that hold all of its bytes; `fault` is "" for a good one.
 
-    What belongs to no frame is a run of its own, and bad. Never raises.
+    What belongs to no frame is a run of its own, and bad. `order` says which byte of a number comes first in dumps; in
+    requests it is always the lowest. Never raises.
     """
     told: list[Explanation] = []
     start = noise = 0
@@ -48,7 +49,7 @@ def explain(data: bytes) -> list[Explanation]:
             continue
         if noise < start:
             told.append(_stray(data[noise:start]))
-        told.append(_explained(data[start : start + size]))
+        told.append(_explained(data[start : start + size], order))
         start = noise = start + size
     return [*told, _stray(data[noise:])] if noise < len(data) else told
 
@@ -80,7 +81,7 @@ def _begins_in(data: bytes) -> bool:
     return any(header in data for header in _HEADERS) or data[-1:] in (b"\xff", b"\xee")
 
 
-def _explained(data: bytes) -> Explanation:
+def _explained(data: bytes, order: table.Order) -> Explanation:
     if data == wire.NOTICE:
         return _made(
             data, "a project has run to its end", [Field(2, "notice", "a project that was started has ended")]
@@ -89,7 +90,7 @@ def _explained(data: bytes) -> Explanation:
         return _request(data)
     if len(data) < wire.REPLY_LENGTH:
         return _short(data, f"{len(data)} bytes of a reply of {wire.REPLY_LENGTH}")
-    return _dump(data) if _is_dump(data) else _reply(data)
+    return _dump(data, order) if _is_dump(data) else _reply(data)
 
 
 def _stray(data: bytes) -> Explanation:
@@ -201,7 +202,7 @@ def _value(name: str, raw: int, command: wire.Command | None = None) -> str:
 # --- the dump -------------------------------------------------------------------------------------------------------
 
 
-def _dump(data: bytes) -> Explanation:
+def _dump(data: bytes, order: table.Order) -> Explanation:
     if fault := wire.dump_fault(data):
         head = [
             *_head(data, wire.COMMANDS["read_project"]),
@@ -211,17 +212,17 @@ def _dump(data: bytes) -> Explanation:
         rest = Field(len(data) - wire.REPLY_LENGTH, "image", "not all of it")
         return _made(data, f"a dump of project {data[3]} that is not whole", [*head, rest], fault)
     image = data[wire.REPLY_LENGTH :]
-    project = table.decode_image(image)
+    project = table.decode_image(image, order)
     fields = [
         *_head(data, wire.COMMANDS["read_project"]),
         Field(1, "project", str(data[3])),
         Field(2, "fixed", "00 00"),
     ]
-    fields += _row(image, table.BASE, 0, "project")
+    fields += _row(image, table.BASE, 0, order)
     for number in range(1, table.STEPS + 1):
         bare = image[number * wire.ROW_LENGTH : (number + 1) * wire.ROW_LENGTH]
         if any(bare):
-            fields += _row(image, table.STEP, number, f"step {number}")
+            fields += _row(image, table.STEP, number, order)
         else:
             fields.append(Field(wire.ROW_LENGTH, f"step {number}", "all 0"))
     faults = (
@@ -235,13 +236,14 @@ def _dump(data: bytes) -> Explanation:
     return _made(data, f"dump of project {data[3]}, {count}", fields, "; ".join(faults))
 
 
-def _row(image: bytes, rows: tuple[Entry, ...], number: int, where: str) -> Iterator[Field]:
+def _row(image: bytes, rows: tuple[Entry, ...], number: int, order: table.Order) -> Iterator[Field]:
+    where = f"step {number}" if number else "project"
     start = at = number * wire.ROW_LENGTH
     for row in rows:
         if at < start + row.address:
             yield _reserved(image[at : start + row.address], where)
             at = start + row.address
-        raw = row.decode(image[at : at + row.size])
+        raw = table.row_value(image, row, order, start)
         name = f"step_{number}_{row.name}" if number else row.name  # as it is read by
         yield Field(row.size, name, _value(row.name, raw))
         at += row.size

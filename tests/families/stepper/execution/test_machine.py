@@ -91,9 +91,11 @@ def test_homing_never_ends_without_its_switch() -> None:
     assert not course.state.homed
 
 
-def test_homing_on_the_switch_does_not_move() -> None:
-    course = Course((5,))("home", project())
-    assert (course.kinds, course.position, course.state.phase) == (["rests"], 0, Phase.IDLE)
+@pytest.mark.parametrize("notice", [False, True])
+def test_homing_on_the_switch_does_not_move_and_is_over_at_once(notice: bool) -> None:
+    course = Course((5,), notice_on_once=notice)("home", project())
+    assert (course.position, course.state.phase, course.state.homed) == (0, Phase.IDLE, False)
+    assert course.kinds == ["rests", *(["completed"] if notice else [])]
 
 
 def test_homing_may_slow_down_at_the_switch() -> None:

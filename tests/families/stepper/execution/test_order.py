@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import islice
 from typing import Any
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour, Place
-from motorbus.families.stepper.table import Project, Step
+from motorbus.families.stepper.table import Project, Step, with_steps
 from tests.families.stepper.execution import exact
 from tests.families.stepper.vectors import behaviour
 
@@ -78,7 +79,7 @@ GEOMETRY = Project(microsteps=16, step_angle=90, turn_distance=5000, total_steps
 
 @pytest.mark.parametrize(("rounding", "sent"), [("trunc", 72721), ("nearest", 72722), ("carry", 72721)])
 def test_pulses_that_are_not_whole(rounding: str, sent: int) -> None:
-    step = Step(distance=56814, direction=1)
+    step = Step(distance=56814, direction=1, speed=300)
     assert execution.exact_pulses(GEOMETRY, step) == Fraction(7272192, 100)
     found, residue = execution.pulses(GEOMETRY, step, Behaviour(rounding=rounding))
     assert found == sent
@@ -90,12 +91,36 @@ def test_what_is_carried_on_is_never_lost(moves: list[tuple[int, int]]) -> None:
     how = Behaviour(rounding="carry")
     residue, where, wanted = Fraction(0), 0, Fraction(0)
     for distance, direction in moves:
-        step = Step(distance=distance, direction=direction)
+        step = Step(distance=distance, direction=direction, speed=300)
         sent, residue = execution.pulses(GEOMETRY, step, how, residue)
         where += step.sign * sent
         wanted += step.sign * execution.exact_pulses(GEOMETRY, step)
         assert wanted - where == residue
         assert abs(residue) <= 1
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 9999), st.integers(0, 1), st.integers(0, 2)), min_size=3, max_size=3),
+    st.integers(1, 5),
+    st.integers(1, 4),
+    st.sampled_from(["trunc", "nearest", "carry"]),
+)
+def test_what_is_sent_in_all_is_what_each_step_sends(
+    moves: list[tuple[int, int, int]], laps: int, rounds: int, rounding: str
+) -> None:
+    how = Behaviour(rounding=rounding)
+    steps = [
+        Step(distance=distance, direction=direction, speed=speed) for distance, direction, speed in moves
+    ]
+    project = replace(
+        with_steps(GEOMETRY, tuple(steps)), loop_first=2, loop_last=3, loop_count=laps, project_loop=rounds
+    )
+    counted: dict[int, dict[int, int]] = {1: {}, 2: {}, 3: {}}
+    residue = Fraction(0)
+    for place in [*execution.one_pass(project, how)] * rounds:
+        sent, residue = execution.pulses(project, project.step(place.step), how, residue)
+        counted[place.step][sent] = counted[place.step].get(sent, 0) + 1
+    assert execution.sent_in_all(project, how) == counted
 
 
 def test_without_a_geometry_nothing_moves() -> None:

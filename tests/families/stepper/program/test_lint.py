@@ -75,9 +75,14 @@ def test_dump_b_has_the_two_that_were_reckoned_by_hand() -> None:
         ("L15", 0, made(replace(GOOD, output=2)), "output 2"),
         ("L15", 0, made(replace(GOOD, output=4), replace(BACK, output=5)), "output 2, 3"),
         ("L17", 0, made(power_on_home=1), "in reverse until input 5"),
-        ("L19", 1, made(replace(GOOD, delay=3_600_001)), "3600 s"),
-        ("L19", 1, made(replace(GOOD, delay=0xFFFFFF)), "the most that can be said"),
+        ("L5", 1, made(replace(GOOD, speed=0), project_loop=3), "speed 0: the motor does not turn"),
+        ("L19", 1, made(replace(GOOD, delay=3_600_001)), "3600.001 s, more than 3600 s"),
+        ("L19", 1, made(replace(GOOD, delay=0xFFFFFF)), "16777.215 s, the most that can be said (raw 16777215"),
+        ("L19", 0, made(replace(GOOD, delay=3_600_000), project_loop=9), "32400 s of pauses in all, more than 28800"),
+        ("L19", 0, made(replace(GOOD, delay=3_600_000), loop_first=1, loop_last=1, loop_count=9, project_loop=255),
+         "32400 s of pauses in each pass"),
         ("L20", 0, made().with_step(7, delay=1), "step 7"),
+        ("L20", 0, made().with_step(7, output=9), "step 7; step 7, output: 9 is not possible (0 to 8)"),
         ("L21", 0, made(mode4=2), "variant 2"),
     ],
 )  # fmt: skip
@@ -97,20 +102,26 @@ def test_rules_that_depend_on_conditions() -> None:
     assert rules(homed) == []
     assert rules(homed, homing=True) == ["L13"]
     assert rules(made(replace(GOOD, delay=2000)), longest=1.0) == ["L19"]
+    assert rules(made(replace(GOOD, delay=2000), replace(BACK, delay=1000)), longest_total=3.0) == []
+    assert rules(made(replace(GOOD, delay=2000), replace(BACK, delay=1001)), longest_total=3.0) == ["L19"]
+    assert rules(made(replace(GOOD, delay=0xFFFFFF)), longest=1e6) == ["L19"]
 
 
 def test_what_jog_depends_on() -> None:
     one = made(number=1)
-    assert rules(one) == rules(one, before=one) == []
-    assert rules(made(), before=one.with_step(1, speed=1)) == []  # another project
+    assert rules(one, before=one) == rules(one, before=one.with_step(2, speed=1).with_step(1, delay=7)) == []
+    assert rules(made()) == rules(made(), before=one.with_step(1, speed=1)) == []  # another project
     found = only("L16", one, before=replace(one.with_step(1, speed=1, delay=7), microsteps=4))
-    assert (found.step, found.text) == (1, "speed, microsteps would change")
+    assert (found.step, found.text) == (1, "speed 1 becomes 600, microsteps 4 becomes 8")
+    untold = only("L16", one)
+    assert (untold.step, untold.level) == (1, "note")
+    assert untold.text.startswith("from now on they go at 600 rpm, from 400 Hz on by 50 Hz; ")
 
 
 def test_bytes_that_nobody_knows() -> None:
     image = bytes(12) + b"\x07" + bytes(207)
     found = only("L18", made(), image=image)
-    assert found.text == "07 at 12"
+    assert found.text == "07 at byte 18 of the dump"
     assert rules(made(), image=bytes(220)) == []
 
 
@@ -122,7 +133,10 @@ def test_other_readings_change_what_is_found() -> None:
     broken = made(replace(GOOD, distance=1), turn_distance=3)
     assert "too many" not in only("L3", broken, how=Behaviour(rounding="nearest")).text
     carried = only("L3", broken, how=Behaviour(rounding="carry")).text
-    assert carried.endswith("carried on to the next step")
+    assert carried == "533.333 pulses, the rest of less than one is carried on to the next step"
+    assert only("L3", broken).text == "533.333 pulses, 0.333 lost each time"
+    for word in ("lost", "carried", "rounded"):
+        assert word not in RULES["L3"].reason, "which of them it is depends on the reading"
     up = made(replace(GOOD, distance=2), turn_distance=3)
     assert "0.333 too many each time" in only("L3", up, how=Behaviour(rounding="nearest")).text
     once = made(GOOD, project_loop=0)
@@ -133,6 +147,23 @@ def test_other_readings_change_what_is_found() -> None:
 def test_net_displacement_counts_the_loop() -> None:
     assert net_units(made(GOOD, BACK, BACK, loop_first=2, loop_last=3, loop_count=4)) == 1600 - 8 * 1600
     assert net_units(Project()) == 0
+
+
+def test_what_moves_nothing_goes_nowhere() -> None:
+    still = made(replace(GOOD, speed=0), project_loop=3)
+    assert net_units(still) == 0
+    assert rules(still) == ["L5"]
+    assert "L3" not in rules(made(replace(GOOD, distance=1, speed=0), turn_distance=3000))
+    less = made(replace(GOOD, distance=1), turn_distance=2000, project_loop=3)  # 0.8 pulses
+    assert [net_units(less, Behaviour(rounding=rounding)) for rounding in ("trunc", "nearest", "carry")] == [
+        0,
+        1,
+        1,
+    ]
+
+
+def test_without_a_geometry_nothing_is_said_of_its_frequencies() -> None:
+    assert rules(made(turn_distance=0)) == ["L1"]
 
 
 def test_every_rule_says_how_grave_and_why() -> None:

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Estimate, duration, estimate, plan
-from motorbus.families.stepper.table import Project, decode_image
+from motorbus.families.stepper.table import Project, Step, decode_image
 from tests.families.stepper.program.projects import projects
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
 
@@ -107,17 +107,77 @@ def test_a_time_for_people(seconds: float, text: str) -> None:
     assert duration(seconds) == text
 
 
+@pytest.mark.parametrize("rounding", ["trunc", "nearest", "carry"])
 @given(projects())
-def test_a_plan_is_what_the_machine_does(project: Project) -> None:
+def test_a_plan_is_what_the_machine_does(rounding: str, project: Project) -> None:
     assume(not project.is_endless)
     short = replace(project, project_loop=min(project.project_loop, 2), loop_count=min(project.loop_count, 3))
     free = replace(short, steps=tuple(replace(step, stop_input=0) for step in short.steps))
-    found = plan(free)
-    state = execution.power_on(0.0, inputs=frozenset({1, 2, 5})).state
+    how = Behaviour(rounding=rounding)
+    found = plan(free, how)
+    state = execution.power_on(0.0, how, inputs=frozenset({1, 2, 5})).state
     done = execution.advance(execution.start(state, free, 0.0).state, 1e12)
     moment = next(one.at for one in done.told if one.kind == "ended") if done.told else 0.0
     assert moment == pytest.approx(found.estimate.seconds, rel=1e-9, abs=1e-9)
-    pulses = sum(
-        free.step(step.number).sign * step.sent * step.times for step in found.steps if step.frequency
+    assert done.state.base == sum(
+        free.step(step.number).sign * sent * times
+        for step in found.steps
+        for sent, times in step.runs.items()
     )
-    assert done.state.base == pulses * (found.passes or 1)
+    for step in found.steps:
+        assert sum(step.runs.values()) == step.times * (found.passes or 1)
+
+
+CARRY = Behaviour(rounding="carry")
+
+
+def test_carried_pulses_are_in_the_estimate() -> None:
+    """A third of a pulse in each of 300 passes: the machine sends one in three, and so says the estimate."""
+    third = Step(distance=1, speed=60, start_frequency=1)
+    project = Project(
+        number=1,
+        total_steps=1,
+        microsteps=1,
+        step_angle=180,
+        turn_distance=600,
+        project_loop=254,
+        steps=(third,) * 10,
+    )
+    found = plan(project, CARRY)
+    (step,) = found.steps
+    assert (step.runs, step.sent) == ({0: 254 - 84, 1: 84}, 1)
+    assert found.estimate.seconds == pytest.approx(84 / 200)
+    assert found.pass_seconds == pytest.approx(84 / 200 / 254)
+    assert found.data()["steps"][0] | {"pulses": 1, "pulses_at_least": 0} == found.data()["steps"][0]
+    assert estimate(project).seconds == 0
+
+
+def test_only_a_motion_can_be_cut_short() -> None:
+    third = Step(distance=1, speed=60, start_frequency=1, stop_input=1)
+    project = Project(
+        number=1,
+        total_steps=1,
+        microsteps=1,
+        step_angle=180,
+        turn_distance=600,
+        project_loop=6,
+        steps=(third,) * 10,
+    )
+    assert (estimate(project).cuts, estimate(project, CARRY).cuts) == (0, 2)
+    endless = Behaviour(zero_distance="endless")
+    assert estimate(project.with_step(1, distance=0), endless).cuts == 6
+
+
+def test_a_step_at_speed_0_sends_nothing_and_leaves_what_is_carried() -> None:
+    third = Step(distance=1, speed=60, start_frequency=1)
+    still = replace(third, speed=0)
+    project = Project(
+        number=1,
+        total_steps=4,
+        microsteps=1,
+        step_angle=180,
+        turn_distance=600,
+        steps=(third, still, third, third) * 3,
+    )
+    assert [step.runs for step in plan(project, CARRY).steps] == [{0: 1}, {0: 1}, {0: 1}, {1: 1}]
+    assert [step.sent for step in plan(project.with_step(2, distance=600)).steps] == [0, 0, 0, 0]

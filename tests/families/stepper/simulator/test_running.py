@@ -29,7 +29,7 @@ def test_edits_while_it_runs_are_acknowledged_and_noted() -> None:
     host.write(written(1, step(1), step(2)))
     host.say(frame(START, 1))
     host.write(step(2, distance=1))
-    assert "runs: it goes on" in host.device.log[-1]
+    assert "runs: it goes on" in host.device.log[-1].text
     host.wait(5.0)
     assert host.device.position == 3200
 

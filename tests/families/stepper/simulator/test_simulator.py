@@ -102,7 +102,7 @@ def test_a_control_socket_looks_at_it_and_cuts_its_supply() -> None:
     [
         ("set-input 1 2 on", "ok"),
         ("set-input 1 2 off", "ok"),
-        ("set-input 1 9 on", "error: there is no input 9"),
+        ("set-input 1 9 on", "error: there is no input 9; expected 1 to 5"),
         ("set-input 4 2 on", "error: there is no node 4; there are: 1"),
         ("set-input 1 two on", "error: the order is: set-input ID INPUT on|off"),
         ("set-input 1 2 up", "error: the order is: set-input ID INPUT on|off"),

@@ -13,10 +13,10 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import NamedTuple
 
+from motorbus.core.chance import Chance
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import effects
-from motorbus.families.feetech.simulator.chance import Chance
 from motorbus.families.feetech.simulator.collision import BITS, Speech, heard, overlapping
 from motorbus.families.feetech.simulator.fate import Fate
 from motorbus.families.feetech.simulator.instructions import MOST, OBEY, Answer

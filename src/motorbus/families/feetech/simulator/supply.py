@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from motorbus.families.feetech.simulator.chance import Chance
+from motorbus.core.chance import Chance
 from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.switches import Switches
 

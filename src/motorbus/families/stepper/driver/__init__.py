@@ -8,6 +8,7 @@ carries it out.
 from __future__ import annotations
 
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
+from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node, checked_motor
 from motorbus.families.stepper.driver.presence import identify, ping
 from motorbus.families.stepper.driver.reading import (
@@ -25,6 +26,7 @@ from motorbus.families.stepper.driver.stopping import Promise, stop
 __all__ = [
     "AsyncController",
     "Controller",
+    "Memory",
     "Node",
     "Promise",
     "Sends",

@@ -9,7 +9,9 @@ from __future__ import annotations
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import presence, reading, stopping
+from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.table import Order
 
 
 class ControllerVerbs(Node):
@@ -32,7 +34,7 @@ class Controller(ControllerVerbs, Blocking):
     """The controller of a blocking bus: `Controller(bus).read_project(1)`."""
 
     def __init__(self, bus: BlockingRunner, node: int = wire.ONLY) -> None:
-        ControllerVerbs.__init__(self, node, _motor(bus))
+        ControllerVerbs.__init__(self, node, *_spoken(bus))
         Blocking.__init__(self, bus)
 
 
@@ -40,11 +42,12 @@ class AsyncController(ControllerVerbs, Awaiting):
     """The controller of an async bus: `await AsyncController(bus).read_project(1)`."""
 
     def __init__(self, bus: AsyncRunner, node: int = wire.ONLY) -> None:
-        ControllerVerbs.__init__(self, node, _motor(bus))
+        ControllerVerbs.__init__(self, node, *_spoken(bus))
         Awaiting.__init__(self, bus)
 
 
-def _motor(bus: object) -> int:
-    """The number of the motor that this bus was opened with."""
-    number: int = getattr(getattr(bus, "family", None), "_motor", wire.MOTOR)
-    return number
+def _spoken(bus: object) -> tuple[int, Order, Memory | None]:
+    """How this bus was opened: the motor's number, the order of bytes in dumps, and what was said on it so far."""
+    family = getattr(bus, "family", None)
+    order: Order = getattr(family, "_order", "little")
+    return getattr(family, "_motor", wire.MOTOR), order, getattr(family, "_memory", None)

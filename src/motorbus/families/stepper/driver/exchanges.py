@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from motorbus.core.operation import Answer, Due, Exchange, Rank, Timeout
+from motorbus.core.operation import Answer, Due, Exchange, Goal, Rank, Timeout
 from motorbus.errors import UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -25,9 +25,12 @@ def command(
     *,
     rank: Rank = Rank.POLL,
     timeout: Timeout | None = None,
+    goals: tuple[Goal, ...] = (),
     **values: int,
 ) -> Exchange[T]:
     """A command by its name and its numbers; `read` makes a value of the whole reply, once that is the right one.
+
+    `goals` is what it orders, for what moves the motor.
 
     Raises RequestError, naming the field and its range, for a number that may not be sent. The exchange raises
     UnexpectedReply when the reply differs from what is due.
@@ -55,6 +58,7 @@ def command(
         judged,
         rank=rank,
         effect=order.effect,
+        goals=goals,
         timeout=order.timeout if timeout is None else timeout,
         repeatable=order.repeatable,
     )

@@ -1,4 +1,4 @@
-"""The one controller of a line, as far as a host can know it: which motor it has, and the map of its projects.
+"""The one controller of a line, as far as a host can know it: which motor it has, and how its projects are told.
 
 There is no address in its frames, so there is one of them on a line, and it is called 1. The motor's number, which
 does stand in its frames, is another thing: the manual has 3 in all of them.
@@ -11,15 +11,28 @@ from typing import Final
 from motorbus.core.entry import Entry, Table, Value
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
-from motorbus.families.stepper.table import TABLE
+from motorbus.families.stepper.driver.memory import Memory
+from motorbus.families.stepper.table import TABLE, Order, checked_order
 
 
 class Node:
-    """The controller of a line. `motor` is the number that motor commands name. Raises RequestError for another id."""
+    """The controller of a line. Raises RequestError for another id.
 
-    def __init__(self, node: int = wire.ONLY, motor: int = wire.MOTOR) -> None:
+    `motor` is the number that motor commands name, `order` says which byte of a number comes first in its dumps,
+    `memory` is what was said to it on this bus.
+    """
+
+    def __init__(
+        self,
+        node: int = wire.ONLY,
+        motor: int = wire.MOTOR,
+        order: Order = "little",
+        memory: Memory | None = None,
+    ) -> None:
         self.node: Final = checked_id(node)
         self.motor: Final = checked_motor(motor)
+        self.order: Final[Order] = checked_order(order)
+        self.memory: Final = memory if memory is not None else Memory()
 
     @property
     def alarm(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.program import Program
-from motorbus.families.stepper.table import INPUTS, STEPS
+from motorbus.families.stepper.table import INPUTS, STEPS, row_value
 
 READINGS: Final = 5
 """How often a dump is read at most until it is believed."""
@@ -51,6 +51,7 @@ def dump(node: Node, project: int = 1) -> Operation[bytes]:
             node=node.node,
         )
     _plausible(node, agreed, project)
+    node.memory.proven = True
     return agreed
 
 
@@ -83,7 +84,7 @@ def read_project(node: Node, project: int = 1) -> Operation[Program]:
 
     Raises RequestError when it holds what no project can, FramingError and UnexpectedReply as `dump`.
     """
-    return Program.from_dump((yield from dump(node, project)), name=f"project {project}")
+    return Program.from_dump((yield from dump(node, project)), name=f"project {project}", order=node.order)
 
 
 def read(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, Value]]:
@@ -99,7 +100,7 @@ def read_raw(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str
     """The same as raw values."""
     rows: list[Entry] = [node.table[name] for name in names or node.table]
     image = (yield from dump(node, project))[wire.REPLY_LENGTH :]
-    return {row.name: row.decode(image[row.address : row.address + row.size]) for row in rows}
+    return {row.name: row_value(image, row, node.order) for row in rows}
 
 
 def read_input(node: Node, port: int) -> Exchange[bool]:

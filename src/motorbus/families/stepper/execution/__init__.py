@@ -35,6 +35,7 @@ from motorbus.families.stepper.execution.order import (
     passes,
     pulses,
     ramp_of,
+    sent_in_all,
     times_in_a_pass,
 )
 from motorbus.families.stepper.execution.profile import Motion, Ramp, motion, still
@@ -72,6 +73,7 @@ __all__ = [
     "pulses",
     "ramp_of",
     "run_once",
+    "sent_in_all",
     "set_input",
     "set_output",
     "set_stop_mode",

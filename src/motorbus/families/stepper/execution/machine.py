@@ -74,11 +74,14 @@ def run_once(state: State, project: Project, at: float) -> Next:
 
 
 def home(state: State, project: Project, at: float) -> Next:
-    """Turn in reverse with the speed of step 1 of this project until input 5 is active: not at all if it is already."""
+    """Turn in reverse with the speed of step 1 of this project until input 5 is active.
+
+    If it is already, homing is over at once: nothing turns, and what is counted stays as it is.
+    """
     turn = Turn(state, at)
     if turn.may_start():
         if HOME_INPUT in turn.state.inputs:
-            turn.tell("rests")
+            turn.homed_already()
         else:
             turn.by_hand(Phase.HOMING, project, None, -1)
     return turn.result()

@@ -128,6 +128,10 @@ class Turn:
         motion = order.move(project, project.step(1), count, self.state.how, sign)
         self.go(phase, motion, manual=project)
 
+    def homed_already(self) -> None:
+        """Homing ends before it begins: input 5 is active. Its end is told as any other."""
+        self._manual_ends(quiet=not self.state.how.notice_on_once)
+
     def _homed(self) -> None:
         self.become(base=0, homed=True)
         self.tell("homed")

@@ -34,8 +34,9 @@ _NOTHING: Mapping[str, int] = MappingProxyType({})
 class Program:
     """A project and what people call it.
 
-    `inputs` and `outputs` give names to numbers, `lead` is mm for one turn where that is known. `raw` are the 220 bytes
-    it was read from, if it was: what no field names is kept in them.
+    `inputs` and `outputs` give names to numbers, `lead` is mm for one turn where that is known. `motor` says how the
+    motor is told where its file says it otherwise (`full_steps`). `raw` are the 220 bytes it was read from, if it was:
+    what no field names is kept in them.
     """
 
     project: Project
@@ -44,6 +45,7 @@ class Program:
     outputs: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
     lead: Fraction | None = None
     expert: bool = False
+    motor: str = ""
     raw: bytes = b""
 
     # -- from what it is made ---------------------------------------------------------------------------------
@@ -54,7 +56,7 @@ class Program:
         found = text.parse(source)
         return cls(
             project=found.project, name=found.name, inputs=found.inputs, outputs=found.outputs, lead=found.lead,
-            expert=found.expert,
+            expert=found.expert, motor=found.motor,
         )  # fmt: skip
 
     @classmethod
@@ -113,7 +115,8 @@ class Program:
 
     def lint(self, conditions: Conditions = USUALLY) -> list[Finding]:
         """What in it will not do what it seems to say."""
-        return lint(self.project, replace(conditions, image=conditions.image or self.raw))
+        image, motor = conditions.image or self.raw, conditions.motor or self.motor
+        return lint(self.project, replace(conditions, image=image, motor=motor))
 
     def estimate(self, how: Behaviour = USUAL) -> Estimate:
         """How long it takes: str() of it is "at least 41.6 s + 6 waits" and what is uncertain."""

@@ -18,13 +18,21 @@ from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.table import (
     ENDLESS,
     HOME_INPUT,
+    PARAMETERS,
     STEP_INPUTS,
+    STEP_NAMES,
     STEPS,
     Project,
     Step,
     after_step,
+    refusal,
     reserved_bytes,
 )
+from motorbus.families.stepper.wire import REPLY_LENGTH
+
+_OF_JOG: Final = ("distance", "direction", "start_frequency", "acceleration", "speed")
+_OF_MOTOR: Final = ("microsteps", "step_angle", "turn_distance")
+"""What of step 1 and of its project manual motion runs with."""
 
 
 class Rule(NamedTuple):
@@ -40,11 +48,15 @@ RULES: Final[Mapping[str, Rule]] = MappingProxyType(
         "L1": Rule("error", "no geometry", "without angle, microsteps and distance of a turn nothing moves"),
         "L2": Rule("warning", "pulses of a turn are not whole", "no number of turns is met exactly"),
         "L3": Rule(
-            "warning", "pulses of a step are not whole", "the rest is lost, or so it is assumed, in each pass"
+            "warning",
+            "pulses of a step are not whole",
+            "what is done with the rest is an assumption: --rounding",
         ),
         "L4": Rule("warning", "the frequency is high", "what turns the motor may not follow so many pulses"),
         "L5": Rule(
-            "error", "start frequency is 0 or not below the running frequency", "then there is no ramp"
+            "error",
+            "start frequency is 0 or not below the running frequency",
+            "then there is no ramp, or no motion",
         ),
         "L6": Rule(
             "warning", "no acceleration", "the motor is to be at full speed at once, and may lose steps"
@@ -71,10 +83,19 @@ RULES: Final[Mapping[str, Rule]] = MappingProxyType(
         "L18": Rule(
             "note", "bytes that nobody knows are not 0", "they cannot be written, so a copy differs in them"
         ),
-        "L19": Rule("warning", "a long pause", "perhaps milliseconds were taken for something else"),
+        "L19": Rule(
+            "warning",
+            "long pauses",
+            "a delay is in ms, FF FF FF is what empty memory holds, and loops multiply",
+        ),
         "L20": Rule("note", "steps behind the last one are filled", "they are stored and not carried out"),
         "L21": Rule("warning", "mode 4 is not 0", "nobody knows what it does"),
         "L22": Rule("warning", "it waits for an input", "there is no timeout, and nobody is there"),
+        "L23": Rule(
+            "note",
+            "the motor is told otherwise",
+            "a driver that is set by the microsteps would be set otherwise too",
+        ),
     }
 )
 """Every rule by its name."""
@@ -105,19 +126,23 @@ class Conditions:
     """What a project is judged against.
 
     `highest`     Hz the driver follows
-    `longest`     s that a pause may have
+    `longest`     s that a pause may have: an hour, unless said otherwise
+    `longest_total`  s that all pauses of a run may have together (of a pass, when it is endless): eight hours
     `homing`      whether input 5 is used for homing, which power-on homing always does
     `unattended`  whether nobody is there to press a button
-    `before`      what project 1 held, when this is to replace it
+    `before`      what project 1 holds now, when this is to replace it; None: nobody has said
     `image`       the 220 bytes it came from, for what no field names
+    `motor`       how its file names the motor, where the controller is told otherwise
     """
 
     highest: float = 100_000.0
     longest: float = 3600.0
+    longest_total: float = 28_800.0
     homing: bool = False
     unattended: bool = False
     before: Project | None = None
     image: bytes = b""
+    motor: str = ""
     how: Behaviour = USUAL
 
 
@@ -149,6 +174,11 @@ def _geometry(project: Project, _: Conditions) -> Iterator[Finding]:
         pulses = f", {float(turn):.6g} pulses a turn" if turn is not None else ""
         text = f"360 / {project.step_angle / 100:g} degrees is not a whole number of full steps{pulses}"
         yield Finding("L2", 0, text + (", which is whole" if whole else ""))
+
+
+def _told(_: Project, conditions: Conditions) -> Iterator[Finding]:
+    if conditions.motor:
+        yield Finding("L23", 0, conditions.motor)
 
 
 def _loops(project: Project, _: Conditions) -> Iterator[Finding]:
@@ -186,79 +216,122 @@ def _outputs(project: Project, conditions: Conditions) -> Iterator[Finding]:
 
 
 def _manual(project: Project, conditions: Conditions) -> Iterator[Finding]:
-    before = conditions.before
-    if project.number == 1 and before is not None:
-        names = ("distance", "direction", "start_frequency", "acceleration", "speed")
-        mine, theirs = project.step(1), before.step(1)
-        changed = [name for name in names if getattr(mine, name) != getattr(theirs, name)]
-        changed += [
-            name
-            for name in ("microsteps", "step_angle", "turn_distance")
-            if getattr(project, name) != getattr(before, name)
-        ]
-        if changed:
-            yield Finding("L16", 1, f"{', '.join(changed)} would change")
+    if project.number == 1 and (told := _jog(project, conditions.before)):
+        yield Finding("L16", 1, told)
     if project.power_on_home:
         yield Finding("L17", 0, "in reverse until input 5, with no limit of travel or time")
     if project.mode4:
         yield Finding("L21", 0, f"variant {project.mode4}")
 
 
+def _jog(project: Project, before: Project | None) -> str:
+    """What manual motion is to run with from now on; "" when that is known not to change."""
+    step = project.step(1)
+    if before is None:
+        return (
+            f"from now on they go at {step.speed} rpm, from {step.start_frequency} Hz on by {step.acceleration} Hz; "
+            "whether that is a change, --before tells"
+        )
+    mine = {name: getattr(step, name) for name in _OF_JOG} | {n: getattr(project, n) for n in _OF_MOTOR}
+    old = before.step(1)
+    theirs = {name: getattr(old, name) for name in _OF_JOG} | {n: getattr(before, n) for n in _OF_MOTOR}
+    return ", ".join(
+        f"{name} {theirs[name]} becomes {mine[name]}" for name in mine if mine[name] != theirs[name]
+    )
+
+
+def _pauses(project: Project, conditions: Conditions) -> Iterator[Finding]:
+    passes = execution.passes(project, conditions.how)
+    times = {n: execution.times_in_a_pass(project, n, conditions.how) for n in _carried_out(project)}
+    total = sum(project.step(n).delay * often for n, often in times.items()) * (passes or 1) / 1000
+    if total > conditions.longest_total:
+        where = "in each pass" if passes is None else "in all"
+        yield Finding("L19", 0, f"{total:g} s of pauses {where}, more than {conditions.longest_total:g} s")
+
+
 def _rest(project: Project, conditions: Conditions) -> Iterator[Finding]:
     if conditions.image and (extra := reserved_bytes(conditions.image)):
-        shown = ", ".join(f"{value:02X} at {at}" for at, value in sorted(extra.items()))
+        shown = ", ".join(
+            f"{value:02X} at byte {REPLY_LENGTH + at} of the dump" for at, value in sorted(extra.items())
+        )
         yield Finding("L18", 0, shown)
     filled = [n for n in range(execution.last_step(project) + 1, STEPS + 1) if project.step(n) != Step()]
     if filled:
-        yield Finding("L20", 0, f"step {', '.join(map(str, filled))}")
+        wrong = "".join(f"; {one}" for number in filled for one in _impossible(project.step(number), number))
+        yield Finding("L20", 0, f"step {', '.join(map(str, filled))}{wrong}")
+
+
+def _impossible(step: Step, number: int) -> Iterator[str]:
+    for name in STEP_NAMES:
+        if (error := refusal(name, getattr(step, name), step=number, expert=True)) is not None:
+            yield f"{error.summary} ({error.expected})"
 
 
 _OF_PROJECT: Final[tuple[Callable[[Project, Conditions], Iterator[Finding]], ...]] = (
     _geometry,
+    _told,
     _loops,
     _walk,
     _outputs,
     _manual,
+    _pauses,
     _rest,
 )
 
 
 def net_units(project: Project, how: Behaviour = USUAL) -> int:
-    """Where one pass of a project ends, in user units from where it began, forward positive."""
-    steps = range(1, execution.last_step(project) + 1)
+    """Where one pass of a project ends, in user units from where it began, forward positive.
+
+    What moves nothing, at speed 0 or with less than one pulse, does not count; parts of a pulse are told by L3.
+    """
     return sum(
         project.step(n).sign * project.step(n).distance * execution.times_in_a_pass(project, n, how)
-        for n in steps
+        for n in _carried_out(project)
+        if _moves(project, project.step(n), how)
     )
+
+
+def _carried_out(project: Project) -> range:
+    return range(1, execution.last_step(project) + 1)
+
+
+def _moves(project: Project, step: Step, how: Behaviour) -> bool:
+    """Whether a step ever sends a pulse; one that is carried on is sent in the end."""
+    turns = execution.frequency(project, step) > 0
+    return turns and (how.rounding == "carry" or execution.pulses(project, step, how)[0] > 0)
 
 
 # --- of one step ----------------------------------------------------------------------------------------------------
 
-_Told = Iterator[tuple[str, str]]
+_Found = Iterator[tuple[str, str]]
 
 
-def _pulses(project: Project, step: Step, number: int, conditions: Conditions) -> _Told:
-    exact = execution.exact_pulses(project, step)
-    sent, _ = execution.pulses(project, step, conditions.how)
-    off = exact - sent
-    if off:
-        times = execution.times_in_a_pass(project, number, conditions.how)
-        passes = execution.passes(project, conditions.how)
-        each = f"{float(exact):.6g} pulses, {_off(off)} each time"
-        drift = f", {_off(off * times)} in a pass" if times > 1 else ""
-        total = f", {_off(off * times * passes)} in all" if passes and passes > 1 else ""
-        carried = "; carried on to the next step" if conditions.how.rounding == "carry" else ""
-        yield "L3", each + drift + total + carried
+def _pulses(project: Project, step: Step, number: int, conditions: Conditions) -> _Found:
+    exact, how = execution.exact_pulses(project, step), conditions.how
+    if exact.denominator == 1 or not execution.frequency(project, step):
+        return
+    each = f"{float(exact):.6g} pulses"
+    if how.rounding == "carry":
+        yield "L3", f"{each}, the rest of less than one is carried on to the next step"
+        return
+    off = exact - execution.pulses(project, step, how)[0]
+    times, passes = execution.times_in_a_pass(project, number, how), execution.passes(project, how)
+    drift = f", {_off(off * times)} in a pass" if times > 1 else ""
+    total = f", {_off(off * times * passes)} in all" if passes and passes > 1 else ""
+    yield "L3", f"{each}, {_off(off)} each time{drift}{total}"
 
 
 def _off(pulses: Fraction) -> str:
     return f"{abs(float(pulses)):.3g} {'lost' if pulses > 0 else 'too many'}"
 
 
-def _frequencies(project: Project, step: Step, number: int, conditions: Conditions) -> _Told:
-    if not step.distance:
-        return
+def _frequencies(project: Project, step: Step, number: int, conditions: Conditions) -> _Found:
+    if not step.distance or project.pulses_per_unit is None:
+        return  # no motion is meant, or L1 has told why there is none
     run = execution.frequency(project, step)
+    if not run:
+        yield "L5", "speed 0: the motor does not turn, and the distance is not gone"
+        return
     if run > conditions.highest:
         yield "L4", f"{step.speed} rpm are {run:.6g} Hz, more than {conditions.highest:g} Hz"
     if not step.start_frequency or step.start_frequency >= run:
@@ -272,15 +345,17 @@ def _frequencies(project: Project, step: Step, number: int, conditions: Conditio
         yield "L7", f"{peak:.4g} rpm at most, {step.speed} rpm wanted"
 
 
-def _idle(project: Project, step: Step, number: int, conditions: Conditions) -> _Told:
+def _idle(project: Project, step: Step, number: int, conditions: Conditions) -> _Found:
     if not (step.distance or step.delay or step.output):
         yield "L8", "only a wait" if step.start_input else "nothing at all"
-    if step.delay / 1000 > conditions.longest:
-        most = ", the most that can be said" if step.delay == 0xFFFFFF else ""
-        yield "L19", f"{step.delay / 1000:g} s{most}"
+    most = PARAMETERS["delay"].high
+    if step.delay == most:
+        yield "L19", f"{most / 1000:.3f} s, the most that can be said (raw {most}, FF FF FF)"
+    elif step.delay / 1000 > conditions.longest:
+        yield "L19", f"{step.delay / 1000:.10g} s, more than {conditions.longest:g} s"
 
 
-def _inputs(project: Project, step: Step, number: int, conditions: Conditions) -> _Told:
+def _inputs(project: Project, step: Step, number: int, conditions: Conditions) -> _Found:
     used = {"start": step.start_input, "stop": step.stop_input}
     for name, port in used.items():
         if port and port not in STEP_INPUTS:
@@ -296,7 +371,7 @@ def _inputs(project: Project, step: Step, number: int, conditions: Conditions) -
         yield "L22", f"input {step.start_input}"
 
 
-_OF_STEP: Final[tuple[Callable[[Project, Step, int, Conditions], _Told], ...]] = (
+_OF_STEP: Final[tuple[Callable[[Project, Step, int, Conditions], _Found], ...]] = (
     _pulses,
     _frequencies,
     _idle,

@@ -32,13 +32,16 @@ READINGS: Final[Mapping[str, Mapping[str, Any]]] = {
 class StepPlan(NamedTuple):
     """One step: what it sends and how long it takes.
 
-    `exact` and `sent` are pulses, before and after rounding; `frequency` and `peak` Hz, wanted and reached; `motion`
-    and `delay` s; `times` how often it is carried out in a pass; `units` its signed distance.
+    `exact` are its pulses before rounding, and `runs` says how often in all it sends so many after it; `sent` is the
+    most of them, which only with rounding=carry is not all there is. `frequency` and `peak` are Hz, wanted and reached;
+    `motion` and `delay` s, the motion on average where runs differ; `times` how often it is carried out in a pass;
+    `units` its signed distance.
     """
 
     number: int
     exact: Fraction
     sent: int
+    runs: Mapping[int, int]
     frequency: float
     shape: str
     peak: float
@@ -60,7 +63,7 @@ class StepPlan(NamedTuple):
 class Estimate:
     """How long a project takes.
 
-    `seconds`  motion and pauses in all, of one pass when it is `endless`
+    `seconds`  motion and pauses in all, of the first pass when it is `endless`
     `waits`    how often it waits for an input, in the same time, at least `seconds` being without them
     `cuts`     how often a stop input may end a motion early, so that it takes less
     `low`, `high`  the same in the readings of the acceleration, `readings` says each
@@ -126,7 +129,7 @@ class Plan:
 
     @property
     def pass_seconds(self) -> float:
-        """Motion and pauses of one pass."""
+        """Motion and pauses of one pass, on average where carried pulses make them differ."""
         return sum(step.seconds * step.times for step in self.steps)
 
     def data(self) -> dict[str, Any]:
@@ -189,13 +192,14 @@ def duration(seconds: float) -> str:
 
 def _estimate(project: Project, how: Behaviour, steps: tuple[StepPlan, ...]) -> Estimate:
     times = execution.passes(project, how) or 1
+    runs = {step.number: step.runs for step in steps}
     return Estimate(
         seconds=_in_all(steps) * times,
         waits=sum(step.times for step in steps if step.start_input) * times,
-        cuts=sum(step.times for step in steps if step.stop_input and step.sent) * times,
+        cuts=sum(_motions(step) for step in steps if step.stop_input),
         endless=project.is_endless,
         readings={
-            text: _in_all(_steps(project, replace(how, **changes))) * times
+            text: _in_all(_steps(project, replace(how, **changes), runs)) * times
             for text, changes in READINGS.items()
         },
     )
@@ -205,23 +209,33 @@ def _in_all(steps: tuple[StepPlan, ...]) -> float:
     return sum(step.seconds * step.times for step in steps)
 
 
-def _steps(project: Project, how: Behaviour) -> tuple[StepPlan, ...]:
-    return tuple(_step(project, number, how) for number in range(1, execution.last_step(project) + 1))
+def _motions(step: StepPlan) -> int:
+    """How often in all it moves."""
+    return sum(times for sent, times in step.runs.items() if sent or step.motion == inf)
 
 
-def _step(project: Project, number: int, how: Behaviour) -> StepPlan:
-    step = project.step(number)
-    sent, _ = execution.pulses(project, step, how)
+def _steps(
+    project: Project, how: Behaviour, runs: Mapping[int, Mapping[int, int]] | None = None
+) -> tuple[StepPlan, ...]:
+    """`runs` are its pulses where they are known already: how the frequency grows changes nothing in them."""
+    known = execution.sent_in_all(project, how) if runs is None else runs
+    return tuple(_step(project, number, how, known[number]) for number in known)
+
+
+def _step(project: Project, number: int, how: Behaviour, runs: Mapping[int, int]) -> StepPlan:
+    step, sent = project.step(number), max(runs)
     endless = not step.distance and how.zero_distance == "endless"
-    move = execution.move(project, step, None if endless else sent, how)
+    moves = {count: execution.move(project, step, None if endless else count, how) for count in runs}
+    move = moves[sent]
     return StepPlan(
         number=number,
         exact=execution.exact_pulses(project, step),
         sent=sent,
+        runs=runs,
         frequency=execution.frequency(project, step),
         shape=move.shape,
         peak=move.peak,
-        motion=move.duration,
+        motion=_mean([(moves[count].duration, times) for count, times in runs.items()]),
         delay=step.delay / 1000,
         times=execution.times_in_a_pass(project, number, how),
         units=step.sign * step.distance,
@@ -231,12 +245,20 @@ def _step(project: Project, number: int, how: Behaviour) -> StepPlan:
     )
 
 
+def _mean(durations: list[tuple[float, int]]) -> float:
+    """Of durations and how often each comes; of a single one exactly that."""
+    if len(durations) == 1:
+        return durations[0][0]
+    return sum(one * times for one, times in durations) / sum(times for _, times in durations)
+
+
 def _step_data(step: StepPlan) -> dict[str, Any]:
     return {
         "step": step.number,
         "times_per_pass": step.times,
         "units": step.units,
         "pulses": step.sent,
+        "pulses_at_least": min(step.runs),
         "pulses_exact": float(step.exact),
         "frequency_hz": step.frequency,
         "peak_hz": step.peak,

@@ -2,7 +2,8 @@
 
 Arithmetic is exact: 0.3 turns of 1600 units are 480 units and not 479.99999. What does not come out whole is refused,
 with the two values on either side, for a file that says one thing and a motor that does another are worse than a
-question. Every quantity has its unit in the file; a bare number could be anything.
+question; what is out of range is refused with the range in the unit of the file. Every quantity has its unit in the
+file; a bare number could be anything.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ from fractions import Fraction
 from math import ceil, floor
 from typing import Final, NamedTuple
 
+from motorbus.core.entry import shown
 from motorbus.errors import RequestError
-from motorbus.families.stepper.table import Project
+from motorbus.families.stepper.table import PARAMETERS, Project
 
 _NUMBER: Final = re.compile(r"\s*([+-]?)\s*(\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})\s*", re.ASCII)
+_MORE: Final = re.compile(r"[eE][+-]?\d|[\d.]")
+"""What behind a number makes it one that is not read: an exponent, or more digits than anybody needs."""
 _PART: Final = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})\s*([a-zµμ]+)\s*", re.ASCII)
 TIME: Final[Mapping[str, Fraction]] = {
     "ms": Fraction(1),
@@ -87,26 +91,53 @@ def refuse(what: str, expected: str, why: str = "") -> RequestError:
 def amount(text: object, where: str, expected: str) -> Amount:
     """`-12.5 mm` taken apart. Raises RequestError, naming `where`, for what is no number with a unit."""
     if not isinstance(text, str):
-        raise refuse(f"{where}: {text!r} has no unit", expected)
+        raise refuse(f"{where}: {shown(text)} has no unit", expected)
     match = _NUMBER.match(text)
     unit = text[match.end() :].strip() if match else ""
-    if match is None or not unit:
-        raise refuse(f"{where}: {text!r} is no number with a unit", expected)
+    if match is None or not unit or _MORE.match(unit):
+        why = "a number has 20 digits at most, and no exponent" if match and unit else ""
+        raise refuse(f"{where}: {shown(text)} is no number with a unit", expected, why)
     number = Fraction(match[2] + "0" if match[2].endswith(".") else match[2])
     negative = match[1] == "-"
     return Amount(-number if negative else number, _SAME.get(unit, unit), negative)
 
 
-def whole(number: Fraction, where: str, said: object, unit: str, back: Callable[[int], str] = str) -> int:
-    """The whole number, or a RequestError with the two on either side of it; `back` says them as the file would."""
+def whole(
+    number: Fraction, where: str, said: object, unit: str, name: str, back: Callable[[int], str] = str
+) -> int:
+    """The whole number that a parameter is to be; `back` says such a number as the file would.
+
+    Raises RequestError with the range when it lies outside, and with the two on either side when it is not whole.
+    """
+    row = PARAMETERS[name]
+    if not row.low <= number <= row.high:
+        raise refuse(
+            f"{where}: {shown(said)} is not possible",
+            f"{back(row.low)} to {back(row.high)} (raw {row.low} to {row.high})",
+        )
     if number.denominator == 1:
         return int(number)
     low, high = floor(number), ceil(number)
     raise refuse(
-        f"{where}: {said!r} is {float(number):.6g} {unit}, and only whole ones can be said",
+        f"{where}: {shown(said)} is {float(number):.10g} {unit}, and only whole ones can be said",
         f"{back(low)} or {back(high)}",
         "the controller counts in whole numbers",
     )
+
+
+def in_unit(number: Fraction, unit: str) -> str:
+    """A number for people, never above what it is: `16777.215 mm`."""
+    return f"{float(Fraction(floor(number * 10**6), 10**6)):.15g} {unit}"
+
+
+def clock(ms: int) -> str:
+    """A pause as a file says it: 4 h 39 min 37.215 s."""
+    if ms < 1000:
+        return f"{ms} ms"
+    minutes, rest = divmod(ms, 60_000)
+    hours, minutes = divmod(minutes, 60)
+    parts = (hours and f"{hours} h", minutes and f"{minutes} min", rest and f"{rest / 1000:.15g} s")
+    return " ".join(part for part in parts if part)
 
 
 def distance(text: object, where: str, geometry: Geometry) -> tuple[int, bool]:
@@ -116,36 +147,50 @@ def distance(text: object, where: str, geometry: Geometry) -> tuple[int, bool]:
     turns = geometry.turns(said.unit)
     if turns is None:
         why = "millimetres need `lead` in [motor]" if said.unit in LENGTH else ""
-        raise refuse(f"{where}: {text!r} has no unit of distance that is known here", expected, why)
-    units = abs(said.number) * turns * geometry.units
-    return whole(units, where, text, "units", lambda count: f"{count} units"), said.negative
+        raise refuse(f"{where}: {shown(text)} has no unit of distance that is known here", expected, why)
+    each = turns * geometry.units
+    count = abs(said.number) * each
+    if count > PARAMETERS["distance"].high:
+        most = PARAMETERS["distance"].high
+        raise refuse(
+            f"{where}: {shown(text)} is not possible",
+            f"0 to {in_unit(most / each, said.unit)}, either way (raw 0 to {most} units)",
+        )
+    return whole(count, where, text, "units", "distance", lambda raw: f"{raw} units"), said.negative
 
 
 def speed(text: object, where: str, geometry: Geometry) -> int:
     """A speed -> RPM."""
     expected = f"a number with one of {', '.join(SPEEDS)}"
     said = amount(text, where, expected)
-    if said.unit == "rpm":
-        rpm = said.number
-    else:
+    each = Fraction(1)
+    if said.unit != "rpm":
         per, _, time = said.unit.rpartition("/")
         turns = geometry.turns("pulses" if said.unit == "Hz" else per)
         if turns is None or (said.unit != "Hz" and time != "s"):
             why = "mm/s needs `lead` in [motor]" if per in LENGTH else ""
-            raise refuse(f"{where}: {text!r} has no unit of speed that is known here", expected, why)
-        rpm = said.number * turns * 60
-    if rpm < 0:
-        raise refuse(f"{where}: {text!r} is negative", expected, "the sign of `move` says which way it turns")
-    return whole(rpm, where, text, "rpm", lambda count: f"{count} rpm")
+            raise refuse(f"{where}: {shown(text)} has no unit of speed that is known here", expected, why)
+        each = turns * 60
+    if said.number < 0:
+        raise refuse(
+            f"{where}: {shown(text)} is negative", expected, "the sign of `move` says which way it turns"
+        )
+    rpm, most = said.number * each, PARAMETERS["speed"].high
+    if rpm > most:
+        raise refuse(
+            f"{where}: {shown(text)} is not possible",
+            f"0 to {in_unit(most / each, said.unit)} (raw 0 to {most} rpm)",
+        )
+    return whole(rpm, where, text, "rpm", "speed", lambda count: f"{count} rpm")
 
 
-def hertz(text: object, where: str) -> int:
-    """A frequency of pulses -> Hz."""
+def hertz(text: object, where: str, name: str = "start_frequency") -> int:
+    """A frequency of pulses -> Hz; `name` is the parameter it is for."""
     said = amount(text, where, "a number with Hz or kHz")
     scale = {"Hz": 1, "kHz": 1000}.get(said.unit)
     if scale is None or said.number < 0:
-        raise refuse(f"{where}: {text!r} is no frequency", "a number with Hz or kHz")
-    return whole(said.number * scale, where, text, "Hz", lambda count: f"{count} Hz")
+        raise refuse(f"{where}: {shown(text)} is no frequency", "a number with Hz or kHz")
+    return whole(said.number * scale, where, text, "Hz", name, lambda count: f"{count} Hz")
 
 
 def milliseconds(text: object, where: str) -> int:
@@ -158,23 +203,25 @@ def milliseconds(text: object, where: str) -> int:
         total += Fraction(match[1] + "0" if match[1].endswith(".") else match[1]) * TIME[match[2]]
         rest = rest[match.end() :]
     if rest or not isinstance(text, str) or not text.strip():
-        raise refuse(f"{where}: {text!r} is no time", expected)
-    return whole(total, where, text, "ms", lambda count: f"{count} ms")
+        raise refuse(f"{where}: {shown(text)} is no time", expected)
+    return whole(total, where, text, "ms", "delay", clock)
 
 
 def hundredths(text: object, where: str) -> int:
     """A step angle, such as `1.8 deg`, -> hundredths of a degree."""
     said = amount(text, where, "an angle such as 1.8 deg")
     if said.unit != "deg" or said.number < 0:
-        raise refuse(f"{where}: {text!r} is no angle", "an angle such as 1.8 deg")
-    return whole(said.number * 100, where, text, "hundredths", lambda count: f"{count / 100:g} deg")
+        raise refuse(f"{where}: {shown(text)} is no angle", "an angle such as 1.8 deg")
+    return whole(
+        said.number * 100, where, text, "hundredths", "step_angle", lambda count: f"{count / 100:g} deg"
+    )
 
 
 def millimetres(text: object, where: str) -> Fraction:
     """A length above 0 -> mm, exact."""
     said = amount(text, where, "a length such as 5 mm")
     if said.unit not in LENGTH or said.number <= 0:
-        raise refuse(f"{where}: {text!r} is no length", "a length such as 5 mm")
+        raise refuse(f"{where}: {shown(text)} is no length", "a length such as 5 mm")
     return said.number * LENGTH[said.unit]
 
 
@@ -193,7 +240,7 @@ def motor_of(full_steps: int, microsteps: int, where: str) -> tuple[int, int]:
         if found.denominator == 1 and 1 <= found <= 0xFFFF:
             return angle, int(found)
     raise refuse(
-        f"{where}: {full_steps} full steps of {microsteps} microsteps are {pulses} pulses a turn, "
+        f"{where}: {shown(full_steps)} full steps of {shown(microsteps)} microsteps are {shown(pulses)} pulses a turn, "
         "which the controller cannot be told",
         "36000 * microsteps / step angle, with 1 to 65535 and 1 to 255",
     )

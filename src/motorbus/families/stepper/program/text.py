@@ -13,10 +13,22 @@ from difflib import get_close_matches
 from fractions import Fraction
 from typing import Any, Final, NamedTuple
 
+from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper.program import names, quantities
 from motorbus.families.stepper.program.quantities import Geometry, refuse
-from motorbus.families.stepper.table import ENDLESS, STEPS, Project, Step, refusal, refusals, with_steps
+from motorbus.families.stepper.table import (
+    BASE_NAMES,
+    ENDLESS,
+    PARAMETERS,
+    STEP_NAMES,
+    STEPS,
+    Project,
+    Step,
+    allowed,
+    is_allowed,
+    with_steps,
+)
 
 FORMAT: Final = 1
 LONGEST: Final = 1 << 20
@@ -30,10 +42,28 @@ MOTOR: Final = (
 LOOP: Final = ("first", "last", "count")
 STEP: Final = ("move", "speed", "start", "acceleration", "delay", "output", "wait_for", "stop_on")
 STOPS: Final = ("slow", "immediate")
+WORDS: Final[Mapping[str, str]] = {
+    "number": "project",
+    "project_loop": "repeat",
+    "loop_first": "[loop], first",
+    "loop_last": "[loop], last",
+    "loop_count": "[loop], count",
+    "stop_mode": "stop",
+    "power_on_home": "home_at_power_on",
+    "distance": "move",
+    "direction": "the sign of move",
+    "start_frequency": "start",
+    "start_input": "wait_for",
+    "stop_input": "stop_on",
+}
+"""What a file calls a parameter that the controller calls otherwise."""
 
 
 class Source(NamedTuple):
-    """What a file says beyond the numbers of its project: its name, names of inputs and outputs, mm for a turn."""
+    """What a file says beyond the numbers of its project: its name, names of inputs and outputs, mm for a turn.
+
+    `motor` says in words what the controller is told of it where that is not what the file says; else it is "".
+    """
 
     project: Project
     name: str = ""
@@ -41,6 +71,7 @@ class Source(NamedTuple):
     outputs: Mapping[str, int] = {}
     lead: Fraction | None = None
     expert: bool = False
+    motor: str = ""
 
 
 def parse(text: str) -> Source:
@@ -50,27 +81,28 @@ def parse(text: str) -> Source:
     _known(data, TOP, "the file")
     expert = _boolean(data, "expert", "expert")
     inputs, outputs = (names.named(data.get(f"{kind}s", {}), kind) for kind in ("input", "output"))
-    base, lead = _motor(_table(data, "motor"))
+    base, lead, motor = _motor(_table(data, "motor"))
     first, last, count = _loop(_table(data, "loop"))
     base = replace(
         base, number=_integer(data, "project", "project", 1), project_loop=_repeat(data.get("repeat", 1))
     )
     base = replace(base, loop_first=first, loop_last=last, loop_count=count)
     _refuse(base, expert, steps=False)
-    steps = _steps(data, Geometry.of(base, lead), inputs, outputs)
+    steps = _steps(data, Reader(Geometry.of(base, lead), inputs, outputs, expert))
     made = with_steps(base, steps)
     made = replace(made, total_steps=_integer(data, "total_steps", "total_steps", len(steps)))
     if made.total_steps > len(steps):
         raise refuse(
-            f"total_steps: {made.total_steps}, but the file has {len(steps)} steps", f"1 to {len(steps)}"
+            f"total_steps: {shown(made.total_steps)}, but the file has {len(steps)} steps",
+            f"1 to {len(steps)}",
         )
     _refuse(replace(made, total_steps=len(steps)), expert)
     _refuse(made, expert)
     _check_loop(made)
     name = data.get("name", "")
     if not isinstance(name, str):
-        raise refuse(f"name: {name!r} is no text", "text in quotes")
-    return Source(made, name, inputs, outputs, lead, expert)
+        raise refuse(f"name: {shown(name)} is no text", "text in quotes")
+    return Source(made, name, inputs, outputs, lead, expert, motor)
 
 
 def write(source: Source) -> str:
@@ -121,7 +153,7 @@ def _toml(text: str) -> dict[str, Any]:
 def _format(data: Mapping[str, Any]) -> None:
     found = data.get("format")
     if type(found) is not int or found != FORMAT:
-        what = "is missing" if found is None else f"{found!r} is not known"
+        what = "is missing" if found is None else f"{shown(found)} is not known"
         raise RequestError(
             f"format: {what}",
             expected=f"format = {FORMAT}",
@@ -134,52 +166,37 @@ def _known(table: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
         if key not in keys:
             near = get_close_matches(key, keys, n=1)
             hint = f"perhaps {near[0]}; " if near else ""
-            raise refuse(f"{where}: there is no field {key!r}", f"{hint}one of {', '.join(keys)}")
+            raise refuse(f"{where}: there is no field {shown(key)}", f"{hint}one of {', '.join(keys)}")
 
 
 def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     table = data.get(key, {})
     if not isinstance(table, Mapping):
-        raise refuse(f"{key}: {table!r} is no table", f"a table [{key}]")
+        raise refuse(f"{key}: {shown(table)} is no table", f"a table [{key}]")
     return table
 
 
 def _integer(table: Mapping[str, Any], key: str, where: str, usual: int) -> int:
     value = table.get(key, usual)
     if type(value) is not int:
-        raise refuse(f"{where}: {value!r} is no whole number", "a whole number without a unit")
+        raise refuse(f"{where}: {shown(value)} is no whole number", "a whole number without a unit")
     return value
 
 
 def _boolean(table: Mapping[str, Any], key: str, where: str) -> bool:
     value = table.get(key, False)
     if not isinstance(value, bool):
-        raise refuse(f"{where}: {value!r} is neither true nor false", "true or false")
+        raise refuse(f"{where}: {shown(value)} is neither true nor false", "true or false")
     return value
 
 
-def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None]:
+def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None, str]:
     _known(table, MOTOR, "[motor]")
-    microsteps = _integer(table, "microsteps", "microsteps", 0)
-    if not table.get("microsteps"):
-        raise refuse("microsteps: they are missing in [motor]", "1 to 65535")
-    if ("step_angle" in table) == ("full_steps" in table):
-        raise refuse(
-            "step_angle: [motor] needs step_angle or full_steps, one of them", 'step_angle = "1.8 deg"'
-        )
-    if "full_steps" in table:
-        angle, microsteps = quantities.motor_of(
-            _integer(table, "full_steps", "full_steps", 0), microsteps, "full_steps"
-        )
-    else:
-        angle = quantities.hundredths(table["step_angle"], "step_angle")
-    for name, raw in (("microsteps", microsteps), ("step_angle", angle)):
-        if (error := refusal(name, raw)) is not None:
-            raise refuse(error.summary, error.expected)
+    angle, microsteps, told = _geometry(table)
     lead = quantities.millimetres(table["lead"], "lead") if "lead" in table else None
     stop = table.get("stop", STOPS[0])
     if stop not in STOPS:
-        raise refuse(f"stop: {stop!r} is no stop mode", " or ".join(STOPS))
+        raise refuse(f"stop: {shown(stop)} is no stop mode", " or ".join(STOPS))
     base = Project(
         microsteps=microsteps,
         step_angle=angle,
@@ -187,7 +204,27 @@ def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None]:
         mode4=_integer(table, "mode4", "mode4", 0),
         power_on_home=int(_boolean(table, "home_at_power_on", "home_at_power_on")),
     )
-    return replace(base, turn_distance=_turn_distance(table, base, lead)), lead
+    return replace(base, turn_distance=_turn_distance(table, base, lead)), lead, told
+
+
+def _geometry(table: Mapping[str, Any]) -> tuple[int, int, str]:
+    """Step angle (hundredths of a degree), microsteps, and in words what is told where the file says it otherwise."""
+    if "microsteps" not in table:
+        raise refuse("microsteps: they are missing in [motor]", _range("microsteps"))
+    microsteps = _integer(table, "microsteps", "microsteps", 0)
+    _within("microsteps", microsteps)
+    if ("step_angle" in table) == ("full_steps" in table):
+        raise refuse(
+            "step_angle: [motor] needs step_angle or full_steps, one of them", 'step_angle = "1.8 deg"'
+        )
+    if "step_angle" in table:
+        return quantities.hundredths(table["step_angle"], "step_angle"), microsteps, ""
+    full = _integer(table, "full_steps", "full_steps", 0)
+    angle, found = quantities.motor_of(full, microsteps, "full_steps")
+    if found == microsteps:
+        return angle, found, ""
+    meant = f"{full} full steps of {microsteps} microsteps are stored as {angle / 100:g} deg and {found} microsteps"
+    return angle, found, f"{meant}: {full * microsteps} pulses a turn either way"
 
 
 def _turn_distance(table: Mapping[str, Any], base: Project, lead: Fraction | None) -> int:
@@ -208,16 +245,26 @@ def _turn_distance(table: Mapping[str, Any], base: Project, lead: Fraction | Non
     if turns is None or unit.number <= 0:
         why = "millimetres need `lead` in [motor]" if unit.unit in quantities.LENGTH else ""
         raise refuse(
-            f"unit: {table['unit']!r} is no unit of distance here", "pulse, turn, 0.001 mm, 0.01 deg", why
+            f"unit: {shown(table['unit'])} is no unit of distance here",
+            "pulse, turn, 0.001 mm, 0.01 deg",
+            why,
         )
-    return quantities.whole(1 / (unit.number * turns), "unit", table["unit"], "units per turn")
+    each = 1 / (unit.number * turns)
+    return quantities.whole(
+        each,
+        "unit",
+        table["unit"],
+        "units per turn",
+        "turn_distance",
+        lambda count: f"{count} units per turn",
+    )
 
 
 def _loop(table: Mapping[str, Any]) -> tuple[int, int, int]:
     _known(table, LOOP, "[loop]")
     if table and set(table) != set(LOOP):
         raise refuse("[loop]: it needs first, last and count", "first = 2, last = 3, count = 2")
-    first, last, count = (_integer(table, key, f"loop_{key}", 0) for key in LOOP)
+    first, last, count = (_integer(table, key, f"[loop], {key}", 0) for key in LOOP)
     return first, last, count
 
 
@@ -225,31 +272,31 @@ def _repeat(said: object) -> int:
     if said == "endless":
         return ENDLESS
     if type(said) is not int or not 0 <= said < ENDLESS:
-        raise refuse(f"repeat: {said!r} is not possible", f'0 to {ENDLESS - 1}, or "endless"')
+        raise refuse(f"repeat: {shown(said)} is not possible", f'0 to {ENDLESS - 1}, or "endless"')
     return said
 
 
-def _steps(
-    data: Mapping[str, Any], geometry: Geometry, inputs: Mapping[str, int], outputs: Mapping[str, int]
-) -> tuple[Step, ...]:
+class Reader(NamedTuple):
+    """What the rest of a file means for its steps."""
+
+    geometry: Geometry
+    inputs: Mapping[str, int]
+    outputs: Mapping[str, int]
+    expert: bool
+
+
+def _steps(data: Mapping[str, Any], known: Reader) -> tuple[Step, ...]:
     rows = data.get("step", [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
         raise refuse("step: it is no list of steps", "tables [[step]]")
     if not 1 <= len(rows) <= STEPS:
         raise refuse(f"step: the file has {len(rows)} steps", f"1 to {STEPS}")
-    return tuple(
-        _step(row, f"step {number}", geometry, inputs, outputs) for number, row in enumerate(rows, start=1)
-    )
+    return tuple(_step(row, f"step {number}", known) for number, row in enumerate(rows, start=1))
 
 
-def _step(
-    row: Mapping[str, Any],
-    where: str,
-    geometry: Geometry,
-    inputs: Mapping[str, int],
-    outputs: Mapping[str, int],
-) -> Step:
+def _step(row: Mapping[str, Any], where: str, known: Reader) -> Step:
     _known(row, STEP, where)
+    geometry, inputs, outputs, expert = known
     distance, reverse = quantities.distance(row.get("move", "0 units"), f"{where}, move", geometry)
     if distance and "speed" not in row:
         raise refuse(f"{where}, speed: it is missing, and the step moves", "a speed such as 60 rpm")
@@ -258,26 +305,48 @@ def _step(
         direction=int(reverse),
         speed=quantities.speed(row.get("speed", "0 rpm"), f"{where}, speed", geometry),
         start_frequency=quantities.hertz(row.get("start", "0 Hz"), f"{where}, start"),
-        acceleration=quantities.hertz(row.get("acceleration", "0 Hz"), f"{where}, acceleration"),
+        acceleration=quantities.hertz(
+            row.get("acceleration", "0 Hz"), f"{where}, acceleration", "acceleration"
+        ),
         delay=quantities.milliseconds(row.get("delay", "0 ms"), f"{where}, delay"),
         output=names.output_of(row.get("output", "none"), f"{where}, output", outputs),
-        start_input=names.input_of(row.get("wait_for", "none"), f"{where}, wait_for", inputs),
-        stop_input=names.input_of(row.get("stop_on", "none"), f"{where}, stop_on", inputs),
+        start_input=names.input_of(row.get("wait_for", "none"), f"{where}, wait_for", inputs, expert=expert),
+        stop_input=names.input_of(row.get("stop_on", "none"), f"{where}, stop_on", inputs, expert=expert),
     )
 
 
 def _refuse(project: Project, expert: bool, *, steps: bool = True) -> None:
-    if (none := refusal("project", project.number)) is not None:
-        raise refuse(none.summary, none.expected)
-    for error in refusals(project if steps else replace(project, total_steps=1), expert=expert):
-        raise refuse(error.summary, error.expected, error.cause)
+    _within("project", project.number)
+    for name in BASE_NAMES:
+        if steps or name != "total_steps":
+            _within(name, getattr(project, name))
+    for number in range(1, min(project.total_steps, STEPS) + 1 if steps else 1):
+        for name in STEP_NAMES:
+            _within(name, getattr(project.step(number), name), number, expert=expert)
+
+
+def _within(name: str, raw: int, step: int = 0, *, expert: bool = False) -> None:
+    """Raises RequestError, with the file's word for it, for a number that a parameter may not be."""
+    if not is_allowed(name, raw, expert=expert):
+        where = f"step {step}, " if step else ""
+        raise refuse(f"{where}{WORDS.get(name, name)}: {shown(raw)} is not possible", _range(name, expert))
+
+
+def _range(name: str, expert: bool = False) -> str:
+    """What a parameter may be, as a file says it."""
+    row = PARAMETERS[name]
+    if name == "delay":
+        return f"{quantities.clock(row.low)} to {quantities.clock(row.high)} (raw {row.low} to {row.high})"
+    if name == "step_angle":
+        return f"{row.low / 100:g} deg to {row.high / 100:g} deg (raw {row.low} to {row.high})"
+    return allowed(name, expert=expert)
 
 
 def _check_loop(project: Project) -> None:
     first, last = project.loop_first, project.loop_last
     if (first or last) and not 1 <= first <= last <= project.total_steps:
         raise refuse(
-            f"loop_first, loop_last: {first} to {last} is no range of the {project.total_steps} steps",
+            f"[loop]: {first} to {last} is no range of the {project.total_steps} steps",
             f"1 <= first <= last <= {project.total_steps}",
         )
 

@@ -18,6 +18,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator.controller import Controller, Said
 from motorbus.families.stepper.simulator.ear import Ear
+from motorbus.families.stepper.simulator.harm import Harm
 from motorbus.families.stepper.simulator.inputs import Change, parse
 from motorbus.families.stepper.simulator.line import Line
 from motorbus.families.stepper.simulator.switches import Switches
@@ -42,15 +43,16 @@ class StepperBus:
     def __init__(self, node: int, switches: Switches) -> None:
         self.switches = switches
         self.now = 0.0
+        self._began: float | None = None
         self._hears = True
-        self._awake = False
         self._tasks: list[Task] = []
         self._order = count()
         self._ear = Ear(switches.rx_gap_ms / 1000)
-        self._line = Line(switches)
+        self._harm = Harm(switches, self._note)
+        self._line = Line(switches, self._harm)
         self._busy_until = -inf
         self._waiting = 0
-        self._storing: int | None = None
+        self.storing: int | None = None
         self.controller = Controller(switches, self)
         self._nodes = {node: self.controller}
 
@@ -61,7 +63,9 @@ class StepperBus:
 
     def tune(self, rate: int) -> None:
         """The host's rate in baud; the controller has 9600 and no other. 0: whichever it has."""
-        self._hears = rate in (0, RATE)
+        heard, self._hears = self._hears, rate in (0, RATE)
+        if heard and not self._hears:
+            self._note(f"the host is at {rate} bit/s and this at {RATE}: neither hears the other")
 
     def receive(self, data: Data, at: float) -> None:
         """Bytes of the host; a CAN frame is for another bus."""
@@ -69,19 +73,26 @@ class StepperBus:
         self._run_until(at)
         if isinstance(data, CanFrame) or not self._hears:
             return
-        if self.switches.echo:
-            self._line.echo(data, self.now)
-        deaf = self.switches.deaf_while_moving and self.controller.moving
-        if deaf or not self.controller.powered:
+        self._line.echo(data, self.now)
+        if self.controller.powered:
+            self._hear(self._harm.misheard(data))
+            self._run_until(self.now)
+
+    def _hear(self, data: bytes) -> None:
+        if self.switches.deaf_while_moving and self.controller.moving:
+            self._note(f"fault: it moves and does not hear {len(data)} bytes")
             return
         heard = self._ear.feed(data, self.now)
         if heard.bad:
-            self.controller.remark(f"{heard.bad} wrong checksum(s)")
+            self._note(f"{heard.bad} wrong checksum(s)")
         for request in heard.requests:
-            if self._waiting < QUEUE:
-                self._waiting += 1
-                self._later(self.now, partial(self._obey, request))
-        self._run_until(self.now)
+            if self._harm.unheard(request):
+                continue
+            if self._waiting >= QUEUE:
+                self._note(f"{QUEUE} requests wait already: {request.hex(' ').upper()} is forgotten")
+                continue
+            self._waiting += 1
+            self._later(self.now, partial(self._obey, request))
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
         """Everything that begins up to this moment, in order; to a host at another rate, nothing that it knows."""
@@ -95,7 +106,7 @@ class StepperBus:
 
     def due(self) -> float | None:
         """When something happens next by itself, or None; before its first moment nobody knows when that will be."""
-        moment = self._next() if self._awake else inf
+        moment = inf if self._began is None else self._next()
         return None if moment == inf else moment
 
     def press(self, port: int, active: bool, at: float) -> None:
@@ -119,15 +130,34 @@ class StepperBus:
 
     # -- what the controller asks of its surroundings -----------------------------------------------------------------
 
+    @property
+    def age(self) -> float:
+        """Seconds since the first moment it was told."""
+        return 0.0 if self._began is None else self.now - self._began
+
+    def behave(self, switches: Switches, *, reseed: bool) -> None:
+        """From now on as these say; with `reseed` chance begins afresh."""
+        self.switches = switches
+        self._harm.change(switches, reseed=reseed)
+        self._line.change(switches)
+        self._later(self.now, self.controller.rewire, outside=True)
+        self.settle()
+
+    def notice(self) -> None:
+        """Say that a project has ended, though none has."""
+        self._later(self.now, self._line.spurious)
+
     def settle(self) -> None:
         """Do what is to be done by now."""
         self._run_until(self.now)
 
     def cut_off(self) -> None:
         """The supply goes: what waits is lost, a save that has begun is cut, what was to be said is not."""
-        if self._storing is not None and self.switches.save_cut == "empty":
-            self.controller.store.stored[self._storing] = BLANK
-        self._storing = None
+        if self.storing is not None:
+            self._note(f"the supply has cut the saving of project {self.storing}")
+            if self.switches.save_cut == "empty":
+                self.controller.store.stored[self.storing] = BLANK
+        self.storing = None
         self._tasks = [task for task in self._tasks if task.outside]
         heapify(self._tasks)
         self._waiting = 0
@@ -139,9 +169,8 @@ class StepperBus:
 
     def _wake(self, at: float) -> None:
         """The first moment it is told is that of power-on, for a clock may begin anywhere; scripts begin then."""
-        if not self._awake:
-            self._awake = True
-            self.now = at
+        if self._began is None:
+            self._began = self.now = at
             self._tasks = [task._replace(at=task.at + at) for task in self._tasks]
             self.controller.power_up(at)
 
@@ -164,9 +193,13 @@ class StepperBus:
                 self.controller.advance(self.now)
             else:
                 heappop(self._tasks).act(self.now)
-            for moment in self.controller.notices():
-                self._line.notice(moment)
+            self._tell_ends()
         self.now = max(self.now, to)
+        self._tell_ends()
+
+    def _tell_ends(self) -> None:
+        for moment in self.controller.notices():
+            self._line.notice(moment)
 
     def _obey(self, request: bytes, at: float) -> None:
         if at < self._busy_until:
@@ -177,7 +210,7 @@ class StepperBus:
         ready = at + self.switches.turnaround
         if said.store is not None:
             ready += self.switches.save_time
-            self._storing = said.reply[3]
+            self.storing = said.reply[3]
             self._later(ready, partial(self._stored, said))
         if said.reply:
             self._busy_until = ready
@@ -186,9 +219,12 @@ class StepperBus:
             self._line.notice(max(moment, ready))
 
     def _stored(self, said: Said, at: float) -> None:
-        self._storing = None
+        self.storing = None
         if said.store is not None:
             said.store()
+
+    def _note(self, text: str) -> None:
+        self.controller.remark(text)
 
     def _press(self, port: int, active: bool, at: float) -> None:
         self.controller.input(port, active, at)

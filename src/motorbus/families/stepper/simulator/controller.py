@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
+from motorbus.core.family import Remark
+from motorbus.core.switches import switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.execution import Behaviour, Happening, Next, Phase, State
 from motorbus.families.stepper.simulator.memory import Memory, Rows
-from motorbus.families.stepper.simulator.switches import Switches
+from motorbus.families.stepper.simulator.switches import CHANGEABLE, Switches
 from motorbus.families.stepper.simulator.travel import Travel
 from motorbus.families.stepper.table import EDITS, HOME_INPUT, PROJECTS, Project, is_allowed
 
@@ -40,6 +42,18 @@ class Surroundings(Protocol):
     """What is around a controller: a clock, hands on its buttons, and its line."""
 
     now: float
+    storing: int | None
+    """The project that is being saved or cleared."""
+
+    @property
+    def age(self) -> float:
+        """Seconds since the simulation began."""
+
+    def behave(self, switches: Switches, *, reseed: bool) -> None:
+        """From now on as these say; with `reseed` chance begins afresh. The controller is told to `rewire`."""
+
+    def notice(self) -> None:
+        """Say that a project has ended, though none has."""
 
     def press(self, port: int, active: bool, at: float) -> None:
         """Let an input change at this moment, with its bounces."""
@@ -57,7 +71,8 @@ class Controller:
     `state`    what it is doing, a value of `execution`
     `store`    what it remembers; `memory` is the same by the names of the rows
     `travel`   where its load is, which it does not know
-    `told`     what happened lately, `log` remarks on what a host should know and is not told
+    `told`     what happened lately
+    `log`      the latest remarks on what a host should know and is not told, and on what faults have done
     `powered`  whether the supply is there and the cable in
     """
 
@@ -65,15 +80,14 @@ class Controller:
         self.switches = switches
         self.store = Memory(switches)
         self.told: list[Happening] = []
-        self.log: list[str] = []
+        self.log: list[Remark] = []
         self.powered = True
+        self._remarks = 0
         self._ends: list[float] = []
         self._around = around
         self.travel = Travel(switches)
-        self._inputs: frozenset[int] = (
-            frozenset({HOME_INPUT}) if switches.home_switch == "stuck" else frozenset()
-        )
-        self.state: State = execution.power_on(0.0, self.how, inputs=self._inputs).state
+        self._inputs: frozenset[int] = frozenset()
+        self.state: State = execution.power_on(0.0, self.how).state
         self.power_up(0.0)
 
     @property
@@ -113,6 +127,34 @@ class Controller:
             raise RequestError(f"there is no project {number}", expected=f"1 to {PROJECTS}")
         self.store.put(number, project)
 
+    def switch(self, **changes: object) -> dict[str, object]:
+        """Change switches while it runs, values also as text; gives all that can be changed, as they are then.
+
+        These are the faults, `turnaround` and `save_time`. So-many-th ones are counted from here, and when `seed` is
+        among the changes, chance begins afresh. Raises RequestError for an impossible name or value, and has changed
+        nothing then.
+        """
+        found = switched(Switches, "stepper", changes)
+        for name in changes.keys() - CHANGEABLE:
+            raise RequestError(
+                f"option {name} cannot be changed while the controller runs",
+                expected=f"one of {', '.join(sorted(CHANGEABLE))}",
+                advice="begin the simulation with it",
+            )
+        if changes:
+            self._around.settle()
+            chosen: dict[str, Any] = {name: getattr(found, name) for name in changes}
+            self.switches = replace(self.switches, **chosen)
+            self._around.behave(self.switches, reseed="seed" in changes)
+        return {name: getattr(self.switches, name) for name in sorted(CHANGEABLE)}
+
+    def notice(self) -> None:
+        """Let it say that a project has ended, though none has. Raises RequestError when it has no supply."""
+        if not self.powered:
+            raise RequestError("without supply it says nothing", advice="plug it in first")
+        self.remark("fault: a notice that nothing has caused")
+        self._around.notice()
+
     def unplug(self) -> None:
         """Pull its plug, supply and line in one: motion, outputs and what was not saved are lost."""
         if self.powered:
@@ -126,6 +168,7 @@ class Controller:
         if not self.powered:
             self.powered = True
             self.power_up(self._around.now)
+            self._around.settle()
 
     def power_cycle(self) -> None:
         """Take its supply away and give it back at once."""
@@ -150,6 +193,7 @@ class Controller:
             "leds": self.state.leds,
             "inputs": sorted(self.state.inputs),
             "selected": self.store.selected,
+            "saving": self._around.storing,
         }
 
     # -- what the bus brings -----------------------------------------------------------------------------------
@@ -157,9 +201,8 @@ class Controller:
     def power_up(self, at: float) -> None:
         """The supply comes, at this moment."""
         base = self.state.position(at)
-        if self.switches.home_switch == "wired":
-            on_it = frozenset({HOME_INPUT}) if self.travel.closed(self.state, at) else frozenset()
-            self._inputs = self._inputs - {HOME_INPUT} | on_it
+        at_home = self._home_switch(at)
+        self._inputs = self._inputs | {HOME_INPUT} if at_home else self._inputs - {HOME_INPUT}
         self.store.restart()
         homes = self.store.project(1)
         home_with = homes if homes.power_on_home else None
@@ -168,6 +211,20 @@ class Controller:
         self._take(execution.power_on(at, self.how, inputs=self._inputs, home_with=home_with, base=base))
         if self.how.flags_scope == "device":
             self._take(execution.set_stop_mode(self.state, self.store.flags["stop_mode"]))
+
+    def rewire(self, at: float) -> None:
+        """The switches are others than before: input 5 is as its switch has it now."""
+        self.travel.change(self.switches)
+        at_home = self._home_switch(at)
+        if at_home is not (HOME_INPUT in self._inputs):
+            self._wire(HOME_INPUT, at_home, at)
+
+    def _home_switch(self, at: float) -> bool:
+        """Whether input 5 is active, as what is wired to it says."""
+        kind = self.switches.home_switch
+        if kind == "wired":
+            return self.travel.closed(self.state, at)
+        return kind == "stuck" or (kind == "free" and HOME_INPUT in self._inputs)
 
     def due(self) -> float:
         """When something happens by itself."""
@@ -260,9 +317,11 @@ class Controller:
         return found
 
     def _save(self, data: bytes, number: int) -> Said:
-        if number != self.store.selected and self.switches.save_cross != "allow":
-            self.remark(f"project {self.store.selected} is saved as project {number}")
-            if self.switches.save_cross == "refuse":
+        reading = self.switches.save_cross
+        if number != self.store.selected and reading != "allow":
+            done = "is saved" if reading == "warn" else "is selected and not saved"
+            self.remark(f"project {self.store.selected} {done} as project {number}")
+            if reading == "refuse":
                 return SILENCE
         image = self.store.as_saved(number)
         return Said(self._reply(data), lambda: self.store.save(number, image))
@@ -294,7 +353,8 @@ class Controller:
 
     def remark(self, text: str) -> Said:
         """Note something that a host is not told; gives the silence that goes with it."""
-        self.log.append(text)
+        self._remarks += 1
+        self.log.append(Remark(self._remarks, self._around.age, text))
         del self.log[:-LOG]
         return SILENCE
 

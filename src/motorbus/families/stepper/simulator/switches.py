@@ -7,7 +7,7 @@ by itself. "Manual" is the stepper controller serial protocol manual.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 from motorbus.core.switches import switch
@@ -105,34 +105,70 @@ class Switches(Behaviour):
 
     # -- faults ---------------------------------------------------------------------------------------------------
 
-    echo: bool = switch(False, "the line hands back what the host sends", source=_FAULT)
+    echo: str = switch(
+        "no",
+        "the line hands back what the host sends: all of it, or the first six bytes of each request, which is how many "
+        "an acknowledgement has",
+        "no",
+        "yes",
+        "six",
+        source=_FAULT,
+    )
+    request_errors: float = switch(
+        0.0,
+        "how probable it is for each byte of a request to arrive as another one; a wrong checksum is not answered",
+        source=_FAULT,
+        span=(0.0, 1.0),
+    )
+    byte_errors: float = switch(
+        0.0,
+        "how probable it is for each byte that the device says to arrive as another one",
+        source=_FAULT,
+        span=(0.0, 1.0),
+    )
+    seed: int = switch(
+        0, "where chance begins: the same seed and the same traffic give the same errors", source=_FAULT
+    )
     reply_fault: str = switch(
         "none",
-        "what happens to replies: they are lost, late, have one bit flipped, are those of another command, come in two "
-        "pieces, or noise comes before them",
+        "what happens to replies: they are lost though the command is carried out; the command is unheard, neither "
+        "carried out nor answered; they are late, come twice, have one bit flipped, are those of another command, come "
+        "in two pieces, or noise comes before them",
         "none",
         "lost",
+        "unheard",
         "late",
+        "doubled",
         "bit",
         "other",
         "split",
         "noise",
         source=_FAULT,
     )
-    fault_every: int = switch(1, "to each so-many-th reply", source=_FAULT, span=(1, 1e9))
-    fault_time: float = switch(0.5, "s by which late replies are late, and between two pieces", source=_FAULT)
     notice_fault: str = switch(
         "none",
-        "what happens to the notice that a project has ended: it is lost, comes twice, or waits for the next request "
-        "and comes before the reply",
+        "what happens to the notice that a project has ended: it is lost, comes twice, is late, waits for the next "
+        "request and comes before the reply (early), or waits for the next dump and comes in the middle of it",
         "none",
         "lost",
         "doubled",
+        "late",
         "early",
+        "inside_dump",
         source=_FAULT,
     )
     dump_fault: str = switch(
         "none", "dumps lack their second half, or one byte", "none", "short", "byte", source=_FAULT
+    )
+    fault_every: int = switch(
+        1,
+        "of echo=six and of the faults of replies, notices and dumps: each so-many-th is hit, each kind counted by "
+        "itself; errors of bytes come by chance alone",
+        source=_FAULT,
+        span=(1, 1e9),
+    )
+    fault_time: float = switch(
+        0.5, "s by which late replies and notices are late, and between two pieces", source=_FAULT
     )
     deaf_while_moving: bool = switch(False, "while the motor turns it hears nothing", source=_FAULT)
     bounce: int = switch(
@@ -154,3 +190,9 @@ class Switches(Behaviour):
         source=_FAULT,
         span=(-1e9, 1e9),
     )
+
+
+CHANGEABLE: Final = frozenset(
+    {one.name for one in fields(Switches) if one.metadata["source"] == _FAULT} | {"turnaround", "save_time"}
+)
+"""What may change while it runs: faults come and go, and so does slowness. How a device is made does not."""

@@ -16,10 +16,14 @@ class Travel:
     """The load, `offset` pulses from what the controller counts."""
 
     def __init__(self, switches: Switches) -> None:
+        self.offset = 0
+        self.change(switches)
+
+    def change(self, switches: Switches) -> None:
+        """From now on the switch is where these say."""
         self._wired = switches.home_switch == "wired"
         self._place = switches.home_at
         self._known: tuple[State | None, bool, float] = (None, False, inf)
-        self.offset = 0
 
     def position(self, state: State, at: float) -> int:
         """Where the load is, in pulses from where it was first."""

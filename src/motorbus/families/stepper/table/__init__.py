@@ -23,10 +23,12 @@ from motorbus.families.stepper.table.edits import Edit, edited, edits, edits_bet
 from motorbus.families.stepper.table.image import (
     BLANK,
     Order,
+    checked_order,
     decode_image,
     differences,
     encode_image,
     reserved_bytes,
+    row_value,
 )
 from motorbus.families.stepper.table.limits import UNITS, allowed, check, is_allowed, refusal, refusals
 from motorbus.families.stepper.table.orders import (
@@ -99,6 +101,7 @@ __all__ = [
     "after_step",
     "allowed",
     "check",
+    "checked_order",
     "decode_image",
     "differences",
     "dump_offset",
@@ -110,6 +113,7 @@ __all__ = [
     "refusal",
     "refusals",
     "reserved_bytes",
+    "row_value",
     "step_output_of",
     "step_row",
     "with_steps",

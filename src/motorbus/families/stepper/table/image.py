@@ -6,11 +6,11 @@ they are given; there is no command that writes them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any, Final, Literal, TypeAlias
 
-from motorbus.core.entry import Entry
+from motorbus.core.entry import Entry, shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table.project import STEPS, Project, Step
@@ -18,6 +18,14 @@ from motorbus.families.stepper.table.rows import BASE, RESERVED, STEP
 
 Order: TypeAlias = Literal["little", "big"]
 BLANK: Final = bytes(wire.IMAGE_LENGTH)
+_ORDERS: Final[Mapping[str, Order]] = {"little": "little", "big": "big"}
+
+
+def checked_order(said: object) -> Order:
+    """Which byte of a number comes first in a dump: little (the lowest) or big. Raises RequestError for other words."""
+    if (order := _ORDERS.get(str(said))) is None:
+        raise RequestError(f"dump_order={shown(said)} is not possible", expected="little or big")
+    return order
 
 
 def decode_image(image: bytes, order: Order = "little") -> Project:
@@ -26,9 +34,9 @@ def decode_image(image: bytes, order: Order = "little") -> Project:
     `order` says which byte of a number comes first; that it is the lowest is an assumption.
     """
     _check(image)
-    base: dict[str, Any] = {row.name: _number(image, row.address, row, order) for row in BASE}
+    base: dict[str, Any] = {row.name: row_value(image, row, order) for row in BASE}
     steps = tuple(
-        Step(**{row.name: _number(image, wire.ROW_LENGTH * x + row.address, row, order) for row in STEP})
+        Step(**{row.name: row_value(image, row, order, wire.ROW_LENGTH * x) for row in STEP})
         for x in range(1, STEPS + 1)
     )
     return Project(**base, steps=steps)
@@ -49,6 +57,12 @@ def encode_image(project: Project, order: Order = "little", *, over: bytes = BLA
     return bytes(image)
 
 
+def row_value(image: bytes, row: Entry, order: Order = "little", start: int = 0) -> int:
+    """The raw value of one row of an image; `start` is where the row of its step begins, if it counts from there."""
+    at = start + row.address
+    return int.from_bytes(image[at : at + row.size], order)
+
+
 def reserved_bytes(image: bytes) -> dict[int, int]:
     """Every byte that no row names and that is not 0, by its offset in the image."""
     _check(image)
@@ -67,10 +81,6 @@ def differences(one: Project, other: Project) -> Iterator[tuple[str, int, int, i
             mine, theirs = getattr(one.step(x), field.name), getattr(other.step(x), field.name)
             if mine != theirs:
                 yield field.name, x, mine, theirs
-
-
-def _number(image: bytes, at: int, row: Entry, order: Order) -> int:
-    return int.from_bytes(image[at : at + row.size], order)
 
 
 def _put(image: bytearray, at: int, row: Entry, value: int, order: Order, step: int) -> None:

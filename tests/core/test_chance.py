@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from motorbus.families.feetech.simulator.chance import Chance
+from motorbus.core.chance import Chance
 
 
 def test_the_known_first_numbers_of_splitmix64() -> None:

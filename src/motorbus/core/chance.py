@@ -1,7 +1,8 @@
 """Chance that can be had again: the same seed gives the same numbers on every machine and in every Python.
 
-Families know no random numbers of their own; a simulated servo that is late by chance needs some, and they must belong
-to its bus alone. So this is a generator of the plainest kind, good for jitter and for nothing that must be secret.
+Families know no random numbers of their own; a simulated device that is late or misheard by chance needs some, and
+they must belong to its bus alone. So this is a generator of the plainest kind, good for jitter and for nothing that
+must be secret.
 """
 
 from __future__ import annotations
