@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from bench import can_rounds, machine, report, responder, rounds, startup, syscalls
+from bench import can_rounds, estimates, machine, report, responder, rounds, startup, syscalls
 from bench.places import BUILD, ROOT
 from bench.rounds import CANDIDATES, Candidate
 from bench.workloads import WORKLOADS
@@ -62,6 +62,7 @@ def measured(given: argparse.Namespace) -> report.Results:
         starts=startup.costs(given.rounds, say),
         missing=missing + can_rounds.missing(),
         can=() if given.only or can_rounds.missing() else can_rounds.rounds(given.count, given.rounds, say),
+        forecasts=() if given.only else estimates.costs(given.rounds, say),
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from bench import can_report
+from bench import can_report, estimates
 from bench.figures import Spread, cost, ratio
 from bench.rounds import Sample
 from bench.startup import Cost
@@ -33,6 +33,7 @@ class Results(NamedTuple):
     starts: list[Cost]
     missing: list[str]
     can: Sequence[Sample] = ()
+    forecasts: Sequence[estimates.Cost] = ()
 
 
 class Table(NamedTuple):
@@ -112,6 +113,11 @@ def can_table(results: Results) -> Table:
     return Table("CAN, over slcan", can_report.COLUMNS, can_report.rows(list(results.can)))
 
 
+def forecast_table(results: Results) -> Table:
+    """What estimating a program costs."""
+    return Table("Estimates", ("", "ms", "min – max"), estimates.rows(results.forecasts))
+
+
 def tables(results: Results) -> list[Table]:
     """All of them, in reading order."""
     found = list(wire_tables(results))
@@ -121,6 +127,8 @@ def tables(results: Results) -> list[Table]:
         found.append(start_table(results))
     if results.can:
         found.append(can_table(results))
+    if results.forecasts:
+        found.append(forecast_table(results))
     return found
 
 
@@ -173,6 +181,7 @@ def as_json(results: Results) -> str:
         else [{"contender": who, "workload": what, "calls": each} for (who, what), each in calls.items()],
         "can": [sample._asdict() for sample in results.can],
         "start_up": [{**start._asdict(), "seconds": start.seconds._asdict()} for start in results.starts],
+        "estimates": [{**one._asdict(), "seconds": one.seconds._asdict()} for one in results.forecasts],
         "missing": results.missing,
     }
     return json.dumps(document, indent=1) + "\n"
@@ -210,6 +219,14 @@ can be measured so.
 Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
 {start}
+{forecasts}"""
+
+_FORECASTS = """
+## Estimates
+
+A program of ten steps for the stepper controller, estimated in this process. The longest that ten steps can be has
+645 160 executions, and with carried pulses each of them is reckoned.
+
 """
 
 
@@ -228,4 +245,11 @@ def page(results: Results) -> str:
         memory=as_markdown(memory_table(results)),
         can=can_report.TEXT + as_markdown(can_table(results)) + "\n\n" if results.can else "",
         start=as_markdown(start_table(results)),
+        forecasts=_estimated(results),
     )
+
+
+def _estimated(results: Results) -> str:
+    if not results.forecasts:
+        return ""
+    return f"{_FORECASTS}{as_markdown(forecast_table(results))}\n\n{estimates.verdict(results.forecasts)}\n"

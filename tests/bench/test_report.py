@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from bench.estimates import Cost as Estimated
 from bench.figures import Spread
 from bench.report import Results, as_json, as_text, page, spoiled, tables, verdict
 from bench.rounds import Sample
@@ -48,6 +49,10 @@ def test_the_page_holds_every_table() -> None:
     assert "CAN" not in page(RESULTS._replace(can=()))
     assert "| import motorbus | 12.3 | 10.0 – 20.0 | 42 | none |" in text
     assert "A processor with 2 cores" in text
+    assert "Estimates" not in text
+    told = page(RESULTS._replace(forecasts=[Estimated("ten steps", Spread(0.0012, 0.001, 0.06))]))
+    assert "| ten steps | 1.20 | 1.00 – 60.00 |" in told
+    assert "estimated in 1.20 ms. Less than 50 ms: reached." in told
 
 
 def test_the_json_has_every_sample() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.core.operation import Answer, Due, Exchange
-from motorbus.errors import ChecksumError, NoReply
+from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import wire
 from tests.bus.script import Script, ping, position, positions, reply
 
@@ -284,3 +284,70 @@ def test_the_echo_of_an_earlier_write_is_no_answer() -> None:
     script.feed(echo)
     assert not flight.done
     assert script.turns.echo.present is None
+
+
+def saying(request: bytes) -> Exchange[Answer]:
+    """An exchange whose reply is the beginning of its request, as with FEETECH a ping that meets its own alarm."""
+    return Exchange(request, (Due(1, 1, 6),))
+
+
+LONGER = wire.encode_status(1, 0) + bytes(5)
+"""A made-up request of 11 bytes that begins with a whole status frame."""
+
+
+def unsure() -> Script:
+    script = Script()
+    script.turns.echo.doubted()
+    return script
+
+
+def test_a_reply_that_may_be_an_echo_waits_for_the_rest_of_it() -> None:
+    script = unsure()
+    flight = script.submit(saying(LONGER))
+    script.sent()
+    script.feed(LONGER[:6])
+    assert not flight.done
+    assert script.turns.due() - script.now == pytest.approx(3 * 10 / 1_000_000)
+    script.feed(LONGER[6:], after=0.00002)
+    assert isinstance(flight.error, MotorbusError), "it was an echo"
+    assert script.turns.trust.of(1).tainted
+
+
+def test_when_no_more_comes_it_is_the_reply() -> None:
+    script = unsure()
+    flight = script.submit(saying(LONGER))
+    script.sent()
+    script.feed(LONGER[:6])
+    script.time_out()
+    assert flight.result().replies[0].data == LONGER[:6]
+
+
+def test_once_an_echo_is_excluded_nothing_waits() -> None:
+    script = unsure()
+    script.submit(position(1))
+    script.sent()
+    script.feed(reply(1))
+    assert script.turns.echo.present is False, "an answer came, and no echo before it"
+    flight = script.submit(saying(LONGER))
+    script.sent()
+    script.feed(LONGER[:6])
+    assert flight.done
+
+
+def test_an_echo_that_begins_later_on_is_found_out_though_no_reply_looks_like_it() -> None:
+    script = Script()
+    flight = script.submit(saying(LONGER))
+    script.sent()
+    script.feed(LONGER + reply(1))
+    assert isinstance(flight.error, OutcomeUnknown)
+    assert script.turns.echo.present is None, "the next probe finds out"
+
+
+def test_the_beginning_of_an_echo_that_should_be_whole_is_no_reply() -> None:
+    script = Script()
+    script.turns.echo.present = True
+    flight = script.submit(saying(LONGER))
+    script.sent()
+    script.feed(LONGER[:6])
+    script.time_out()
+    assert isinstance(flight.error, OutcomeUnknown)

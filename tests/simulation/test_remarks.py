@@ -26,8 +26,8 @@ def test_each_is_one_line_with_its_moment_and_is_shown_once() -> None:
 def test_of_a_flood_the_first_are_shown_and_the_others_counted() -> None:
     bus = used()
     remarks = Remarks(bus)
-    for _ in range(1200):  # more than the controller keeps
-        bus.controller.remark("again")
+    for number in range(1200):  # more than the controller keeps
+        bus.controller.remark(f"again {number}")
     assert len(remarks.lines(5.0)) == MOST
     bus.controller.remark("once more")
     assert remarks.lines(5.5) == []
@@ -36,12 +36,21 @@ def test_of_a_flood_the_first_are_shown_and_the_others_counted() -> None:
     assert remarks.lines(8.0) == []
 
 
+def test_what_is_repeated_does_not_hide_what_is_new() -> None:
+    bus = used()
+    remarks = Remarks(bus)
+    for _ in range(100):
+        bus.controller.remark("again")
+    bus.controller.remark("new")
+    assert [line.partition(": ")[2] for line in remarks.lines(5.0)] == ["again", "new"]
+
+
 def test_what_was_not_shown_may_be_asked_for_at_the_end() -> None:
     bus = used()
     remarks = Remarks(bus)
-    for _ in range(MOST + 1):
+    for _ in range(2):
         bus.controller.remark("again")
-    remarks.lines(1.0)
+    assert len(remarks.lines(1.0)) == 1
     assert remarks.rest() == ["… and 1 more"]
     assert remarks.rest() == []
 

@@ -39,6 +39,7 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
     Timeout.STORE: 0.02,
 }
 SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
+ECHO_SETTLE = 3.0  # byte times after a reply that may be the beginning of an echo, for the rest of it
 
 
 class Air:
@@ -62,8 +63,7 @@ class Air:
         self._free_at = 0.0
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
-        """This try has failed; the queue decides whether there is another."""
-        raise AssertionError("turns decides")
+        raise AssertionError("turns decides whether there is another try")
 
     def _heard(self, notice: Notice) -> None:
         """Tell whoever listens."""
@@ -151,6 +151,8 @@ class Air:
                 for event in self.receiver.feed(data):
                     self._take(event, now)
             if isinstance(data, bytes):
+                if self.echo.returned:
+                    self._echo_returned()
                 self._let_settle(len(data), now)
         self._land(now)
         self.expire(now if looked is None else looked)
@@ -158,13 +160,16 @@ class Air:
     def _let_settle(self, size: int, now: float) -> None:
         """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.
 
-        One that came whole needs none; what was left over would have come with it.
+        One that came whole needs none, unless it may be the beginning of an echo, of which the rest may follow.
         """
         for flight in self._flying.values():
             last = flight.last
-            if flight.complete and not flight.settling and last is not None and size < len(last.data):
+            if flight.settling or not flight.complete or last is None:
+                continue
+            if (echo := self.echo.may_be(last.data)) or size < len(last.data):
                 flight.settling = True
-                flight.deadline = min(flight.deadline, now + SETTLE * self._byte_time(flight))
+                pause = (ECHO_SETTLE if echo else SETTLE) * self._byte_time(flight) + echo * self.latency
+                flight.deadline = min(flight.deadline, now + pause)
 
     def _byte_time(self, flight: Flight) -> float:
         exchange = flight.exchange
@@ -247,6 +252,15 @@ class Air:
             flight.spoiled = "echo"
         self.trust.doubt(now, self._quiet)
 
+    def _echo_returned(self) -> None:
+        """What was sent is back where no echo was known: who waits has heard himself, unless that was just tested."""
+        if any(flight.echo_checked or flight.spoiled == "echo" for flight in self._flying.values()):
+            return
+        self.echo.doubted()
+        self.statistics.other["echo"] += 1
+        for flight in self._flying.values():
+            flight.spoiled = "echo"
+
     @property
     def _quiet(self) -> float:
         return self.family.quiet_time(self.rate)
@@ -308,6 +322,8 @@ class Air:
 
     def _overdue(self, lane: int, flight: Flight, now: float) -> None:
         held = self.echo.give_up()
+        if self.echo.broken:
+            self._echo_broke(now)
         for event in (self.receiver.feed(held) if held else []) + self.receiver.flush():
             self._take(event, now)
         if self._flying.get(lane) is not flight:
@@ -341,8 +357,8 @@ class Air:
         self._landed()
 
     def _echo_settled(self, flight: Flight) -> None:
-        """A test of the echo has ended: nothing but its answer came, or nothing at all."""
-        test = flight.parent is not None or flight.exchange is self.echo.test
+        """A test of the echo has ended: nothing but its answer came, or nothing at all. Or an answer came first."""
+        test = flight.parent is not None or flight.exchange is self.echo.test or self.echo.disproved
         if test and self.echo.present is None and not flight.noise:
             self.echo.excluded()
 

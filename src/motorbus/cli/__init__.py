@@ -46,6 +46,8 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
     Group("Act", sort_key=2): {
         "write": "Write registers of a device.",
         "move": "Move devices to positions, several of them together.",
+        "jog": "Turn a device at a speed for a time, and stop.",
+        "home": "Let a device find its reference.",
         "torque": "Switch the power stage on or off.",
         "calibrate": "Make the present pose of a device read another position, for good.",
         "stop": "Decelerate and hold.",

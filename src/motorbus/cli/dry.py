@@ -7,11 +7,23 @@ what was "written", so that a guarded sequence is shown to its end.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
-from motorbus.core.operation import ANY, Alone, CanFrame, Effect, Exchange, Pause, Rank, Together, Tune
+from motorbus.core.operation import (
+    ANY,
+    Alone,
+    CanFrame,
+    Effect,
+    Exchange,
+    Listen,
+    Pause,
+    Rank,
+    Together,
+    Tune,
+)
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
@@ -54,16 +66,18 @@ def _unforeseeable() -> Unforeseeable:
 class DryBus:
     """Stands where a bus stands: reads by it, and keeps what it withheld in `frames`, in order.
 
-    A CAN frame is kept as it stands in a run of bytes, see `CanFrame.flat()`.
+    A CAN frame is kept as it stands in a run of bytes, see `CanFrame.flat()`. Nobody waits in a rehearsal, but its time
+    passes, and what a family remembers of what it said goes into a copy of it.
     """
 
     def __init__(self, bus: Bus) -> None:
-        self.family = bus.family
+        self.family = copy(bus.family)
         self.link = bus.link
         self.frames: list[bytes] = []
         self._bus = bus
         self._gate = Gate()
         self._written: set[int] = set()
+        self._waited = 0.0
 
     def apart(self) -> DryBus:
         """The same bus for another device: what is withheld here and from it hides nothing of the other.
@@ -105,8 +119,11 @@ class DryBus:
                 iter(step)
             )  # on CAN whoever speaks at another rate disturbs the bus: only ask there
         if isinstance(step, Pause):
-            return self.link.now()
-        return None  # a report, another rate: nothing is sent
+            self._waited += step.seconds
+            return self.link.now() + self._waited
+        if isinstance(step, Listen):
+            self._waited += step.until
+        return None  # nobody has said anything; a report, another rate: nothing is sent
 
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:

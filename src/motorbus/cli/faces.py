@@ -9,6 +9,10 @@ A family's face is the module (or package) of its name in this folder. Apart fro
                                                                frame of that exchange all that it may be
     report_frames(family, node)                                all that a report of a node may be
     say(event)                                                 what an event of its operations says, "" if nothing
+    sample(one)                                                what there is to watch of a device without telemetry:
+                                                               words by name
+    demo(bus, seconds, picture, output)                        what a demonstration of these devices shows: draws the
+                                                               picture, and prints what came of it
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
     bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
     CUT_OFF                                                    what to do about a change that was cut off, where no

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import alarms, traffic
+from motorbus.cli import alarms, faces, traffic
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.read import state_facts
+from motorbus.cli.read import Told, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened
 from motorbus.core.operation import Pause
 from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
@@ -27,7 +27,9 @@ app = App(
     usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
     help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again. What no device tells has
-no column. --listen asks nobody: it prints what others say, such as position
+no column; of a stepper controller there are its inputs to watch, and each is
+asked for by itself. What is asked takes its time on the line: the rate that was
+reached is told at the end where it is less than --rate. --listen asks nobody: it prints what others say, such as position
 reports, and works where listen_only=yes lets nothing out; --count is of frames
 then.
 
@@ -36,10 +38,11 @@ Examples:
     motorbus monitor feetech:/dev/ttyACM0
     motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
     motorbus monitor kst:can://slcan/dev/ttyACM0,listen_only=yes --listen
+    motorbus monitor stepper:/dev/ttyUSB0#1 --rate 4
     motorbus monitor feetech:sim,ids=1-2#1+2 --count 3 --json""",
 )
 
-Sample = dict[tuple[str, int], "State | MotorbusError"]
+Sample = dict[tuple[str, int], "State | Told | MotorbusError"]
 
 
 @app.default
@@ -80,10 +83,10 @@ def monitor(
         def tell(sample: Sample) -> None:
             show(sample)
             for (name, node), state in sample.items():
-                if not isinstance(state, MotorbusError):
+                if not isinstance(state, MotorbusError | dict):
                     told.look(name, watched[name, node], state)
 
-        return _watch(watched, 1 / rate, count, duration, tell)
+        return _watch(watched, 1 / rate, count, duration, tell, output)
 
 
 def _watched(
@@ -94,7 +97,8 @@ def _watched(
         bus = stack.enter_context(opened(name, options, output))
         for node in everyone(name, bus, nodes, output):
             one = face(bus, node)
-            able(one, "telemetry")
+            if faces.offer(bus.family.name, "sample") is None:
+                able(one, "telemetry")
             found[name, node] = one
     return found
 
@@ -105,6 +109,7 @@ def _watch(
     count: int,
     duration: float,
     show: Callable[[Sample], None],
+    output: Output,
 ) -> Exit:
     bus: Bus = next(iter(watched.values())).bus
     began = bus.link.now()
@@ -122,12 +127,19 @@ def _watch(
             bus.run(_pause(max(0.0, done * period - passed)))
     except KeyboardInterrupt:
         pass  # the usual way to end it
+    _say_rate(done, bus.link.now() - began, 1 / period, output)
     return _verdict(set(watched), heard)
 
 
-def _sample(one: Any) -> State | MotorbusError:
+def _say_rate(samples: int, seconds: float, wanted: float, output: Output) -> None:
+    """Where the line or the devices were slower than was asked for; the first sample comes at once."""
+    if samples > 1 and (reached := samples / seconds) < wanted * _SLOW:
+        output.note(f"note: {reached:.3g} samples per second, which is all that the line and the devices allow")
+
+
+def _sample(one: Any) -> State | Told | MotorbusError:
     try:
-        state: State = one.telemetry()
+        state = sampled(one)
     except LinkError:
         raise
     except MotorbusError as error:
@@ -171,7 +183,8 @@ def _lines(sample: Sample, output: Output, told: set[str]) -> None:
         if isinstance(state, MotorbusError):
             output.document("motorbus.monitor/1", {**named, "error": state.summary})
         else:
-            output.document("motorbus.monitor/1", {**named, **state_facts(state)})
+            facts = state if isinstance(state, dict) else state_facts(state)
+            output.document("motorbus.monitor/1", {**named, **facts})
     if not output.json:
         output.draw(_grid(sample, output, told))
 
@@ -185,27 +198,40 @@ COLUMNS: Final = {
     "temperature": ">temperature (°C)",
     "moving": "moving",
 }
+_SLOW: Final = 0.9
+"""Of the rate that was asked for: what is below is told."""
 _DIGITS: Final = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltage": 1, "temperature": 0}
 
 
 def _grid(sample: Sample, output: Output, told: set[str]) -> Any:
     """A column for each thing that a device has told so far; all of them while none has told anything."""
-    states = [state for state in sample.values() if not isinstance(state, MotorbusError)]
+    answers = [state for state in sample.values() if not isinstance(state, MotorbusError)]
+    others = list(dict.fromkeys(name for one in answers if isinstance(one, dict) for name in one))
+    states = [one for one in answers if not isinstance(one, dict)]
     told |= {name for name in COLUMNS if any(getattr(state, name) is not None for state in states)}
-    names = [name for name in COLUMNS if name in told or not told]
-    columns = [">id", *(COLUMNS[name] for name in names), "alarm"]
-    return output.grid(columns, [_row(node, state, names) for (_, node), state in sample.items()])
+    names = [name for name in COLUMNS if name in told or not (told or others)]
+    columns = [">id", *(COLUMNS[name] for name in names), *(name.replace("_", " ") for name in others), "alarm"]
+    return output.grid(columns, [_row(node, state, names, others) for (_, node), state in sample.items()])
 
 
-def _row(node: int, state: State | MotorbusError, names: Sequence[str]) -> tuple[object, ...]:
+def _row(
+    node: int, state: State | Told | MotorbusError, names: Sequence[str], others: Sequence[str]
+) -> tuple[object, ...]:
     if isinstance(state, MotorbusError):
-        return (node, *("" for _ in names), state.summary)
-    return (node, *(_told(state, name) for name in names), ", ".join(state.alarm))
+        return (node, *("" for _ in (*names, *others)), state.summary)
+    if isinstance(state, dict):
+        return (node, *("" for _ in names), *(_word(state.get(name)) for name in others), "")
+    return (node, *(_told(state, name) for name in names), *("" for _ in others), ", ".join(state.alarm))
+
+
+def _word(value: object) -> object:
+    """yes or nothing for what is so or not so; else the value."""
+    return ("yes" if value else "") if isinstance(value, bool) else value
 
 
 def _told(state: State, name: str) -> str:
     if name == "moving":
-        return "yes" if state.moving else ""
+        return str(_word(bool(state.moving)))
     return _value(getattr(state, name), name)
 
 

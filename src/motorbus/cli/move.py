@@ -1,4 +1,7 @@
-"""`motorbus move`: one device, or several in the same instant, to positions that are checked beforehand."""
+"""`motorbus move`: one device, or several in the same instant, to positions that are checked beforehand.
+
+Of devices that do not know where they are, by an angle from where they stand.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from motorbus.cli import dry, faces
-from motorbus.cli.consent import consent_to_ways
+from motorbus.cli.acting import acted
+from motorbus.cli.consent import FAR, consent_to_ways
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
-from motorbus.cli.target import able, face, offers, opened, takes, target
+from motorbus.cli.plain import plain
+from motorbus.cli.target import able, device, face, offers, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -21,6 +26,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.dry import DryBus
+    from motorbus.core.family import Family
 
 app = App(
     name="move",
@@ -32,12 +38,18 @@ needs --yes. The goal must lie inside the limits of the device. Several devices
 of one bus begin in the same instant where their family can do that. Ctrl-C
 ends the waiting, not the motion: `motorbus stop` does.
 
++= and -= go by an angle from where the device stands: all that devices can do
+which do not know their position, as a stepper controller. One device at a
+time, and it is stopped at the end. What is shown then is reckoned, not read.
+
 Examples:
 
     motorbus move feetech:/dev/ttyACM0#3=90deg
     motorbus move feetech:/dev/ttyACM0#3=-0.5 --velocity 1.5
     motorbus move feetech:COM7#1+2=0 feetech:COM7#3=0.3 --no-wait
-    motorbus move feetech:/dev/ttyACM0#3=90deg --dry-run""",
+    motorbus move feetech:/dev/ttyACM0#3=90deg --dry-run
+    motorbus move stepper:/dev/ttyUSB0#1+=90deg --velocity 60rpm
+    motorbus move stepper:/dev/ttyUSB0#1-=0.5turn""",
 )
 
 
@@ -73,6 +85,8 @@ def move(
         Any option of the bus string, as a flag.
     """
     bounds = _bounds(velocity, acceleration)
+    if any(_is_relative(text) for text in goals):
+        return _moved_by(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
     results = []
     for bus, wanted in _wanted(goals).items():
         with opened(bus, options, output) as opening:
@@ -101,7 +115,7 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
     for text in texts:
         devices, _, position = text.rpartition("=")
         bus, family, nodes = target(devices) if "#" in devices else _nowhere(text)
-        offers(family, "move")
+        _knows_where_it_is(family, text)
         goals = found.setdefault(bus, {})
         if not goals.keys().isdisjoint(nodes):
             raise RequestError(f"{text}: a device is named twice", advice="nothing was sent")
@@ -111,6 +125,56 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
             "which device, and where to?", expected="BUS#ID=POSITION, as feetech:/dev/ttyACM0#3=90deg"
         )
     return found
+
+
+def _is_relative(text: str) -> bool:
+    return text.rpartition("=")[0].endswith(("+", "-"))
+
+
+def _knows_where_it_is(family: Family, text: str) -> None:
+    """Raises RequestError for devices that do not, with the form by which they move."""
+    devices, _, position = text.rpartition("=")
+    if hasattr(family.devices.blocking, "move_by") and not hasattr(family.devices.blocking, "move"):
+        raise RequestError(
+            f"{family.name} devices do not know where they are, so they cannot go to a position",
+            expected=f"by an angle from where it stands: {devices}+={position} or {devices}-={position}",
+            advice="nothing was sent",
+        )
+    offers(family, "move")
+
+
+def _moved_by(
+    texts: tuple[str, ...],
+    bounds: dict[str, float],
+    options: Mapping[str, str],
+    output: Output,
+    *,
+    wait: bool,
+    yes: bool,
+    dry_run: bool,
+) -> Exit:
+    """One device by an angle from where it stands. Raises RequestError for several, or where that is not possible."""
+    if len(texts) != 1 or "acceleration" in bounds:
+        raise RequestError(
+            "by an angle one device goes at a time, with the acceleration that it is set to",
+            expected="BUS#ID+=ANGLE alone, without --acceleration",
+            advice="nothing was sent",
+        )
+    devices, _, angle = texts[0].rpartition("=")
+    bus, family, (node,) = device(devices[:-1])
+    offers(family, "move_by")
+    way = units.parse(angle, "position") * (-1 if devices.endswith("-") else 1)
+    question = f"move #{node} by {units.show(way, 'position')}" if abs(way) > FAR and not yes else ""
+    how: dict[str, Any] = {**bounds, "wait": wait}
+    with opened(bus, options, output) as opening:
+        told = acted(
+            opening, node, "move_by", way, question=question, dry_run=dry_run, output=output, **how
+        )
+    if not dry_run:
+        facts = {"bus": bus, "id": node, "by": way, "result": plain(told)}
+        output.document("motorbus.move-by/1", facts)
+        output.text(f"{bus}#{node}: {told}")
+    return Exit.OK
 
 
 def _nowhere(text: str) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import quantity, registers
+from motorbus.cli import faces, quantity, registers
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.target import able, check_names, device, face, opened, table_of
@@ -55,7 +55,7 @@ def read(
         if names:
             _registers(one, names, output)
         else:
-            _telemetry(able(one, "telemetry")(), node, output)
+            _telemetry(one, output)
     return Exit.OK
 
 
@@ -67,6 +67,8 @@ def _registers(one: Any, names: tuple[str, ...], output: Output) -> None:
     registers.show(f"#{one.node}", rows, output)
 
 
+Told = dict[str, object]
+"""What a device without telemetry tells of itself, each by its name."""
 UNITS: Final = {
     "position": "rad",
     "velocity": "rad/s",
@@ -82,7 +84,21 @@ def state_facts(state: State) -> dict[str, object]:
     return {**asdict(state), "alarm": list(state.alarm), "quality": state.quality.value}
 
 
-def _telemetry(state: State, node: int, output: Output) -> None:
+def sampled(one: Any) -> State | Told:
+    """The telemetry of a device, or what else its family offers to watch. Raises RequestError where there is neither."""
+    sample = faces.offer(one.bus.family.name, "sample")
+    state: State | Told = sample(one) if sample is not None else able(one, "telemetry")()
+    return state
+
+
+def _telemetry(one: Any, output: Output) -> None:
+    state, node = sampled(one), one.node
+    if isinstance(state, dict):
+        output.document("motorbus.telemetry/1", {"id": node, **state})
+        words = {True: "yes", False: "no"}
+        rows = [(name.replace("_", " "), words[value] if isinstance(value, bool) else value) for name, value in state.items()]
+        output.table(f"#{node}", ["", "value"], rows)
+        return
     output.document("motorbus.telemetry/1", {"id": node, **state_facts(state)})
     told = {name: getattr(state, name) for name in UNITS if getattr(state, name) is not None}
     rows = [(name, quantity.shown(value, UNITS[name])) for name, value in told.items()]

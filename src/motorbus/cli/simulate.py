@@ -144,17 +144,16 @@ def simulate(
         nodes = sorted(simulator.nodes)
         facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
         output.document("motorbus.simulate/1", facts)
-        names = " and ".join(buses)
-        output.text(f"ready: {names}  (simulated: {len(nodes)} {family} devices, ids {ids})")
-        if quiet:
-            mount.serve(stop)
-        else:
-            _serve(mount, stop, output)
+        output.text(f"ready: {' and '.join(buses)}  (simulated: {len(nodes)} {family} devices, ids {ids})")
+        _serve(mount, stop, None if quiet else output)
     return Exit.OK
 
 
-def _serve(mount: Mount, stop: int, output: Output) -> None:
-    """Serve until told to stop, and say what the devices remark."""
+def _serve(mount: Mount, stop: int, output: Output | None) -> None:
+    """Serve until told to stop, and say what the devices remark, if there is anything to say it on."""
+    if output is None:
+        mount.serve(stop)
+        return
     remarks = Remarks(mount.simulator)
     while not mount.step(stop):
         for line in remarks.lines(time.monotonic()):

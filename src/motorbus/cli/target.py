@@ -179,6 +179,8 @@ def everyone(name: str, bus: Bus, nodes: tuple[int, ...], output: Output) -> tup
         def listen(event: object) -> None:
             if isinstance(event, Progress):
                 bar.advance(event.done, event.total)
+            elif bus.report is not None:
+                bus.report(event)  # some families tell what they send to find anybody
 
         found = bus.run(bus.family.scan(), report=listen)
     if not found:

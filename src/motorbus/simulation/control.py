@@ -182,7 +182,7 @@ def _log(simulator: Simulator, words: list[str]) -> str:
         _able(simulator, words[0], "log", "no log")
     nodes = {int(words[0], 0): _node(simulator, words[0])} if words else simulator.nodes
     said = [
-        {"id": id, **remark._asdict()}
+        {"id": id, **remark._asdict(), "at": round(remark.at, 6)}
         for id in sorted(nodes)
         for remark in getattr(nodes[id], "log", [])[-LATEST:]
     ]

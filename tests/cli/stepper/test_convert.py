@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,3 +52,24 @@ def test_another_form_ends_with_2(run: Run) -> None:
 def test_the_schema_is_printed_as_it_is(run: Run) -> None:
     assert json.loads(run("stepper", "schema").out) == schema()
     assert run("stepper", "schema", "--json").document["schema_of_files"] == schema()
+
+
+def test_what_a_form_cannot_hold_is_told(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "known.bin"
+    program = Program.from_dump(DUMP_B[:18] + b"\x12\x34" + DUMP_B[20:])
+    path.write_bytes(replace(program, project=program.project.with_step(9, delay=5)).dump())
+    unnamed = "cannot hold what no field names: 12 at byte 18 of the dump, 34 at byte 19 of the dump"
+    behind = "frames write no steps behind the last one: step 9"
+    for to, told in (("toml", [unnamed]), ("frames", [unnamed, behind]), ("dump", []), ("image", [])):
+        ran = run("stepper", "convert", str(path), "--to", to)
+        assert ran.code == 0
+        assert [line.startswith("note: ") for line in ran.err.splitlines()] == [True] * len(told)
+        assert all(one in ran.err for one in told)
+
+
+def test_a_cleared_project_is_no_file(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "cleared.bin"
+    path.write_bytes(bytes.fromhex("FFAA3E030000") + bytes(220))
+    ran = run("stepper", "convert", str(path))
+    assert (ran.code, ran.out) == (2, "")
+    assert "project 3 has been cleared: there is nothing for a file to say" in ran.err

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
-from tests.families.stepper.program.projects import file
+from tests.families.stepper.program.projects import MOTOR, file
 
 
 def test_every_step_is_a_row(run: Run) -> None:
@@ -32,6 +32,30 @@ def test_the_plan_is_the_document(run: Run) -> None:
     document = run("stepper", "show", EXAMPLE, "--json").document
     assert document["schema"] == "motorbus.stepper.plan/1"
     assert (document["name"], len(document["steps"]), document["picture"]) == ("Pick and place", 10, None)
+    assert document["file"] == EXAMPLE
+
+
+def test_several_are_shown_one_after_the_other(run: Run, tmp_path: Path) -> None:
+    other = tmp_path / "other.toml"
+    other.write_text(file(top='name = "Other"'), encoding="utf-8")
+    out = run("stepper", "show", EXAMPLE, str(other)).out
+    assert out == run("stepper", "show", EXAMPLE).out + run("stepper", "show", str(other)).out
+    records = run("stepper", "show", EXAMPLE, str(other), "--json").records
+    assert [(one["schema"], one["name"]) for one in records] == [
+        ("motorbus.stepper.plan/1", "Pick and place"),
+        ("motorbus.stepper.plan/1", "Other"),
+    ]
+    ran = run("stepper", "show", EXAMPLE, str(other), "--output", str(tmp_path / "two.png"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "one picture of 2 programs" in ran.err
+
+
+def test_pulses_that_are_carried_are_a_range(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "thirds.toml"
+    motor = MOTOR.replace("turn_distance = 5000", "turn_distance = 3")
+    path.write_text(file(top="repeat = 9", motor=motor).replace("10 mm", "1 units"), encoding="utf-8")
+    assert "533 to 534" in run("stepper", "show", "--rounding", "carry", str(path)).out
+    assert "533 to" not in run("stepper", "show", str(path)).out
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +16,7 @@ from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
 
 START = bytes.fromhex("FFAA4E01000000000000F8")
+SAVE_AS_4 = bytes.fromhex("FFAA2E04000000000000DB")
 STARTED, DONE = bytes.fromhex("FFAA4E010000"), b"\xee\xdd"
 
 
@@ -58,6 +62,23 @@ def test_its_buttons_are_pressed_by_the_control_socket(tmp_path: Path) -> None:
             answer = lines.readline().strip()
         assert json.loads(answer)["nodes"][0]["inputs"] == [4]
         assert motorbus.stepper.Controller(bus).read_input(4) is True
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_what_no_host_is_told_is_said_on_stderr_with_its_moment(quiet: bool) -> None:
+    words = [sys.executable, "-m", "motorbus.cli", "simulate", "stepper", "--tcp", "0", "--json"]
+    words += ["--quiet"] if quiet else []
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
+        assert served.stdout is not None
+        bus = json.loads(served.stdout.readline())["bus"]
+        with socket.create_connection(("127.0.0.1", int(bus.rpartition(":")[2])), timeout=30) as client:
+            client.sendall(SAVE_AS_4)
+            assert received(client, 6) == bytes.fromhex("FFAA2E040000")
+        served.terminate()
+        _, said = served.communicate(timeout=30)
+    assert served.returncode == 0
+    assert bool(re.fullmatch(r" *\d+\.\d{3} s  #1: project 1 is saved as project 4\n", said)) is not quiet
+    assert (said == "") is quiet
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,12 @@ def test_every_byte_of_a_dump_has_a_name() -> None:
 
 @pytest.mark.parametrize(
     ("offset", "value", "says"),
-    [(36, 9, "step 1, output: 9"), (6, 3, "its image says project 3"), (18, 7, "")],
+    [
+        (36, 9, "step 1, output: 9 is not possible (0 to 8)"),
+        (6, 3, "number: the reply says project 2 and its image 3 (2 twice)"),
+        (9, 9, "loop_first, loop_last: 2 to 9 of 3 steps (1 <= first <= last <= 3, or 0 0)"),
+        (18, 7, ""),
+    ],
 )
 def test_a_dump_that_cannot_be_right_says_where(offset: int, value: int, says: str) -> None:
     one = only(DUMP_B[:offset] + bytes((value,)) + DUMP_B[offset + 1 :])

@@ -1,21 +1,14 @@
-"""What only the stepper controller can do; so far without a controller: programs checked, timed, drawn and converted.
+"""What only the stepper controller can do: programs checked, timed and drawn, the commands of its manual, whole jobs.
 
-What of a running one can be asked or stopped has common commands: scan, ping, info, read, stop, estop.
-
-The only face that knows this family. `app` has the commands, each file some of them.
+The only face that knows this family. `app` has the commands, each file some of them; the rest is what common commands
+use, see `motorbus.cli.faces`.
 """
 
 from __future__ import annotations
 
-from motorbus.cli.stepper import convert, programs, show
+from motorbus.cli.stepper import convert, manual, programs, show
+from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import app
-from motorbus.families.stepper import Sends
+from motorbus.cli.stepper.offers import COMMANDS, sample
 
-__all__ = ["app", "convert", "programs", "say", "show"]
-
-
-def say(event: object) -> str:
-    """What an event says to people: nothing is sent to find a controller without telling which frame it is."""
-    if not (isinstance(event, Sends) and isinstance(event.request, bytes)):
-        return ""
-    return f"to find out who is there, this is sent and nothing else: {event.request.hex(' ').upper()} (read project 1)"
+__all__ = ["COMMANDS", "app", "convert", "manual", "programs", "sample", "say", "show"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -19,7 +20,8 @@ KINDS: Final = ("toml", "dump", "image", "frames")
 @app.command(
     help_epilogue="""toml is the file that people write; dump the 226 bytes that a controller
 answers, image the 220 behind their head, both in hexadecimal, or as they are
-in a file; frames the requests that write and save it, one on each line.
+in a file; frames the requests that write and save it, one on each line. What
+a form cannot hold is told on stderr.
 
 Examples:
 
@@ -46,7 +48,10 @@ def convert(
     """
     if to not in KINDS:
         raise RequestError(f"there is no form {to!r}", expected=f"one of {', '.join(KINDS)}")
-    text, data = _made(loaded(file, dump_order), to, checked_order(dump_order))
+    program = loaded(file, dump_order)
+    text, data = _made(program, to, checked_order(dump_order))
+    for lost in _lost(program, to):
+        output.note(f"note: {lost}")
     if output_ is not None:
         with usable(output_, "written"):
             output_.write_bytes(data)
@@ -54,6 +59,17 @@ def convert(
     output.document("motorbus.stepper.convert/1", {**facts, **({} if output_ else {to: text})})
     output.text(f"written: {output_}" if output_ else text)
     return Exit.OK
+
+
+def _lost(program: Program, to: str) -> Iterator[str]:
+    """What the program has and this form of it has not."""
+    if to in ("dump", "image"):
+        return
+    found = {finding.rule: finding.text for finding in program.lint()}
+    if "L18" in found:
+        yield f"{to} cannot hold what no field names: {found['L18']}"
+    if to == "frames" and "L20" in found:
+        yield f"frames write no steps behind the last one: {found['L20']}"
 
 
 def _made(program: Program, to: str, order: Order) -> tuple[str, bytes]:

@@ -7,7 +7,9 @@ from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
+from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
+from motorbus.cli.output import Output
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
@@ -56,6 +58,28 @@ def loaded(path: Path, order: str = "little") -> Program:
     except RequestError as error:
         error.summary = f"{path}: {error.summary}"
         raise
+
+
+def each(files: tuple[Path, ...], order: str, output: Output) -> tuple[list[tuple[Path, Program]], Exit]:
+    """Every program that can be read; of each other one it is told at once why not, and the exit code is to be 2.
+
+    Raises RequestError when there is none at all.
+    """
+    if not files:
+        raise RequestError("no file is given", expected="one or more programs")
+    checked_order(order)
+    found: list[tuple[Path, Program]] = []
+    errors: list[RequestError] = []
+    for file in files:
+        try:
+            found.append((file, loaded(file, order)))
+        except RequestError as error:
+            errors.append(error)
+    for told in errors if found else errors[:-1]:
+        output.error(told)
+    if not found:
+        raise errors[-1]
+    return found, Exit.USAGE if errors else Exit.OK
 
 
 def reading(said: dict[str, str]) -> Behaviour:

@@ -7,30 +7,29 @@ from pathlib import Path
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Flag, Silent
-from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, loaded, reading
+from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, each, loaded, reading
 from motorbus.errors import RequestError
-from motorbus.families.stepper import Conditions, Program
-
-
-def _all(files: tuple[Path, ...], order: str) -> list[tuple[Path, Program]]:
-    if not files:
-        raise RequestError("no file is given", expected="one or more programs")
-    return [(file, loaded(file, order)) for file in files]
+from motorbus.families.stepper import Conditions, Plan
+from motorbus.families.stepper.table import Project
 
 
 @app.command(
-    help_epilogue="""Ends with exit code 1 if any finding is an error, and with --strict if
-there is any finding at all.
+    help_epilogue="""Ends with exit code 1 if any finding is an error, with --strict if there is
+any finding at all, and with 2 if a file is no program; the others are judged
+all the same.
 
 Examples:
 
     motorbus stepper check examples/pick_and_place.toml
-    motorbus stepper check --unattended --highest 20000 *.toml""",
+    motorbus stepper check --unattended --highest 20000 *.toml
+    motorbus stepper check --before backup/project1.bin jog.toml""",
 )
 def check(
     *files: File,
     highest: float = 100_000.0,
     longest: float = 3600.0,
+    longest_total: float = 28_800.0,
+    before: Path | None = None,
     homing: Flag = False,
     unattended: Flag = False,
     strict: Flag = False,
@@ -46,6 +45,11 @@ def check(
         Hz that the driver follows.
     longest
         s that a pause may have.
+    longest_total
+        s that all pauses of a run may have together; of one pass, when it is endless.
+    before
+        What project 1 holds now (a program or a dump): jog, single move and homing run with its step 1, and a program
+        for project 1 is told what it changes for them.
     homing
         Input 5 is used for homing.
     unattended
@@ -54,10 +58,20 @@ def check(
         Any finding is a failure.
     """
     how = reading(readings)
-    conditions = Conditions(highest=highest, longest=longest, homing=homing, unattended=unattended, how=how)
-    found = [
-        (file, finding) for file, program in _all(files, dump_order) for finding in program.lint(conditions)
-    ]
+    for name, limit in (("highest", highest), ("longest", longest), ("longest-total", longest_total)):
+        if not limit > 0:  # what is no number is neither
+            raise RequestError(f"--{name} {limit:g} is not possible", expected="a number above 0")
+    conditions = Conditions(
+        highest=highest,
+        longest=longest,
+        longest_total=longest_total,
+        homing=homing,
+        unattended=unattended,
+        before=_before(before, dump_order),
+        how=how,
+    )
+    programs, worst = each(files, dump_order, output)
+    found = [(file, finding) for file, program in programs for finding in program.lint(conditions)]
     facts = [
         {
             "file": str(file),
@@ -69,14 +83,28 @@ def check(
         }
         for file, one in found
     ]
-    output.document("motorbus.stepper.check/1", {"files": [str(file) for file in files], "findings": facts})
+    judged = [str(file) for file, _ in programs]
+    output.document("motorbus.stepper.check/1", {"files": judged, "findings": facts})
     if found:
         rows = [(file, one.step or "", one.rule, one.level, one.text, one.reason) for file, one in found]
         output.table("", ("file", ">step", "rule", "level", "what", "why"), rows)
     else:
         output.text("no findings")
     failed = any(one.level == "error" for _, one in found) or (strict and bool(found))
-    return Exit.FAILURE if failed else Exit.OK
+    return max(worst, Exit.FAILURE if failed else Exit.OK)
+
+
+def _before(path: Path | None, order: str) -> Project | None:
+    """What project 1 holds. Raises RequestError for another project."""
+    if path is None:
+        return None
+    project = loaded(path, order).project
+    if project.number not in (0, 1):
+        raise RequestError(
+            f"{path}: --before holds project {project.number}",
+            expected="project 1, whose step 1 jog, single move and homing run with",
+        )
+    return project
 
 
 @app.command(
@@ -92,14 +120,15 @@ Examples:
 def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say how long a program takes."""
     how = reading(readings)
-    found = [(file, program, program.estimate(how)) for file, program in _all(files, dump_order)]
+    programs, worst = each(files, dump_order, output)
+    found = [(file, program, program.estimate(how)) for file, program in programs]
     facts = [
         {"file": str(file), "name": program.name, **one.data(), "text": str(one)}
         for file, program, one in found
     ]
     output.document("motorbus.stepper.estimate/1", {"estimates": facts})
     _lines(output, [(file, str(one)) for file, _, one in found])
-    return Exit.OK
+    return worst
 
 
 @app.command(
@@ -111,11 +140,18 @@ def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **r
 def order(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say in which order the steps of a program come, and how often."""
     how = reading(readings)
-    plans = [(file, program.plan(how)) for file, program in _all(files, dump_order)]
+    programs, worst = each(files, dump_order, output)
+    plans = [(file, program.plan(how)) for file, program in programs]
     facts = [{"file": str(file), "order": list(one.order), "passes": one.passes} for file, one in plans]
     output.document("motorbus.stepper.order/1", {"programs": facts})
-    _lines(output, [(file, f"{' '.join(map(str, one.order))}  {_passes(one.passes)}") for file, one in plans])
-    return Exit.OK
+    _lines(output, [(file, _ordered(one)) for file, one in plans])
+    return worst
+
+
+def _ordered(plan: Plan) -> str:
+    if not plan.order:
+        return "no steps: the project has been cleared"
+    return f"{' '.join(map(str, plan.order))}  {_passes(plan.passes)}"
 
 
 def _passes(count: int | None) -> str:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import Silent
-from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, loaded, reading
+from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, each, reading
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from motorbus.cli.output import Output
     from motorbus.families.stepper import Behaviour, Plan, Program
     from motorbus.families.stepper.program import StepPlan
 
@@ -26,17 +27,17 @@ _COLUMNS = (
 @app.command(
     help_epilogue="""The picture shows position, speed, outputs and inputs over time, with an
 operator who takes --wait seconds at each input; the suffix of its name says
-of which kind it is (.png, .svg, .pdf). It needs matplotlib.
+of which kind it is (.png, .svg, .pdf). It needs matplotlib, and one program.
+With --json each program is a line of its own.
 
 Examples:
 
     motorbus stepper show examples/pick_and_place.toml
     motorbus stepper show examples/pick_and_place.toml --output feed.svg
-    motorbus stepper show backup/project1.bin --json""",
+    motorbus stepper show backup/project1.bin backup/project2.bin --json""",
 )
 def show(
-    file: File,
-    *,
+    *files: File,
     output_: Path | None = None,
     wait: float = 1.0,
     passes: int = 1,
@@ -44,7 +45,7 @@ def show(
     output: Silent,
     **readings: Readings,
 ) -> Exit:
-    """Show what a program does, step by step, and draw it.
+    """Show what programs do, step by step, and draw one.
 
     Parameters
     ----------
@@ -57,21 +58,31 @@ def show(
     """
     if not 0 <= wait <= 1e6 or passes < 1:
         raise RequestError("--wait and --passes: that is not possible", expected="0 s or more, 1 or more")
+    if output_ is not None and len(files) > 1:
+        raise RequestError(f"one picture of {len(files)} programs", expected="--output with one program")
     how = reading(readings)
-    program = loaded(file, dump_order)
+    programs, worst = each(files, dump_order, output)
+    for file, program in programs:
+        if output_ is not None:
+            _draw(program, how, output_, wait, passes)
+        _show(file, program, how, output_, output)
+    return worst
+
+
+def _show(file: Path, program: Program, how: Behaviour, picture: Path | None, output: Output) -> None:
     plan = program.plan(how)
-    if output_ is not None:
-        _draw(program, how, output_, wait, passes)
-    facts = {name: value for name, value in plan.data().items() if name != "schema"}
-    output.document("motorbus.stepper.plan/1", {**facts, "picture": str(output_) if output_ else None})
+    facts = {"file": str(file), **{name: value for name, value in plan.data().items() if name != "schema"}}
+    output.document("motorbus.stepper.plan/1", {**facts, "picture": str(picture) if picture else None})
+    if not plan.order:
+        output.text(f"{file}: no steps: the project has been cleared")
+        return
     output.table(program.name or str(file), _COLUMNS, _rows(plan, program))
     net = (
         f"a pass ends {plan.net_units:+d} units from where it began"
         if plan.net_units
         else "a pass ends where it began"
     )
-    output.text(f"{plan.estimate}\n{net}" + (f"\ndrawn: {output_}" if output_ else ""))
-    return Exit.OK
+    output.text(f"{plan.estimate}\n{net}" + (f"\ndrawn: {picture}" if picture else ""))
 
 
 def _rows(plan: Plan, program: Program) -> Iterator[tuple[object, ...]]:

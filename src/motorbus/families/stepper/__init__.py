@@ -16,6 +16,7 @@ before a motor turns, and `simulator` makes it a device.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from functools import cached_property
 from typing import Any, Final
 
@@ -103,6 +104,10 @@ class Stepper:
             raise RequestError(f"a stepper bus has no setting {name!r}", expected="motor or dump_order")
         motor, order = settings.get("motor", self._motor), settings.get("dump_order", self._order)
         return Stepper(driver.checked_motor(motor), checked_order(order), driver.Memory())
+
+    def __copy__(self) -> Stepper:
+        """The same with a memory of its own, as it is now: what is only rehearsed was not said."""
+        return Stepper(self._motor, self._order, deepcopy(self._memory))
 
     def _node(self, node: int = wire.ONLY) -> driver.Node:
         return driver.Node(node, self._motor, self._order, self._memory)

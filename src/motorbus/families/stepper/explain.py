@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 from motorbus.core.entry import Entry
 from motorbus.core.family import Explanation, Part
 from motorbus.families.stepper import table, wire
+from motorbus.families.stepper.program.dumps import faults
 
 _HEADERS: Final = (wire.HEADER, wire.NOTICE)
 _COUNTS: Final = {
@@ -225,15 +226,9 @@ def _dump(data: bytes, order: table.Order) -> Explanation:
             fields += _row(image, table.STEP, number, order)
         else:
             fields.append(Field(wire.ROW_LENGTH, f"step {number}", "all 0"))
-    faults = (
-        [error.summary for error in table.refusals(project, expert=True)]
-        if project != table.Project()
-        else []
-    )
-    if not faults and project.number not in (0, data[3]):
-        faults.append(f"its image says project {project.number}")
+    wrong = [f"{what} ({may})" for what, may in faults(project, data[3])]
     count = f"{project.total_steps} step{'' if project.total_steps == 1 else 's'}"
-    return _made(data, f"dump of project {data[3]}, {count}", fields, "; ".join(faults))
+    return _made(data, f"dump of project {data[3]}, {count}", fields, "; ".join(wrong))
 
 
 def _row(image: bytes, rows: tuple[Entry, ...], number: int, order: table.Order) -> Iterator[Field]:

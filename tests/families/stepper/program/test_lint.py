@@ -125,6 +125,11 @@ def test_bytes_that_nobody_knows() -> None:
     assert rules(made(), image=bytes(220)) == []
 
 
+def test_a_motor_that_is_told_otherwise() -> None:
+    found = only("L23", made(), motor="48 full steps are stored as 1.8 deg")
+    assert (found.step, found.level, found.text) == (0, "note", "48 full steps are stored as 1.8 deg")
+
+
 def test_other_readings_change_what_is_found() -> None:
     left_on = made(replace(GOOD, output=1), BACK)
     assert rules(left_on) == ["L15"]
@@ -167,7 +172,7 @@ def test_without_a_geometry_nothing_is_said_of_its_frequencies() -> None:
 
 
 def test_every_rule_says_how_grave_and_why() -> None:
-    assert list(RULES) == [f"L{number}" for number in range(1, 23)]
+    assert list(RULES) == [f"L{number}" for number in range(1, 24)]
     assert {rule.level for rule in RULES.values()} == {"error", "warning", "note"}
     assert all(rule.title and rule.reason for rule in RULES.values())
     found = Finding("L10", 3, "for ever")

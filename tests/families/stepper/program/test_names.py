@@ -12,7 +12,7 @@ OUT = {"gripper": 1, "lamp": 3}
 
 @pytest.mark.parametrize(
     ("said", "number"),
-    [("none", 0), ("button", 2), ("input 5", 5), (5, 5), (0, 0), ("input 9", 9), (" button ", 2)],
+    [("none", 0), ("button", 2), ("input 5", 5), (5, 5), (0, 0), (" button ", 2)],
 )
 def test_an_input(said: object, number: int) -> None:
     assert names.input_of(said, "step 1, wait_for", {"button": 2}) == number
@@ -23,6 +23,25 @@ def test_no_input(said: object) -> None:
     with pytest.raises(RequestError, match="step 1, wait_for: there is no input") as caught:
         names.input_of(said, "step 1, wait_for", {"button": 2})
     assert "button" in caught.value.expected
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [(3, "3 is not"), ("input 4", "'input 4' is not"), ("door", "'door' is input 3, and that is not")],
+)
+def test_inputs_3_and_4_are_for_experts(said: object, says: str) -> None:
+    with pytest.raises(RequestError, match=f"step 1, stop_on: {says} possible") as caught:
+        names.input_of(said, "step 1, stop_on", {"door": 3})
+    assert caught.value.expected == "none, or an input: 1, 2, 5"
+    assert "expert = true" in caught.value.cause
+    assert names.input_of(said, "step 1, stop_on", {"door": 3}, expert=True) in (3, 4)
+
+
+@pytest.mark.parametrize("said", [6, -1, "input 9"])
+def test_there_is_no_sixth_input(said: object) -> None:
+    with pytest.raises(RequestError, match="is not possible") as caught:
+        names.input_of(said, "step 1, wait_for", {}, expert=True)
+    assert (caught.value.expected, caught.value.cause) == ("none, or an input: 1, 2, 3, 4, 5", "")
 
 
 @pytest.mark.parametrize("action", range(9))

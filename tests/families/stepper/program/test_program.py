@@ -13,7 +13,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Program
 from motorbus.families.stepper.table import Project
-from tests.families.stepper.program.projects import file, projects
+from tests.families.stepper.program.projects import MOTOR, file, projects
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
 
 EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "pick_and_place.toml"
@@ -100,6 +100,17 @@ def test_a_file_that_cannot_be_is_refused(make: object, says: str, tmp_path: Pat
         Program.load(str(path))
 
 
+def test_a_motor_that_is_stored_otherwise_is_found() -> None:
+    motor = MOTOR.replace('step_angle = "1.8 deg"', "full_steps = 48").replace(
+        "microsteps = 8", "microsteps = 25"
+    )
+    found = [
+        str(one) for one in Program.parse(file(motor=motor, top="project = 2")).lint() if one.rule == "L23"
+    ]
+    assert len(found) == 1
+    assert "48 full steps of 25 microsteps are stored as 1.8 deg and 6 microsteps" in found[0]
+
+
 def test_an_expert_stays_one() -> None:
     program = Program.parse(file("wait_for = 4", top="expert = true"))
     assert program.expert
@@ -109,5 +120,5 @@ def test_an_expert_stays_one() -> None:
 def test_a_program_without_a_project_is_refused_where_it_matters() -> None:
     with pytest.raises(RequestError, match="no project 0"):
         Program(project=Project()).dump()
-    with pytest.raises(RequestError, match="project: 0"):
+    with pytest.raises(RequestError, match="project 0 has been cleared"):
         Program(project=Project()).text()

@@ -60,6 +60,13 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
     project = text.parse(file(motor=motor)).project
     assert (project.step_angle, project.microsteps) == (180, 6)
     assert project.pulses_per_turn == 1200
+    told = text.parse(file(motor=motor)).motor
+    assert (
+        told
+        == "48 full steps of 25 microsteps are stored as 1.8 deg and 6 microsteps: 1200 pulses a turn either way"
+    )
+    plain = MOTOR.replace('step_angle = "1.8 deg"', "full_steps = 200")
+    assert text.parse(file(motor=plain)).motor == text.parse(file()).motor == ""
 
 
 @pytest.mark.parametrize(
@@ -68,6 +75,7 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         ("format = 1\n[motor", "the file is no TOML", "TOML"),
         ("x" * ((1 << 20) + 1), "1048577 characters", "at most"),
         ("a = " + "[" * 5000, "the file is no TOML", "TOML"),
+        ("a = " + "9" * 5000, "the file is no TOML: a number has thousands of digits\n", "TOML"),
         ("", "format: is missing", "format = 1"),
         ("format = 2", "format: 2 is not known", "format = 1"),
         ("format = true", "format: True is not known", "format = 1"),
@@ -78,6 +86,15 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         (file(top="project = 5"), "project: 5", "1 to 4"),
         (file(top="project = 0"), "project: 0", "1 to 4"),
         (file(top="project = 1.0"), "project: 1.0 is no whole number", "whole number"),
+        (file(top="project = " + "9" * 4000), "^project: 9{40}… is not possible\n", "1 to 4"),
+        (file(top="x" * 4000 + " = 1"), "there is no field 'x{39}…\n", "format"),
+        (file("[loop]\nfirst = 11\nlast = 12\ncount = 2"), r"\[loop\], first: 11", "0 to 10"),
+        (file(motor=MOTOR.replace("microsteps = 8", "microsteps = 0")), "microsteps: 0", "1 to 65535"),
+        (
+            file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "0.0000001 mm"')),
+            "unit: '0.0000001 mm'",
+            "raw 1 to",
+        ),
         (file(top="repeat = 255"), "repeat: 255", "endless"),
         (file(top="repeat = -1"), "repeat: -1", "0 to 254"),
         (file(top='repeat = "often"'), "repeat: 'often'", "endless"),
@@ -85,14 +102,14 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         (file(top='expert = "yes"'), "expert: 'yes' is neither", "true or false"),
         (file(top="total_steps = 2"), "total_steps: 2, but the file has 1", "1 to 1"),
         (file(top="total_steps = 0"), "total_steps: 0", "1 to 10"),
-        (file('delay = "4 h 40 min"'), "step 1, delay: 16800000", "4 h 39 min 37.215 s"),
-        (file(motor=MOTOR.replace("1.8 deg", "2.56 deg")), "step_angle: 256", "2.55°"),
+        (file('delay = "4 h 40 min"'), "step 1, delay: '4 h 40 min'", "4 h 39 min 37.215 s"),
+        (file(motor=MOTOR.replace("1.8 deg", "2.56 deg")), "step_angle: '2.56 deg'", "0.01 deg to 2.55 deg"),
         (
             file(
                 motor=MOTOR.replace("1.8 deg", "2.56 deg").replace("turn_distance = 5000", 'unit = "pulse"')
             ),
-            "step_angle: 256",
-            "2.55°",
+            "step_angle: '2.56 deg'",
+            "0.01 deg to 2.55 deg",
         ),
         (file(motor=MOTOR.replace("= 8", "= 65536")), "microsteps: 65536", "1 to 65535"),
         (file(motor=MOTOR.replace("microsteps = 8", "")), "microsteps: they are missing", "1 to 65535"),
@@ -103,7 +120,11 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         (file(motor=MOTOR + "stop = 'hard'"), "stop: 'hard'", "slow or immediate"),
         (file(motor=MOTOR + "mode4 = 3"), "mode4: 3", "0 to 2"),
         (file(motor=MOTOR + "home_at_power_on = 1"), "home_at_power_on: 1 is neither", "true or false"),
-        (file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "0.3 mm"')), "only whole ones", "16 or 17"),
+        (
+            file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "0.3 mm"')),
+            "only whole ones",
+            "16 units per turn or 17",
+        ),
         (
             file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "5 units"')),
             "no unit of distance here",
@@ -113,22 +134,26 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         (file('move = "1 mm"'), "the file is no TOML", "TOML"),  # twice
         (
             file().replace('move = "10 mm"', 'move = "16777216 units"'),
-            "step 1, distance: 16777216",
-            "0 to 16777215",
+            "step 1, move: '16777216 units'",
+            "0 to 16777215 units, either way",
         ),
         (file().replace('speed = "60 rpm"', ""), "step 1, speed: it is missing", "60 rpm"),
-        (file().replace('speed = "60 rpm"', 'speed = "65536 rpm"'), "step 1, speed: 65536", "0 to 65535 RPM"),
-        (file().replace("200 Hz", "70 kHz"), "step 1, start_frequency: 70000", "0 to 65535 Hz"),
-        (file("wait_for = 3"), "step 1, start_input: 3", "1, 2, 5"),
-        (file('stop_on = "input 4"'), "step 1, stop_input: 4", "1, 2, 5"),
-        (file("wait_for = 6", top="expert = true"), "step 1, start_input: 6", "1, 2, 3, 4, 5"),
+        (
+            file().replace('speed = "60 rpm"', 'speed = "65536 rpm"'),
+            "step 1, speed: '65536 rpm'",
+            "0 to 65535 rpm",
+        ),
+        (file().replace("200 Hz", "70 kHz"), "step 1, start: '70 kHz'", "0 Hz to 65535 Hz"),
+        (file("wait_for = 3"), "step 1, wait_for: 3", "1, 2, 5"),
+        (file('stop_on = "input 4"'), "step 1, stop_on: 'input 4'", "1, 2, 5"),
+        (file("wait_for = 6", top="expert = true"), "step 1, wait_for: 6", "1, 2, 3, 4, 5"),
         (
             file("[loop]\nfirst = 1\nlast = 2\ncount = 2"),
             "1 to 2 is no range of the 1 steps",
             "first <= last",
         ),
         (file("[loop]\nfirst = 1\nlast = 1"), "it needs first, last and count", "count"),
-        (file("[loop]\nfirst = 1\nlast = 1\ncount = 255"), "loop_count: 255", "0 to 254"),
+        (file("[loop]\nfirst = 1\nlast = 1\ncount = 255"), r"\[loop\], count: 255", "0 to 254"),
         (file(steps=0) + "step = 3", "there is no field 'step'|no list of steps", ""),
     ],
 )
@@ -162,8 +187,10 @@ def test_what_is_written_is_read_as_the_same(project: Project, lead: Fraction | 
 @pytest.mark.parametrize(
     ("project", "says"),
     [
-        (Project(), "project: 0"),
-        (Project(number=1), "total_steps: 0"),
+        (Project(), "project 0 has been cleared"),
+        (Project(number=1), "project 1 has been cleared"),
+        (Project(number=5, total_steps=1), "project: 5"),
+        (Project(number=1, microsteps=8), "total_steps: 0"),
         (
             Project(number=1, total_steps=1, microsteps=8, step_angle=180, turn_distance=1).with_step(
                 1, output=9

@@ -138,7 +138,7 @@ def test_each_so_many_th_request_comes_back_as_six_bytes() -> None:
     assert len(harm(echo="yes", fault_every=2).echoed(STOP, 1.0)) == 11  # a cable is as it is
 
 
-# --- errors by chance --------------------------------------------------------------------------------------------------
+# --- errors by chance -----------------------------------------------------------------------------------------------
 
 
 def test_bytes_are_hit_as_often_as_is_said_and_never_stay_the_same() -> None:
@@ -166,7 +166,7 @@ def test_the_same_seed_gives_the_same_errors_and_another_gives_others() -> None:
     assert errors(3) == errors(3) != errors(4)
 
 
-# --- changes while it runs ---------------------------------------------------------------------------------------------
+# --- changes while it runs ------------------------------------------------------------------------------------------
 
 
 def test_after_a_change_it_is_counted_afresh() -> None:

@@ -14,7 +14,7 @@ raises UnexpectedReply when the acknowledgement differs in any byte from the one
 
 from __future__ import annotations
 
-from motorbus.core.operation import Exchange, Goal, Rank
+from motorbus.core.operation import Exchange, Goal, Rank, Refusal
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
 
@@ -25,7 +25,7 @@ def nothing(reply: bytes) -> None:
 
 def motion(node: Node, name: str, goals: tuple[Goal, ...], **values: int) -> Exchange[None]:
     """A command that moves the motor, with what it orders: the gate lets nothing through that does not say."""
-    return command(node, name, nothing, rank=Rank.CONTROL, timeout=None, goals=goals, **values)
+    return command(node, name, nothing, rank=Rank.CONTROL, timeout=None, goals=goals, expert=False, **values)
 
 
 def select_project(node: Node, project: int, total_steps: int) -> Exchange[None]:

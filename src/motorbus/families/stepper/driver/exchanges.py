@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Rank, Timeout
+from motorbus.core.operation import Answer, Due, Exchange, Goal, Rank, Refusal, Timeout
 from motorbus.errors import UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -26,16 +26,18 @@ def command(
     rank: Rank = Rank.POLL,
     timeout: Timeout | None = None,
     goals: tuple[Goal, ...] = (),
+    refusal: Refusal | None = None,
+    expert: bool = False,
     **values: int,
 ) -> Exchange[T]:
     """A command by its name and its numbers; `read` makes a value of the whole reply, once that is the right one.
 
-    `goals` is what it orders, for what moves the motor.
+    `goals` is what it orders, for what moves the motor, `refusal` why it must not leave after all. `expert` lets a step use inputs 3 and 4.
 
     Raises RequestError, naming the field and its range, for a number that may not be sent. The exchange raises
     UnexpectedReply when the reply differs from what is due.
     """
-    check(name, values)
+    check(name, values, expert=expert)
     order = ORDERS[name]
     request = wire.encode(name, motor=node.motor, **values)
 
@@ -61,4 +63,5 @@ def command(
         goals=goals,
         timeout=order.timeout if timeout is None else timeout,
         repeatable=order.repeatable,
+        refusal=refusal,
     )

@@ -37,12 +37,21 @@ def dump(node: Node, project: int = 1) -> Operation[bytes]:
     Raises FramingError when the line is too bad for that, UnexpectedReply when what came twice is the image of another
     project. Reading changes nothing; with unsaved edits it shows those, or so it is assumed.
     """
+    return agreed(node, project, (yield from readings(node, project)))
+
+
+def readings(node: Node, project: int) -> Operation[list[bytes]]:
+    """As many dumps of a project as it takes until they agree, at most five: `agreed` says what holds of them."""
     seen: list[bytes] = []
-    agreed = b""
-    while not agreed and len(seen) < READINGS:
+    while len(seen) < READINGS and not vote(seen):
         seen.append((yield from dump_once(node, project)))
-        agreed = vote(seen)
-    if not agreed:
+    return seen
+
+
+def agreed(node: Node, project: int, seen: Sequence[bytes]) -> bytes:
+    """What of these dumps of a project holds. Raises as `dump`."""
+    found = vote(seen)
+    if not found:
         raise FramingError(
             f"project {project} came differently each of {READINGS} times it was read",
             expected="two readings that agree",
@@ -50,9 +59,9 @@ def dump(node: Node, project: int = 1) -> Operation[bytes]:
             advice="see to the cable and its ground; nothing was written",
             node=node.node,
         )
-    _plausible(node, agreed, project)
+    _plausible(node, found, project)
     node.memory.proven = True
-    return agreed
+    return found
 
 
 def vote(readings: Sequence[bytes]) -> bytes:

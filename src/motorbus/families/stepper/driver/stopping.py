@@ -13,13 +13,14 @@ from typing import Final
 
 from motorbus.core.family import Stop
 from motorbus.core.operation import Answer, Exchange, Operation, Rank, outcome
-from motorbus.errors import MotorbusError
+from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
 
 STOPS: Final = ("stop_project", "stop_motor")
-TRIES: Final = 3
-"""How often each is said until it is accepted."""
+TRIES: Final = 5
+"""How often each is said until it is accepted; of a device that is silent that takes about 2 s."""
+MAY_TURN: Final = "the motor may be turning"
 
 
 class Promise(Enum):
@@ -34,15 +35,19 @@ class Promise(Enum):
 def stop(node: Node) -> Operation[Promise]:
     """End the project, then any other motion. Returns what was promised.
 
-    Each is said up to three times, the second also when the first was not accepted. Raises OutcomeUnknown
-    when one of them never was, for it may have been heard all the same.
+    Each is said up to five times, the second also when the first was not accepted. Raises OutcomeUnknown when one of
+    them never was, for it may have been heard all the same, and the motor may be turning as well; LinkError when the
+    port is gone.
     """
-    failures = []
+    failures = {}
     for name in STOPS:
         told = yield from _insisted(node, name)
-        failures += [told] if isinstance(told, MotorbusError) else []
+        if told is not None:
+            failures[name] = told
     if failures:
-        raise failures[0]
+        raise _not_accepted(node, failures)
+    node.memory.stops += 1
+    node.memory.owed = False
     return Promise.STOP_ACCEPTED
 
 
@@ -50,13 +55,31 @@ def _insisted(node: Node, name: str) -> Operation[MotorbusError | None]:
     told: MotorbusError | None = None
     for _ in range(TRIES):
         told = yield from outcome(command(node, name, _nothing, rank=Rank.STOP))
-        if told is None:
+        if told is None or isinstance(told, LinkError):
             break
     return told
 
 
 def _nothing(reply: bytes) -> None:
     """An acknowledgement carries no value."""
+
+
+def _not_accepted(node: Node, failures: Mapping[str, MotorbusError]) -> MotorbusError:
+    """The error for a stop of which so much was not accepted; that of a port that is gone stays what it is."""
+    first = next(iter(failures.values()))
+    if isinstance(first, LinkError):
+        first.add_note(f"the stop was not accepted: {MAY_TURN}")
+        return first
+    said = " and ".join(name.replace("_", " ") for name in failures)
+    return OutcomeUnknown(
+        f"{said} was not accepted, said {TRIES} times: {MAY_TURN}",
+        sent=first.sent,
+        received=first.received,
+        expected=first.expected,
+        cause=first.cause,
+        advice="say stop again, or cut the power of the motor",
+        node=node.node,
+    )
 
 
 def stop_all(nodes: Mapping[int, Answer | None], motor: int) -> Stop:

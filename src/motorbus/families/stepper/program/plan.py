@@ -2,8 +2,9 @@
 
 A controller tells nothing while it works, so the plan is also the only progress there can be. Time has three parts:
 motion and pauses, which are known but for the open questions; what an operator takes at an input, which nobody knows
-and which is counted; and what a stop input may take away. So an estimate says "at least 41.6 s + 6 waits", and gives a
-band over the readings of the one constant that the manual leaves out: per what the frequency grows.
+and which is counted; and what a stop input may take away. So an estimate says "at least 41.6 s + 6 waits", which holds
+for the readings it is made with, and then a band over those of the one constant that the manual leaves out: per what
+the frequency grows.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class Estimate:
             " for each pass, without an end" if self.endless else ""
         )
         if duration(self.low) != duration(self.high):
-            text += f" ({duration(self.low)} to {duration(self.high)}, as the acceleration is meant)"
+            text += f"; {duration(self.low)} to {duration(self.high)} if the acceleration is meant otherwise"
         if self.cuts:
             times = "once" if self.cuts == 1 else f"{self.cuts} times"
             text += f"; less where a stop input ends a step early, {times} at most"

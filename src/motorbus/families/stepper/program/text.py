@@ -17,16 +17,14 @@ from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper.program import names, quantities
 from motorbus.families.stepper.program.quantities import Geometry, refuse
+from motorbus.families.stepper.program.words import range_of, within
 from motorbus.families.stepper.table import (
     BASE_NAMES,
     ENDLESS,
-    PARAMETERS,
     STEP_NAMES,
     STEPS,
     Project,
     Step,
-    allowed,
-    is_allowed,
     with_steps,
 )
 
@@ -42,21 +40,6 @@ MOTOR: Final = (
 LOOP: Final = ("first", "last", "count")
 STEP: Final = ("move", "speed", "start", "acceleration", "delay", "output", "wait_for", "stop_on")
 STOPS: Final = ("slow", "immediate")
-WORDS: Final[Mapping[str, str]] = {
-    "number": "project",
-    "project_loop": "repeat",
-    "loop_first": "[loop], first",
-    "loop_last": "[loop], last",
-    "loop_count": "[loop], count",
-    "stop_mode": "stop",
-    "power_on_home": "home_at_power_on",
-    "distance": "move",
-    "direction": "the sign of move",
-    "start_frequency": "start",
-    "start_input": "wait_for",
-    "stop_input": "stop_on",
-}
-"""What a file calls a parameter that the controller calls otherwise."""
 
 
 class Source(NamedTuple):
@@ -111,6 +94,11 @@ def write(source: Source) -> str:
     Raises RequestError for a project that no file may say, as one with an output action of 9.
     """
     project, expert = source.project, source.expert or _needs_expert(source.project)
+    if project == Project(number=project.number):
+        raise refuse(
+            f"project {project.number} has been cleared: there is nothing for a file to say",
+            "at least one step",
+        )
     steps = _filled(project)
     _refuse(project, expert)
     _refuse(replace(project, total_steps=steps), expert)
@@ -144,10 +132,11 @@ def _toml(text: str) -> dict[str, Any]:
         raise refuse(f"the file has {len(text)} characters", f"{LONGEST} at most")
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise refuse(
-            f"the file is no TOML: {error}", "TOML, as in the example of the documentation"
-        ) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        why = str(error)
+    except ValueError:  # Python reads no number of more than 4300 digits
+        why = "a number has thousands of digits"
+    raise refuse(f"the file is no TOML: {why}", "TOML, as in the example of the documentation")
 
 
 def _format(data: Mapping[str, Any]) -> None:
@@ -210,9 +199,9 @@ def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None, str]:
 def _geometry(table: Mapping[str, Any]) -> tuple[int, int, str]:
     """Step angle (hundredths of a degree), microsteps, and in words what is told where the file says it otherwise."""
     if "microsteps" not in table:
-        raise refuse("microsteps: they are missing in [motor]", _range("microsteps"))
+        raise refuse("microsteps: they are missing in [motor]", range_of("microsteps"))
     microsteps = _integer(table, "microsteps", "microsteps", 0)
-    _within("microsteps", microsteps)
+    within("microsteps", microsteps)
     if ("step_angle" in table) == ("full_steps" in table):
         raise refuse(
             "step_angle: [motor] needs step_angle or full_steps, one of them", 'step_angle = "1.8 deg"'
@@ -316,30 +305,13 @@ def _step(row: Mapping[str, Any], where: str, known: Reader) -> Step:
 
 
 def _refuse(project: Project, expert: bool, *, steps: bool = True) -> None:
-    _within("project", project.number)
+    within("project", project.number)
     for name in BASE_NAMES:
         if steps or name != "total_steps":
-            _within(name, getattr(project, name))
+            within(name, getattr(project, name))
     for number in range(1, min(project.total_steps, STEPS) + 1 if steps else 1):
         for name in STEP_NAMES:
-            _within(name, getattr(project.step(number), name), number, expert=expert)
-
-
-def _within(name: str, raw: int, step: int = 0, *, expert: bool = False) -> None:
-    """Raises RequestError, with the file's word for it, for a number that a parameter may not be."""
-    if not is_allowed(name, raw, expert=expert):
-        where = f"step {step}, " if step else ""
-        raise refuse(f"{where}{WORDS.get(name, name)}: {shown(raw)} is not possible", _range(name, expert))
-
-
-def _range(name: str, expert: bool = False) -> str:
-    """What a parameter may be, as a file says it."""
-    row = PARAMETERS[name]
-    if name == "delay":
-        return f"{quantities.clock(row.low)} to {quantities.clock(row.high)} (raw {row.low} to {row.high})"
-    if name == "step_angle":
-        return f"{row.low / 100:g} deg to {row.high / 100:g} deg (raw {row.low} to {row.high})"
-    return allowed(name, expert=expert)
+            within(name, getattr(project.step(number), name), number, expert=expert)
 
 
 def _check_loop(project: Project) -> None:

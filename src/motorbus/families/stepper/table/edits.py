@@ -47,13 +47,14 @@ def edits(project: Project, *, rows: int | None = None) -> list[Edit]:
     return found
 
 
-def edits_between(before: Project, after: Project) -> list[Edit]:
+def edits_between(before: Project, after: Project, *, rows: int | None = None) -> list[Edit]:
     """The commands that make one project of another, none when nothing differs; the first one selects it.
 
-    Only for who knows what the controller holds. Rows that are carried out by either of them are compared.
+    Only for who knows what the controller holds. So many `rows` are compared; when None, those that are carried out by
+    either of them.
     """
-    rows = min(max(before.total_steps, after.total_steps), STEPS)
-    pairs = zip(edits(before, rows=rows), edits(after, rows=rows), strict=True)
+    count = min(max(before.total_steps, after.total_steps), STEPS) if rows is None else rows
+    pairs = zip(edits(before, rows=count), edits(after, rows=count), strict=True)
     found = [new for old, new in pairs if old != new]
     if not found:
         return []

@@ -1,0 +1,91 @@
+"""`motorbus home`: let a device find its reference, bounded in time and never left running."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.acting import acted
+from motorbus.cli.exits import Exit
+from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.plain import plain
+from motorbus.cli.target import device, offers, opened
+from motorbus.core import units
+
+if TYPE_CHECKING:
+    from motorbus.cli.output import Output
+
+app = App(
+    name="home",
+    usage="Usage: motorbus home BUS#ID [OPTIONS]",
+    help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the switch
+is not met before the deadline it is stopped, and the command ends with exit
+code 8. Ctrl-C stops it too.
+
+A stepper controller homes in reverse, with the speed of step 1 of its project
+1, until its input 5 is active. Is it active beforehand, then it stands on the
+switch or the switch is stuck, and nothing moves.
+
+Examples:
+
+    motorbus home stepper:/dev/ttyUSB0#1
+    motorbus home stepper:/dev/ttyUSB0#1 --deadline 20s --velocity 30rpm --yes
+    motorbus home stepper:sim,home_switch=wired#1 --dry-run""",
+)
+
+
+@app.default
+def home(
+    device_: Annotated[str, Parameter(name="BUS#ID")],
+    /,
+    *,
+    deadline: str = "",
+    velocity: str = "",
+    yes: Flag = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
+    """Let a device find its reference.
+
+    Parameters
+    ----------
+    device_
+        FAMILY:PORT#ID, as stepper:/dev/ttyUSB0#1
+    deadline
+        How long it may take, as 20s; as the family says when left out.
+    velocity
+        How fast, in rad/s or as 30rpm; as the device is set when left out.
+    yes
+        Do not ask before.
+    options
+        Any option of the bus string, as a flag.
+    """
+    return homed(device_, deadline, velocity, options, output, yes=yes, dry_run=dry_run)
+
+
+def homed(
+    device_: str,
+    deadline: str,
+    velocity: str,
+    options: dict[str, str],
+    output: Output,
+    *,
+    yes: bool,
+    dry_run: bool,
+) -> Exit:
+    """The same for whoever has a command of another name for it. Raises RequestError, NotHomed and what stops it."""
+    bus, family, (node,) = device(device_)
+    offers(family, "home")
+    bounds = {
+        **({"deadline": units.parse(deadline, "time")} if deadline else {}),
+        **({"velocity": units.parse(velocity, "velocity")} if velocity else {}),
+    }
+    question = "" if yes else f"home #{node}: it moves until its switch is met, as far as that takes"
+    with opened(bus, options, output) as opening:
+        told = acted(opening, node, "home", question=question, dry_run=dry_run, output=output, **bounds)
+    if not dry_run:
+        output.document("motorbus.home/1", {"id": node, "result": plain(told)})
+        output.text(f"#{node}: {told}")
+    return Exit.OK

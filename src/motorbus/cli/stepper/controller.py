@@ -1,0 +1,107 @@
+"""What the commands of this family share: the one controller of a bus, and work on it carried out or only shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from cyclopts import Parameter
+
+from motorbus.cli import dry
+from motorbus.cli.consent import consent_to
+from motorbus.cli.exits import Unforeseeable
+from motorbus.cli.stepper.events import say
+from motorbus.cli.stepper.files import NAME
+from motorbus.cli.target import face, opened, target
+from motorbus.core.operation import Progress
+from motorbus.errors import RequestError
+from motorbus.families.stepper import Controller
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from motorbus.bus.pump import Bus
+    from motorbus.cli.output import Bar, Output
+    from motorbus.core.operation import Runnable
+
+T = TypeVar("T")
+
+BusName = Annotated[str, Parameter(name="BUS", help="stepper:PORT, as stepper:/dev/ttyUSB0")]
+BusOption = Annotated[str, Parameter(help="Any option of the bus string, as a flag: --dump-order big.")]
+ProjectNumber = Annotated[int, Parameter(help="Which project, 1 to 4.")]
+
+
+def ours(text: str) -> str:
+    """The bus that BUS or BUS#1 names. Raises RequestError when it is one of another family."""
+    found = target(text)
+    if found.family.name != NAME:
+        raise RequestError(f"{found.bus} is no {NAME} bus", advice="nothing was sent")
+    return found.bus
+
+
+def verb(name: str, *args: Any, **values: Any) -> Callable[[Controller], Runnable[Any]]:
+    """A verb of the controller with what it gets, to be carried out on one."""
+    function = getattr(Controller, name).function
+    return lambda one: function(one, *args, **values)
+
+
+def carried_out(
+    text: str,
+    options: Mapping[str, str],
+    output: Output,
+    do: Callable[[Controller], Runnable[T]],
+    *,
+    what: str = "",
+    consent: str | Callable[[Bus], str] = "",
+    dry_run: bool = False,
+    rehearse: Callable[[Controller], Runnable[object]] | None = None,
+    hear: Callable[[object, Bar], None] | None = None,
+) -> T | None:
+    """Open the bus and carry out what `do` says to its controller; what came of it, None after a dry run.
+
+    `consent` is what somebody must agree to before, "" for nothing; a function finds that out on the open bus. Before
+    anybody is asked a rehearsal has found nothing against it. `rehearse` stands for `do` there where `do` waits for
+    what no rehearsal brings. `hear` gets the events that `say` has no words for, and the bar named `what`.
+    """
+    bus = ours(text)
+    with opened(bus, options, output) as opening:
+        if dry_run:
+            _shown(opening, rehearse or do, output)
+            return None
+        question = consent if isinstance(consent, str) else consent(opening)
+        consent_to(question, output, yes=not question, rehearse=lambda: _rehearsed(opening, rehearse or do))
+        with output.progress(what or "working") as bar:
+            return opening.run(
+                do(face(opening, 1)), report=lambda event: _heard(event, bar, output, opening.report, hear)
+            )
+
+
+def _rehearsed(bus: Bus, do: Callable[[Controller], Runnable[object]]) -> dry.DryBus:
+    rehearsal = dry.DryBus(bus)
+    rehearsal.run(do(face(rehearsal, 1)))
+    return rehearsal
+
+
+def _shown(bus: Bus, do: Callable[[Controller], Runnable[object]], output: Output) -> None:
+    """What would be sent, as far as that can be foreseen."""
+    rehearsal = dry.DryBus(bus)
+    try:
+        rehearsal.run(do(face(rehearsal, 1)))
+    except Unforeseeable as error:
+        output.note(f"note: {error.summary}; what is shown is as far as it can be foreseen")
+    dry.show(rehearsal, output)
+
+
+def _heard(
+    event: object,
+    bar: Bar,
+    output: Output,
+    report: Callable[[object], None] | None,
+    hear: Callable[[object, Bar], None] | None,
+) -> None:
+    if isinstance(event, Progress):
+        bar.advance(event.done, event.total, event.what)
+    elif say(event):
+        if report is not None:
+            report(event)
+    elif hear is not None:
+        hear(event, bar)

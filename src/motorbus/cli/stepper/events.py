@@ -1,0 +1,16 @@
+"""What the events of this family say to people."""
+
+from __future__ import annotations
+
+from motorbus.families.stepper import Sends
+
+
+def say(event: object) -> str:
+    """What an event says in words, "" for one that says nothing.
+
+    Nothing is sent to find a controller without telling which frame it is.
+    """
+    if isinstance(event, Sends) and isinstance(event.request, bytes):
+        sent = event.request.hex(" ").upper()
+        return f"to find out who is there, this is sent and nothing else: {sent} (read project 1)"
+    return ""

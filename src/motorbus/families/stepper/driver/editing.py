@@ -1,0 +1,216 @@
+"""How what is being edited is brought to be as it is meant, and how one knows: by reading all of it back.
+
+An acknowledgement repeats no value, and selecting a project does more than it says: it sets the number of steps, and
+may load what is stored, or leave another project's numbers in place under a new name. So only what differs is sent,
+then the whole project is read and compared, and where it is not as meant every field is sent. Nothing is saved here:
+until somebody does, a power cycle brings back what is stored.
+
+That edits go to a copy which is kept by saving alone is an assumption. So is that reading shows this copy; whether it
+does is found out here each time, for a project that reads as it did before it was edited shows what is stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
+
+from motorbus.core.entry import Entry, Value
+from motorbus.core.operation import Exchange, Operation, Progress, Rank, Report, Runnable
+from motorbus.errors import RequestError, VerificationFailed
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.exchanges import T, command
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.reading import agreed, dump_once, readings
+from motorbus.families.stepper.table import (
+    EMPTY,
+    STEPS,
+    TABLE,
+    Edit,
+    Order,
+    Project,
+    decode_image,
+    differences,
+    edits,
+    edits_between,
+    step_row,
+)
+
+View: TypeAlias = Literal["untold", "working", "stored"]
+"""What a read-back shows: the copy that is edited, what is stored, or nothing was written that could tell."""
+_MOST: Final = 6
+"""Differences that a message lists."""
+
+
+class Change(NamedTuple):
+    """One parameter that differs: its row, and both raw values. str() of it is "step_3_delay: 0.5 s -> 1 s"."""
+
+    row: Entry
+    step: int
+    raw_before: int
+    raw_after: int
+
+    @property
+    def name(self) -> str:
+        """As `read` and `write` call it."""
+        return self.row.name
+
+    @property
+    def before(self) -> Value:
+        """In the unit of the API."""
+        return self.row.to_value(self.raw_before)
+
+    @property
+    def after(self) -> Value:
+        """In the unit of the API."""
+        return self.row.to_value(self.raw_after)
+
+    def __str__(self) -> str:
+        return f"{self.name}: {_words(self.row, self.raw_before)} -> {_words(self.row, self.raw_after)}"
+
+
+class Readback(NamedTuple):
+    """What came of editing: the 220 bytes that were read at last, what these are, and what was spent on it."""
+
+    image: bytes
+    view: View
+    commands: int
+    dumps: int
+
+
+def changes(before: Project, after: Project) -> Iterator[Change]:
+    """Every parameter in which two projects differ, but for their number; rows that are not carried out count too."""
+    for name, step, old, new in differences(before, replace(after, number=before.number)):
+        yield Change(step_row(step, name) if step else TABLE[name], step, old, new)
+
+
+def brought(node: Node, before_image: bytes, after: Project, *, every: bool = False) -> Operation[Readback]:
+    """Bring what is being edited to `after` in every named field, all ten rows, and read it back. Nothing is saved.
+
+    `before_image` are the 220 bytes that were read before, and `after.number` says of which project. Only what differs
+    is sent, behind the command that selects the project; nothing at all is sent, and nothing read, when nothing
+    differs, unless `every` field is wanted. A right read-back is one reading. If it is not right, every field is sent
+    and it is read again: then it is as meant, view "working", or it is as it was before, and the controller shows what
+    is stored, view "stored": what is edited cannot be seen then, but each field of it was acknowledged.
+
+    Edits of another project that were not saved are lost. Call it inside `Alone`, for another caller's selection in
+    between would lead these edits elsewhere. Reports `Progress`. Raises RequestError for a number that may not be
+    sent, before anything is; VerificationFailed when the read-back is neither; OutcomeUnknown when a command was not
+    acknowledged. An error from the middle has a note that says what may be half written.
+    """
+    before = decode_image(before_image, node.order)
+    fresh = edits(after, rows=_filled(after))
+    some = _orders(node, fresh if before.is_cleared else edits_between(before, after, rows=STEPS))
+    if not some and not every:
+        return Readback(before_image, "untold", 0, 0)
+    whole = _orders(node, edits(after, rows=STEPS), strict=False)
+    spent = 0
+    dumps = 0
+    for orders in (whole if every else some, whole):
+        yield from _told(node, after.number, orders)
+        spent += len(orders)
+        image, count = yield from _noted(read_back(node, after), _unsaved(after.number))
+        dumps += count
+        if decode_image(image, node.order) == after:
+            return Readback(image, "working" if some else "untold", spent, dumps)
+    if _is_alike(decode_image(image, node.order), before):
+        return Readback(image, "stored", spent, dumps)
+    raise differs(
+        node, image, after, f"project {after.number} is being edited and does not read as it was written",
+        f"nothing was saved; {_unsaved(after.number)}",
+    )  # fmt: skip
+
+
+def read_back(node: Node, meant: Project) -> Operation[tuple[bytes, int]]:
+    """The 220 bytes of a project as they are now, and how many dumps that took.
+
+    One reading is enough when it is as `meant` in every named field, for no line changes bytes into that; any other is
+    believed when two agree. Raises as `dump`.
+    """
+    image = (yield from dump_once(node, meant.number))[wire.REPLY_LENGTH :]
+    if decode_image(image, node.order) == meant:
+        return image, 1
+    seen = yield from readings(node, meant.number)
+    return agreed(node, meant.number, seen)[wire.REPLY_LENGTH :], 1 + len(seen)
+
+
+def differs(node: Node, image: bytes, meant: Project, what: str, advice: str) -> VerificationFailed:
+    """The error for a project that does not read as it is meant; it says what the controller shows now."""
+    shown = decode_image(image, node.order)
+    found = [str(one) for one in changes(meant, shown)]
+    more = f" and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    other: Order = "big" if node.order == "little" else "little"
+    swapped = decode_image(image, other) == meant
+    return VerificationFailed(
+        what,
+        received=image,
+        expected=f"(meant -> read) {'; '.join(found[:_MOST]) or 'its number'}{more}",
+        cause=f"its dumps have the {'highest' if other == 'big' else 'lowest'} byte of a number first"
+        if swapped
+        else "it lost its supply, something else edited it, or it does not take one of these values",
+        advice=f"open the bus with dump_order={other}" if swapped else advice,
+        node=node.node,
+    )
+
+
+def _orders(node: Node, wanted: Sequence[Edit], *, strict: bool = True) -> list[Exchange[None]]:
+    """The commands; unless `strict`, without those that no controller takes, which then hold what they held before."""
+    found = []
+    for edit in wanted:
+        try:
+            found.append(_order(node, edit))
+        except RequestError:
+            if strict:
+                raise
+    return found
+
+
+def _filled(project: Project) -> int:
+    """How many rows it takes to say it: those it carries out, and those behind that hold something."""
+    rows = (number for number in range(1, STEPS + 1) if project.step(number) != EMPTY)
+    return max(min(project.total_steps, STEPS), *rows, 0)
+
+
+def _order(node: Node, edit: Edit) -> Exchange[None]:
+    def acknowledged(reply: bytes) -> None:
+        if edit.command == "select_project":
+            node.memory.selected = edit.values["project"]
+
+    values: dict[str, Any] = dict(edit.values)
+    return command(node, edit.command, acknowledged, rank=Rank.CONFIGURATION, expert=True, **values)
+
+
+def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> Operation[None]:
+    node.memory.selected = None
+    for number, order in enumerate(orders):
+        yield from Report(Progress(number, len(orders), f"writing project {project}"))
+        yield from _noted(order, f"{number} of {len(orders)} commands were acknowledged; {_unsaved(project)}")
+    yield from Report(Progress(len(orders), len(orders), f"writing project {project}"))
+
+
+def _unsaved(project: int) -> str:
+    return (
+        f"what is edited of project {project} may be half written; it was not saved, so a power cycle brings back "
+        "what is stored"
+    )
+
+
+def _noted(runnable: Runnable[T], note: str) -> Operation[T]:
+    """Carry it out; an error or an interruption of it gets this note."""
+    try:
+        return (yield from runnable)
+    except BaseException as error:
+        error.add_note(note)
+        raise
+
+
+def _is_alike(shown: Project, before: Project) -> bool:
+    """Whether it is the old one; stop mode and its like may belong to the device and be another's already."""
+    flags = {name: getattr(before, name) for name in ("stop_mode", "mode4", "power_on_home")}
+    return replace(shown, number=before.number, **flags) == before
+
+
+def _words(row: Entry, raw: int) -> str:
+    if raw in row.choices:
+        return row.choices[raw]
+    return f"{row.to_value(raw):.6g} {row.unit}" if row.unit else str(raw)
