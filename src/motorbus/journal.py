@@ -1,9 +1,10 @@
 """What must survive a crash: how far a guarded change of a device has come, on disk before its next step.
 
-A servo whose id is half changed answers to a name that nobody remembers. So whoever changes one says first what it is
-about to do, then each step, then how it ended; each record is on disk before the next frame leaves. One file per port,
-beside its lock and held by it, so never two writers. It holds one change: beginning the next one replaces it, and
-nothing begins while another is unfinished.
+A servo whose id is half changed answers to a name that nobody remembers, and a controller whose project is borrowed
+does something else than its owner wrote. So whoever changes one says first what it is about to do, then each step, then
+how it ended; each record is on disk before the next frame leaves. One file per port, beside its lock and held by it, so
+never two writers. It holds one change: beginning the next one replaces it, and nothing begins while another is
+unfinished.
 """
 
 from __future__ import annotations
@@ -33,6 +34,12 @@ class Change(NamedTuple):
     verb: str
     facts: dict[str, Any]
     begun: str
+
+    @property
+    def what(self) -> str:
+        """What is unfinished, in words; "" when its facts do not say, and its verb has to."""
+        said = self.facts.get("what")
+        return said if isinstance(said, str) else ""
 
     @property
     def node(self) -> int:
@@ -76,7 +83,7 @@ class BusJournal:
             raise RequestError(
                 f"{event.change}() has reached {event.state!r} and nothing is known of its beginning",
                 cause="its journal has been closed in the meantime, by `motorbus recover` or another task",
-                advice="look where the device is before it is changed again",
+                advice="look how the device is before it is changed again",
             )
         record = {"change": event.change, "state": event.state, "at": _now(), "facts": event.facts}
         if open_change is None:
@@ -198,8 +205,8 @@ def _bus(head: dict[str, Any] | None, path: Path | None) -> str:
             f"{path}: a journal with {said}, which this version of motorbus does not know",
             expected=f"format {FORMAT}",
             cause="a later version wrote it, or something else did",
-            advice="finish what it holds with the version that wrote it, or, if every device of this bus has its id and"
-            " rate, `motorbus recover BUS --forget` or remove the file",
+            advice="finish what it holds with the version that wrote it, or, if every device of this bus is as it"
+            " should be, `motorbus recover BUS --forget` or remove the file",
         )
     return str(head.get("bus"))
 
@@ -253,12 +260,13 @@ def _belongs(event: Journal, change: Change) -> bool:
 
 _ADVICE: Final = "`motorbus recover {}` finishes it or takes it back"
 _FORGET: Final = (
-    "when every device of that bus has its id and rate, `motorbus recover {} --forget` gives it up"
+    "when every device of that bus is as it should be, `motorbus recover {} --forget` gives it up"
 )
 
 
 def _described(change: Change) -> str:
-    return f"{change.verb}() of #{change.facts.get('node')}, begun {change.begun},"
+    what = change.what or f"{change.verb}() of #{change.facts.get('node')}"
+    return f"{what}, begun {change.begun},"
 
 
 def _unfinished(change: Change) -> RequestError:

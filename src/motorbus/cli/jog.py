@@ -69,9 +69,7 @@ def jog(
     way = abs(velocity * span)
     question = f"turn #{node} by {units.show(way, 'position')}" if way > FAR and not yes else ""
     with opened(bus, options, output) as opening:
-        told = acted(
-            opening, node, "jog", velocity, span, question=question, dry_run=dry_run, output=output
-        )
+        told = acted(opening, node, "jog", velocity, span, question=question, dry_run=dry_run, output=output)
     if dry_run:
         return Exit.OK
     facts = {"id": node, "velocity": velocity, "seconds": span, "result": plain(told)}

@@ -27,11 +27,11 @@ app = App(
     usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
     help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again. What no device tells has
-no column; of a stepper controller there are its inputs to watch, and each is
-asked for by itself. What is asked takes its time on the line: the rate that was
-reached is told at the end where it is less than --rate. --listen asks nobody: it prints what others say, such as position
-reports, and works where listen_only=yes lets nothing out; --count is of frames
-then.
+no column; of a stepper controller there are its inputs to watch, each asked for
+by itself. Where the line allows less than --rate, the rate that was reached is
+told at the end. --listen asks nobody: it prints what others say, such as
+position reports, and works where listen_only=yes lets nothing out; --count is
+of frames then.
 
 Examples:
 
@@ -134,7 +134,9 @@ def _watch(
 def _say_rate(samples: int, seconds: float, wanted: float, output: Output) -> None:
     """Where the line or the devices were slower than was asked for; the first sample comes at once."""
     if samples > 1 and (reached := samples / seconds) < wanted * _SLOW:
-        output.note(f"note: {reached:.3g} samples per second, which is all that the line and the devices allow")
+        output.note(
+            f"note: {reached:.3g} samples per second, which is all that the line and the devices allow"
+        )
 
 
 def _sample(one: Any) -> State | Told | MotorbusError:
@@ -210,7 +212,12 @@ def _grid(sample: Sample, output: Output, told: set[str]) -> Any:
     states = [one for one in answers if not isinstance(one, dict)]
     told |= {name for name in COLUMNS if any(getattr(state, name) is not None for state in states)}
     names = [name for name in COLUMNS if name in told or not (told or others)]
-    columns = [">id", *(COLUMNS[name] for name in names), *(name.replace("_", " ") for name in others), "alarm"]
+    columns = [
+        ">id",
+        *(COLUMNS[name] for name in names),
+        *(name.replace("_", " ") for name in others),
+        "alarm",
+    ]
     return output.grid(columns, [_row(node, state, names, others) for (_, node), state in sample.items()])
 
 

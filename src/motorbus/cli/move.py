@@ -167,9 +167,7 @@ def _moved_by(
     question = f"move #{node} by {units.show(way, 'position')}" if abs(way) > FAR and not yes else ""
     how: dict[str, Any] = {**bounds, "wait": wait}
     with opened(bus, options, output) as opening:
-        told = acted(
-            opening, node, "move_by", way, question=question, dry_run=dry_run, output=output, **how
-        )
+        told = acted(opening, node, "move_by", way, question=question, dry_run=dry_run, output=output, **how)
     if not dry_run:
         facts = {"bus": bus, "id": node, "by": way, "result": plain(told)}
         output.document("motorbus.move-by/1", facts)

@@ -85,7 +85,7 @@ def state_facts(state: State) -> dict[str, object]:
 
 
 def sampled(one: Any) -> State | Told:
-    """The telemetry of a device, or what else its family offers to watch. Raises RequestError where there is neither."""
+    """The telemetry of a device, or what else its family offers to watch. Raises RequestError for neither."""
     sample = faces.offer(one.bus.family.name, "sample")
     state: State | Told = sample(one) if sample is not None else able(one, "telemetry")()
     return state
@@ -96,7 +96,10 @@ def _telemetry(one: Any, output: Output) -> None:
     if isinstance(state, dict):
         output.document("motorbus.telemetry/1", {"id": node, **state})
         words = {True: "yes", False: "no"}
-        rows = [(name.replace("_", " "), words[value] if isinstance(value, bool) else value) for name, value in state.items()]
+        rows = [
+            (name.replace("_", " "), words[value] if isinstance(value, bool) else value)
+            for name, value in state.items()
+        ]
         output.table(f"#{node}", ["", "value"], rows)
         return
     output.document("motorbus.telemetry/1", {"id": node, **state_facts(state)})

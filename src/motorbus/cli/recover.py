@@ -1,4 +1,4 @@
-"""`motorbus recover`: end a change of id or rate that was cut off; without a bus, say where there is one."""
+"""`motorbus recover`: end a guarded change that was cut off; without a bus, say where there is one."""
 
 from __future__ import annotations
 
@@ -28,10 +28,12 @@ if TYPE_CHECKING:
 app = App(
     name="recover",
     usage="Usage: motorbus recover [BUS] [OPTIONS]",
-    help_epilogue="""`set-id` and `set-baud` write down what they are about to do. When the program
-is killed or the power goes in the middle, this finds the device, finishes the
-change or takes it back, locks the device, and says which. It may be said again
-at any time. A device that answers under no id any more hears broadcasts at the
+    help_epilogue="""`set-id` and `set-baud` write down what they are about to do, and so do `jog`,
+`move` and `home` on stepper buses, which borrow project 1. When the program is
+killed or the power goes in the middle, this finds the device, finishes the
+change or takes it back, and says which: a servo is locked again, a stepper
+controller is told to stop and has its project 1 back. It may be said again at
+any time. A device that answers under no id any more hears broadcasts at the
 most: --alone allows them, when it is the only one on its bus. --forget gives
 the change up without touching the device, as when it is gone. --of is for a
 port that has another name since, as after the adapter was plugged in again.
@@ -41,6 +43,7 @@ Examples:
     motorbus recover
     motorbus recover feetech:/dev/ttyACM0 --yes
     motorbus recover feetech:/dev/ttyACM0 --alone --yes
+    motorbus recover stepper:/dev/ttyUSB0 --yes
     motorbus recover feetech:/dev/ttyACM1 --of feetech:/dev/ttyACM0 --yes
     motorbus recover feetech:/dev/ttyACM0 --forget --yes""",
 )
@@ -61,7 +64,7 @@ def recover(
     output: Silent,
     **options: str,
 ) -> Exit:
-    """Finish or take back a change of id or rate that was cut off.
+    """Finish or take back a change that was cut off.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ def recover(
     of
         The name that this bus had when the change was cut off; its journal is the one that is ended.
     yes
-        Do not ask before memory of the device is written, or the change is forgotten.
+        Do not ask before the device is stopped or written, or the change is forgotten.
     options
         Any option of the bus string, as a flag.
     """
@@ -202,14 +205,17 @@ def _listed(output: Output, *, more: bool) -> Exit:
 
 def _facts(change: Change) -> dict[str, object]:
     known: dict[str, object] = {
-        name: change.facts[name] for name in ("new", "rate", "new_rate") if name in change.facts
+        name: change.facts[name] for name in ("what", "new", "rate", "new_rate") if name in change.facts
     }
     node = change.facts.get("node")
     return {"bus": change.bus, "change": change.verb, "id": node, **known, "begun": change.begun}
 
 
 def _called(change: Change) -> str:
+    """What it is, in the words of its family where it has left any; else it is a change of id or rate."""
     facts = change.facts
+    if change.what:
+        return change.what
     to = f"{facts.get('new_rate')} bit/s" if "baud" in change.verb else f"#{facts.get('new')}"
     node = change.facts.get("node")
     return "a change of which nothing is known" if node is None else f"the change of #{node} to {to}"

@@ -179,7 +179,7 @@ def test_a_motor_that_is_stored_otherwise_is_told(run: Run, tmp_path: Path) -> N
     assert "are stored as 1.8 deg and 6 microsteps" in run("stepper", "check", str(path)).out
 
 
-@pytest.mark.parametrize("command", ["order", "show"])
+@pytest.mark.parametrize("command", ["order", "show", "estimate"])
 def test_a_cleared_project_is_called_that(run: Run, tmp_path: Path, command: str) -> None:
     path = tmp_path / "cleared.bin"
     path.write_bytes(bytes.fromhex("FFAA3E030000") + bytes(220))

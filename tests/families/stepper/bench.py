@@ -21,11 +21,13 @@ T = TypeVar("T")
 class Bench:
     """A simulated bus, the real bus on it, what was reported, and what was sent."""
 
-    def __init__(self, *, line: Line | None = None, motor: int = 3, **options: Any) -> None:
+    def __init__(
+        self, *, line: Line | None = None, motor: int = 3, pace: bool = False, **options: Any
+    ) -> None:
         self.simulator = simulate((1,), **options)
-        self.link = MemoryLink(self.simulator, rate=9600, line=line)
+        self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
         self.events: list[object] = []
-        family = FAMILY.configured(motor=motor)
+        family = FAMILY.configured(motor=motor, dump_order=options.get("dump_order", "little"))
         self.bus = Bus(self.link, family, admit=Gate(), report=self.events.append)
         self.device = Controller(self.bus)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)

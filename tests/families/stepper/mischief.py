@@ -43,16 +43,20 @@ EVERYTHING = (*REQUESTS, *REPLIES, *NOTICES)
 class Mischief(PerfectLine):
     """Strikes with this probability, by one of these kinds; `fired` counts them, `last` is when one struck last.
 
-    `cut` takes the supply away for a moment, with the reply that is about to be said.
+    A reply that is `late` is so by at most `late_by` (s); a copy of one comes `copy_after` it (s), or as soon as the
+    wire can carry it. `cut` takes the supply away for a moment, with the reply that is about to be said.
     """
 
-    def __init__(self, seed: int, share: float, *kinds: str, late_by: float = 1.5) -> None:
+    def __init__(
+        self, seed: int, share: float, *kinds: str, late_by: float = 1.5, copy_after: float | None = None
+    ) -> None:
         self.random = Random(seed)
         self.share = share
         self.requests = [kind for kind in REQUESTS if kind in kinds]
         self.replies = [kind for kind in REPLIES if kind in kinds]
         self.notices = [kind for kind in NOTICES if kind in kinds]
         self.late_by = late_by
+        self.copy_after = copy_after
         self.fired: Counter[str] = Counter()
         self.last = float("-inf")
         self.heard: list[bytes] = []
@@ -104,7 +108,7 @@ class Mischief(PerfectLine):
         if kind in ("late", "notice late"):
             return [(self.random.uniform(0.005, self.late_by), data)]
         if kind in ("twice", "notice twice"):
-            return [(0.0, data), (len(data) * BYTE, data)]
+            return [(0.0, data), (len(data) * BYTE if self.copy_after is None else self.copy_after, data)]
         if kind == "split":
             return [(0.0, data[:spot]), (self.random.uniform(0.001, 0.1), data[spot:])]
         return [(0.0, self._spoilt(kind, data, spot))]

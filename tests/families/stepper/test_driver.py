@@ -243,7 +243,6 @@ def test_what_it_cannot_do_yet_is_absent() -> None:
     absent = {
         "write",
         "write_project",
-        "run",
         "jog",
         "home",
         "move",

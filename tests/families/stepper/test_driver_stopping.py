@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.errors import OutcomeUnknown
+from motorbus.errors import LinkError, OutcomeUnknown
 from motorbus.families.stepper import FAMILY, Promise
 from motorbus.families.stepper.execution import Phase
 from tests.families.stepper.bench import Bench, Tampering, bench
@@ -63,7 +63,7 @@ def test_no_more_is_promised_than_that_it_was_accepted() -> None:
     assert "nothing tells when it rests" in FAMILY.stop({}).promise
 
 
-@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("times", [1, 2, 4])
 def test_what_was_not_accepted_is_said_again(times: int) -> None:
     with bench(line=Losing("FF AA 5E", times)) as there:
         turning(there)
@@ -74,10 +74,36 @@ def test_what_was_not_accepted_is_said_again(times: int) -> None:
 def test_the_second_is_said_though_the_first_never_was_accepted() -> None:
     with bench(line=Losing("FF AA 5E")) as there:
         turning(there)
-        with pytest.raises(OutcomeUnknown):
+        with pytest.raises(OutcomeUnknown, match="stop project was not accepted, said 5 times: the motor may be"):
             there.device.stop()
-        assert there.sent() == [PROJECT] * 3 + [MOTOR]
+        assert there.sent() == [PROJECT] * 5 + [MOTOR]
         assert at_rest(there)
+        assert there.device.memory.stops == 0
+
+
+def test_neither_was_accepted_and_both_are_named() -> None:
+    with bench(line=Losing("FF AA")) as there:
+        there.press(JOG)
+        with pytest.raises(OutcomeUnknown, match="stop project and stop motor was not accepted"):
+            there.device.stop()
+        assert there.sent() == [PROJECT] * 5 + [MOTOR] * 5
+
+
+def test_what_was_accepted_is_counted_and_nothing_is_owed_any_more() -> None:
+    with bench() as there:
+        turning(there, START)
+        there.device.memory.owed = True
+        there.device.stop()
+        assert (there.device.memory.stops, there.device.memory.owed) == (1, False)
+
+
+def test_a_port_that_is_gone_is_what_is_told() -> None:
+    with bench() as there:
+        turning(there)
+        there.link.close()
+        with pytest.raises(LinkError) as caught:
+            there.device.stop()
+        assert caught.value.__notes__ == ["the stop was not accepted: the motor may be turning"]
 
 
 @pytest.mark.parametrize("request_", [JOG, START])

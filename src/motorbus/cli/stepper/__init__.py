@@ -6,9 +6,35 @@ use, see `motorbus.cli.faces`.
 
 from __future__ import annotations
 
-from motorbus.cli.stepper import convert, manual, programs, show
+from motorbus.cli.stepper import (
+    convert,
+    copies,
+    inputs,
+    manual,
+    moves,
+    programs,
+    projects,
+    runs,
+    show,
+    writing,
+)
 from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.offers import COMMANDS, sample
 
-__all__ = ["COMMANDS", "app", "convert", "manual", "programs", "sample", "say", "show"]
+__all__ = [
+    "COMMANDS",
+    "app",
+    "convert",
+    "copies",
+    "inputs",
+    "manual",
+    "moves",
+    "programs",
+    "projects",
+    "runs",
+    "sample",
+    "say",
+    "show",
+    "writing",
+]

@@ -15,6 +15,7 @@ from motorbus.cli.target import face, opened, target
 from motorbus.core.operation import Progress
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Controller
+from motorbus.families.stepper.driver import Node
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -58,11 +59,13 @@ def carried_out(
 ) -> T | None:
     """Open the bus and carry out what `do` says to its controller; what came of it, None after a dry run.
 
-    `consent` is what somebody must agree to before, "" for nothing; a function finds that out on the open bus. Before
-    anybody is asked a rehearsal has found nothing against it. `rehearse` stands for `do` there where `do` waits for
-    what no rehearsal brings. `hear` gets the events that `say` has no words for, and the bar named `what`.
+    What is refused before the first step is refused before the port is opened. `consent` is what somebody must agree to
+    before, "" for nothing; a function finds that out on the open bus. Before anybody is asked a rehearsal has found
+    nothing against it. `rehearse` stands for `do` there where `do` waits for what no rehearsal brings. `hear` gets the
+    events that `say` has no words for, and the bar named `what`.
     """
     bus = ours(text)
+    _refused_early(do)
     with opened(bus, options, output) as opening:
         if dry_run:
             _shown(opening, rehearse or do, output)
@@ -73,6 +76,13 @@ def carried_out(
             return opening.run(
                 do(face(opening, 1)), report=lambda event: _heard(event, bar, output, opening.report, hear)
             )
+
+
+def _refused_early(do: Callable[[Controller], Runnable[object]]) -> None:
+    """Begin it on a controller of no bus, as far as its first step, which is not carried out."""
+    begun = iter(do(Node()))  # type: ignore[arg-type]
+    next(begun, None)
+    begun.close()
 
 
 def _rehearsed(bus: Bus, do: Callable[[Controller], Runnable[object]]) -> dry.DryBus:

@@ -17,6 +17,7 @@ from motorbus.families.stepper.table import checked_order
 
 NAME: Final = "stepper"
 LONGEST: Final = 1 << 20
+CLEARED: Final = "no steps: the project has been cleared"
 
 app = App(name=NAME, help="What only stepper controllers can do.", help_epilogue="")
 

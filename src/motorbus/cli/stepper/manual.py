@@ -1,6 +1,6 @@
 """The commands of the manual that are one frame and no more: those that set parameters, and the two that stop.
 
-They differ in their numbers only, so each is made of its row in the tables: its flags, what may be said there, its help.
+They differ in their numbers only, so each is made of its row in the tables: its flags, what they take, and its help.
 What takes more than a frame to be safe, as whatever moves the motor, has a function of its own in the other files.
 """
 
@@ -14,7 +14,7 @@ from cyclopts import Parameter as Said
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, ours, verb
+from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.numbers import expected, number
 from motorbus.families.stepper.driver import Node, commands
@@ -45,19 +45,20 @@ EXAMPLES: Final[Mapping[str, str]] = {
 """Of each command that sets parameters: what its help shows."""
 _EDITS: Final = tuple(name for name in EDITS if name != "select_project")
 _STOPS: Final = ("stop_project", "stop_motor")
-_SELECTED: Final = """It goes to the project that is selected, which nobody can ask; --project selects
+_SELECTED: Final = """Plain numbers are those of the manual; some may have a unit: 500ms, 100rpm.
+
+It goes to the project that is selected, which nobody can ask; --project selects
 it first, keeping its number of steps, and that loads what is stored of it, or
 so it is assumed: what was set before and not saved is lost then. So select a
 project once (`select-project`), set what there is to set, read it
-(`read-project`) and save it (`save-project`). `write` does all that, verified.
-"""
-_EXPLAINED: Final = """One frame, item {item} of the manual. {note}Numbers are those of
-the manual, or have a unit (500ms, 100rpm, 1.8deg).
+(`read-project`), save it (`save-project`). `write` does all that, verified."""
+_BOTH: Final = "`motorbus stop` says both stops, each until it is accepted."
+_EXPLAINED: Final = """{note}{more}
 
-{more}
 Examples:
 
 {examples}"""
+_WIDTH: Final = 70
 
 
 def words(name: str) -> str:
@@ -77,9 +78,7 @@ def _edit(
     **texts: str,
 ) -> Exit:
     values = {field.removesuffix("_"): number(field.removesuffix("_"), text) for field, text in texts.items()}
-    getattr(commands, name)(Node(), **values)  # raises when it may not be sent
-    if project is not None:
-        check("read_project", {"project": project})
+    check(name, values)
     order = ORDERS[name]
     guarded = any(PARAMETERS[field].protected for field in values)
     carried_out(
@@ -154,34 +153,36 @@ def _registered(name: str, do: Callable[..., Exit]) -> None:
     usual = {one.name: one.default for one in parameters if one.default is not Parameter.empty}
 
     def command(bus: str, /, output: Output, **said: Any) -> Exit:
-        ours(bus)
         options = {flag: text for flag, text in said.items() if flag not in known}
         own = {flag: value for flag, value in said.items() if flag in known}
         return do(name, bus, output, options, **{**usual, **own})
 
     command.__name__ = name
-    command.__doc__ = f"{ORDERS[name].title}."
+    command.__doc__ = f"{ORDERS[name].title} (item {ORDERS[name].command.number} of the manual)."
     command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in parameters}
-    app.command(command, name=words(name), help_epilogue=_help(name))
+    usage = f"Usage: motorbus stepper {words(name)} BUS{_flags(parameters)} [OPTIONS]"
+    app.command(command, name=words(name), usage=usage, help_epilogue=_help(name))
+
+
+def _flags(parameters: tuple[Parameter, ...]) -> str:
+    """Those that must be said."""
+    fields = [one for one in parameters if one.kind is one.KEYWORD_ONLY and one.default is one.empty]
+    names = [one.name.strip("_") for one in fields if one.annotation is not Silent]
+    return "".join(f" --{words(name)} {name.upper()}" for name in names)
 
 
 def _help(name: str) -> str:
-    order, shown = (
-        ORDERS[name],
-        f"motorbus stepper {words(name)} stepper:/dev/ttyUSB0 {EXAMPLES.get(name, '')}",
-    )
-    lines = [
-        shown.rstrip(),
-        *([f"{shown} --project 2"] if name in _EDITS else []),
-        f"{shown.rstrip()} --dry-run",
-    ]
-    return _EXPLAINED.format(
-        item=order.command.number,
-        note=f"{order.note.capitalize()}. " if order.note else "",
-        more=_SELECTED if name in _EDITS else "`motorbus stop` says both stops, until they are accepted.\n",
-        examples="\n".join(f"    {line}" for line in lines),
-    )
+    order, start = ORDERS[name], f"    motorbus stepper {words(name)} stepper:"
+    if name in _STOPS:
+        shown, more = [f"{start}/dev/ttyUSB0", f"{start}sim"], _BOTH
+    else:
+        own = EXAMPLES[name]
+        between = " " if len(start) + len(own) < _WIDTH else " \\\n        "
+        shown = [f"{start}/dev/ttyUSB0 \\\n        {own} --project 2", f"{start}sim{between}{own}"]
+        more = _SELECTED
+    note = f"{order.note.capitalize()}.\n" if order.note else ""
+    return _EXPLAINED.format(note=note, more=more, examples="\n".join(shown))
 
 
 for _name in _EDITS:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Flag, Silent
-from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, each, loaded, reading
+from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, loaded, reading
 from motorbus.errors import RequestError
-from motorbus.families.stepper import Conditions, Plan
+from motorbus.families.stepper import Conditions, Finding, Plan
 from motorbus.families.stepper.table import Project
 
 
@@ -57,21 +58,30 @@ def check(
     strict
         Any finding is a failure.
     """
-    how = reading(readings)
-    for name, limit in (("highest", highest), ("longest", longest), ("longest-total", longest_total)):
-        if not limit > 0:  # what is no number is neither
-            raise RequestError(f"--{name} {limit:g} is not possible", expected="a number above 0")
     conditions = Conditions(
-        highest=highest,
-        longest=longest,
-        longest_total=longest_total,
+        **_limits(highest=highest, longest=longest, longest_total=longest_total),
         homing=homing,
         unattended=unattended,
         before=_before(before, dump_order),
-        how=how,
+        how=reading(readings),
     )
     programs, worst = each(files, dump_order, output)
     found = [(file, finding) for file, program in programs for finding in program.lint(conditions)]
+    _tell([file for file, _ in programs], found, output)
+    failed = any(one.level == "error" for _, one in found) or (strict and bool(found))
+    return max(worst, Exit.FAILURE if failed else Exit.OK)
+
+
+def _limits(**limits: float) -> dict[str, Any]:
+    for name, limit in limits.items():
+        if not limit > 0:  # what is no number is neither
+            raise RequestError(
+                f"--{name.replace('_', '-')} {limit:g} is not possible", expected="a number above 0"
+            )
+    return limits
+
+
+def _tell(judged: list[Path], found: list[tuple[Path, Finding]], output: Output) -> None:
     facts = [
         {
             "file": str(file),
@@ -83,15 +93,12 @@ def check(
         }
         for file, one in found
     ]
-    judged = [str(file) for file, _ in programs]
-    output.document("motorbus.stepper.check/1", {"files": judged, "findings": facts})
-    if found:
-        rows = [(file, one.step or "", one.rule, one.level, one.text, one.reason) for file, one in found]
-        output.table("", ("file", ">step", "rule", "level", "what", "why"), rows)
-    else:
+    output.document("motorbus.stepper.check/1", {"files": [str(file) for file in judged], "findings": facts})
+    if not found:
         output.text("no findings")
-    failed = any(one.level == "error" for _, one in found) or (strict and bool(found))
-    return max(worst, Exit.FAILURE if failed else Exit.OK)
+        return
+    rows = [(file, one.step or "", one.rule, one.level, one.text, one.reason) for file, one in found]
+    output.table("", ("file", ">step", "rule", "level", "what", "why"), rows)
 
 
 def _before(path: Path | None, order: str) -> Project | None:
@@ -127,7 +134,9 @@ def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **r
         for file, program, one in found
     ]
     output.document("motorbus.stepper.estimate/1", {"estimates": facts})
-    _lines(output, [(file, str(one)) for file, _, one in found])
+    _lines(
+        output, [(file, CLEARED if program.project.is_cleared else str(one)) for file, program, one in found]
+    )
     return worst
 
 
@@ -150,7 +159,7 @@ def order(*files: File, dump_order: DumpOrder = "little", output: Silent, **read
 
 def _ordered(plan: Plan) -> str:
     if not plan.order:
-        return "no steps: the project has been cleared"
+        return CLEARED
     return f"{' '.join(map(str, plan.order))}  {_passes(plan.passes)}"
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import Silent
-from motorbus.cli.stepper.files import DumpOrder, File, Readings, app, each, reading
+from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, reading
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _show(file: Path, program: Program, how: Behaviour, picture: Path | None, ou
     facts = {"file": str(file), **{name: value for name, value in plan.data().items() if name != "schema"}}
     output.document("motorbus.stepper.plan/1", {**facts, "picture": str(picture) if picture else None})
     if not plan.order:
-        output.text(f"{file}: no steps: the project has been cleared")
+        output.text(f"{file}: {CLEARED}")
         return
     output.table(program.name or str(file), _COLUMNS, _rows(plan, program))
     net = (

@@ -189,4 +189,6 @@ def test_whatever_can_be_said_can_be_judged(project: Project) -> None:
 
 
 def test_a_cleared_project_can_be_judged() -> None:
-    assert rules(Project()) == ["L1", "L1", "L1"]
+    assert rules(Project()) == rules(Project(number=3)) == ["L1"]
+    assert "cleared" in only("L1", Project()).text
+    assert rules(Project(number=3, total_steps=1).with_step(1, delay=5)) == ["L1", "L1", "L1"]

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
+from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.stepper.program import quantities, schema, text
+from motorbus.families.stepper.program import names, quantities, schema, text
 from motorbus.families.stepper.program.quantities import Geometry
 from motorbus.families.stepper.table import Project
 
+EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "pick_and_place.toml"
 MADE = schema()
 STEP: dict[str, Any] = MADE["properties"]["step"]["items"]["properties"]
 MOTOR: dict[str, Any] = MADE["properties"]["motor"]["properties"]
@@ -56,19 +60,87 @@ def test_ranges_are_those_of_the_rows() -> None:
         ("speed", "60 mph"),
         ("start", "1.5 kHz"),
         ("start", "50"),
+        ("move", "90 degrees"),
+        ("move", "1e9 mm"),
+        ("move", "9" * 21 + " units"),
+        ("speed", "60 RPM"),
+        ("speed", "1e999 rpm"),
+        ("delay", "2 min 30 s"),
+        ("delay", "500ms"),
+        ("delay", "500"),
+        ("delay", "soon"),
+        ("delay", "-5 s"),
+        ("output", "none"),
+        ("output", "all off"),
+        ("output", "output 3 on"),
+        ("output", "output 4 on"),
+        ("output", "valve on"),
+        ("output", "valve"),
+        ("output", "valve up"),
+        ("wait_for", "none"),
+        ("wait_for", "button"),
+        ("wait_for", "input 5"),
+        ("wait_for", "1button"),
+        ("wait_for", ""),
+        ("stop_on", "button"),
     ],
 )
 def test_a_pattern_takes_what_reading_takes(field: str, said: str) -> None:
-    readers = {"move": quantities.distance, "speed": quantities.speed}
+    """For one who uses the names of the file; whether a name is one of them, and its number, only reading tells."""
+    inputs, outputs = {"button": 1}, {"valve": 3}
+    readers: dict[str, Callable[[], object]] = {
+        "move": lambda: quantities.distance(said, "x", PLAIN),
+        "speed": lambda: quantities.speed(said, "x", PLAIN),
+        "start": lambda: quantities.hertz(said, "x"),
+        "delay": lambda: quantities.milliseconds(said, "x"),
+        "output": lambda: names.output_of(said, "x", outputs),
+        "wait_for": lambda: names.input_of(said, "x", inputs),
+        "stop_on": lambda: names.input_of(said, "x", inputs),
+    }
     try:
-        if field == "start":
-            quantities.hertz(said, "x")
-        else:
-            readers[field](said, "x", PLAIN)
+        readers[field]()
         taken = True
     except RequestError:
         taken = False
-    assert bool(re.search(STEP[field]["pattern"], said)) is taken or said == "90°"
+    row = STEP[field]
+    pattern = row["pattern"] if "pattern" in row else row["anyOf"][1]["pattern"]
+    assert bool(re.search(pattern, said)) is taken
+
+
+@pytest.mark.parametrize(
+    ("unit", "taken"),
+    [
+        ("pulse", True),
+        ("0.001 mm", True),
+        ("2 pulses", True),
+        ("turn", True),
+        ("0.01°", True),
+        ("5 units", False),
+        ("x", False),
+    ],
+)
+def test_the_unit_of_distances_is_checked_too(unit: str, taken: bool) -> None:
+    assert bool(re.search(MOTOR["unit"]["pattern"], unit)) is taken
+
+
+def test_names_are_checked_too() -> None:
+    pattern = MADE["properties"]["inputs"]["propertyNames"]["pattern"]
+    assert re.search(pattern, "go on")
+    assert not re.search(pattern, "1st")
+    assert MADE["properties"]["outputs"]["maxProperties"] == 3
+    (number, _) = STEP["wait_for"]["anyOf"]
+    assert (number["minimum"], number["maximum"]) == (0, 5)
+
+
+def test_the_example_fits_it() -> None:
+    """Every text of the example fits the pattern of its field."""
+    example = tomllib.loads(EXAMPLE.read_text(encoding="utf-8"))
+    for step in example["step"]:
+        for key, value in step.items():
+            patterns = (
+                [STEP[key]["pattern"]] if "pattern" in STEP[key] else [STEP[key]["anyOf"][1]["pattern"]]
+            )
+            assert re.search(patterns[0], value), (key, value)
 
 
 def test_what_is_needed_is_said() -> None:

@@ -200,7 +200,9 @@ def test_a_change_takes_hold_of_everything_it_is_about() -> None:
     host.device.switch(turnaround=0.05, save_time=0.5, echo="yes")
     assert [at for at, _ in host.timed(STOP)] == [0.0, 0.05]
     assert [at for at, _ in host.timed(frame(SAVE, 1), 1.0)] == [0.0, 0.55]
-    host.device.switch(echo="no", dump_fault="short", bounce=2)
+    host.device.switch(notice_fault="late", fault_time=0.25, echo="no", dump_fault="short", bounce=2)
+    ends = [at for at, text in host.timed(frame(START, 2), 1.0) if text == DONE]
+    assert ends == [0.3]  # it is empty: the turnaround, and late
     assert len(host.dump(1)) == 113
     host.device.set_input(1, True)
     assert host.bus.due() is not None  # it bounces
@@ -231,6 +233,15 @@ def test_a_home_switch_may_be_wired_while_the_motor_turns() -> None:
     assert (host.device.position, host.device.status()["load"]) == (0, -4800)
     host.device.switch(home_at=-9000)
     assert host.say(READ_5) == "FF AA 00 0B 05 00"
+
+
+def test_a_home_switch_may_be_moved_while_the_motor_turns() -> None:
+    host = Host(home_switch="wired", home_at=-4800)
+    host.write(written(1, step(1)))
+    host.say(HOME, 1.0)
+    host.device.switch(home_at=-8000)
+    host.wait(9.0)
+    assert (host.device.position, host.device.status()["load"]) == (0, -8000)
 
 
 def test_the_same_seed_said_again_gives_the_same_errors() -> None:

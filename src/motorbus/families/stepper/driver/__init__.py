@@ -8,9 +8,24 @@ carries it out.
 from __future__ import annotations
 
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
+from motorbus.families.stepper.driver.copying import backup, restore
+from motorbus.families.stepper.driver.costs import Cost
+from motorbus.families.stepper.driver.editing import Change
+from motorbus.families.stepper.driver.homing import Homed, home
+from motorbus.families.stepper.driver.inputs import InputChanged, Watched, watch_inputs
+from motorbus.families.stepper.driver.jogging import (
+    Moved,
+    jog,
+    jog_forward,
+    jog_reverse,
+    move_by,
+    run_once,
+)
 from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node, checked_motor
+from motorbus.families.stepper.driver.outputs import last_commanded, set_output
 from motorbus.families.stepper.driver.presence import identify, ping
+from motorbus.families.stepper.driver.progress import Estimated
 from motorbus.families.stepper.driver.reading import (
     dump,
     dump_once,
@@ -20,26 +35,72 @@ from motorbus.families.stepper.driver.reading import (
     read_raw,
     vote,
 )
+from motorbus.families.stepper.driver.recovery import recover
+from motorbus.families.stepper.driver.running import run, start_project
 from motorbus.families.stepper.driver.scanning import Sends, scan
+from motorbus.families.stepper.driver.selecting import clear, save, select
 from motorbus.families.stepper.driver.stopping import Promise, stop
+from motorbus.families.stepper.driver.waiting import Outcome, Ran
+from motorbus.families.stepper.driver.writing import (
+    Difference,
+    Planned,
+    Proof,
+    Written,
+    difference,
+    write,
+    write_project,
+)
 
 __all__ = [
     "AsyncController",
+    "Change",
     "Controller",
+    "Cost",
+    "Difference",
+    "Estimated",
+    "Homed",
+    "InputChanged",
     "Memory",
+    "Moved",
     "Node",
+    "Outcome",
+    "Planned",
     "Promise",
+    "Proof",
+    "Ran",
     "Sends",
+    "Watched",
+    "Written",
+    "backup",
     "checked_motor",
+    "clear",
+    "difference",
     "dump",
     "dump_once",
+    "home",
     "identify",
+    "jog",
+    "jog_forward",
+    "jog_reverse",
+    "last_commanded",
+    "move_by",
     "ping",
     "read",
     "read_input",
     "read_project",
     "read_raw",
+    "recover",
+    "restore",
+    "run",
+    "run_once",
+    "save",
     "scan",
+    "select",
+    "set_output",
+    "start_project",
     "stop",
     "vote",
+    "watch_inputs",
+    "write",
+    "write_project",
 ]

@@ -23,9 +23,23 @@ def nothing(reply: bytes) -> None:
     """An acknowledgement carries no value."""
 
 
-def motion(node: Node, name: str, goals: tuple[Goal, ...], **values: int) -> Exchange[None]:
-    """A command that moves the motor, with what it orders: the gate lets nothing through that does not say."""
-    return command(node, name, nothing, rank=Rank.CONTROL, timeout=None, goals=goals, expert=False, **values)
+def motion(
+    node: Node, name: str, goals: tuple[Goal, ...], refusal: Refusal | None = None, **values: int
+) -> Exchange[None]:
+    """A command that moves the motor, with what it orders: the gate lets nothing through that does not say.
+
+    `refusal` is asked just before it leaves: why it must not after all, see `Exchange`."""
+    return command(
+        node,
+        name,
+        nothing,
+        rank=Rank.CONTROL,
+        timeout=None,
+        goals=goals,
+        refusal=refusal,
+        expert=False,
+        **values,
+    )
 
 
 def select_project(node: Node, project: int, total_steps: int) -> Exchange[None]:

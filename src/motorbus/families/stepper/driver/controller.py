@@ -8,7 +8,20 @@ from __future__ import annotations
 
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
 from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver import presence, reading, stopping
+from motorbus.families.stepper.driver import (
+    copying,
+    homing,
+    inputs,
+    jogging,
+    outputs,
+    presence,
+    reading,
+    recovery,
+    running,
+    selecting,
+    stopping,
+    writing,
+)
 from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.table import Order
@@ -27,7 +40,32 @@ class ControllerVerbs(Node):
     read_project = verb(reading.read_project)
     read_input = verb(reading.read_input)
     dump = verb(reading.dump)
+    difference = verb(writing.difference)
+    write_project = verb(writing.write_project)
+    write = verb(writing.write)
+    select = verb(selecting.select)
+    save = verb(selecting.save)
+    clear = verb(selecting.clear)
+    backup = verb(copying.backup)
+    restore = verb(copying.restore)
+    start_project = verb(running.start_project)
+    run = verb(running.run)
+    set_output = verb(outputs.set_output)
+    watch_inputs = verb(inputs.watch_inputs)
+    inputs = verb(inputs.inputs)  # last of those, for it takes the module's name
     stop = verb(stopping.stop)
+    jog = verb(jogging.jog)
+    move_by = verb(jogging.move_by)
+    run_once = verb(jogging.run_once)
+    jog_forward = verb(jogging.jog_forward)
+    jog_reverse = verb(jogging.jog_reverse)
+    home = verb(homing.home)
+    recover = verb(recovery.recover)
+
+    @property
+    def last_commanded(self) -> dict[int, bool | None]:
+        """What each output was last commanded to be on this bus, see `driver.outputs`; a memory and no reading."""
+        return outputs.last_commanded(self)
 
 
 class Controller(ControllerVerbs, Blocking):

@@ -11,7 +11,7 @@ does is found out here each time, for a project that reads as it did before it w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -19,6 +19,7 @@ from motorbus.core.entry import Entry, Value
 from motorbus.core.operation import Exchange, Operation, Progress, Rank, Report, Runnable
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import T, command
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import agreed, dump_once, readings
@@ -38,6 +39,8 @@ from motorbus.families.stepper.table import (
 
 View: TypeAlias = Literal["untold", "working", "stored"]
 """What a read-back shows: the copy that is edited, what is stored, or nothing was written that could tell."""
+FLAGS: Final = ("stop_mode", "mode4", "power_on_home")
+"""What each project's dump holds, and may belong to the device nevertheless."""
 _MOST: Final = 6
 """Differences that a message lists."""
 
@@ -90,8 +93,8 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     `before_image` are the 220 bytes that were read before, and `after.number` says of which project. Only what differs
     is sent, behind the command that selects the project; nothing at all is sent, and nothing read, when nothing
     differs, unless `every` field is wanted. A right read-back is one reading. If it is not right, every field is sent
-    and it is read again: then it is as meant, view "working", or it is as it was before, and the controller shows what
-    is stored, view "stored": what is edited cannot be seen then, but each field of it was acknowledged.
+    and it is read again: then it is as meant, view "working", or both times as it was before, and the controller shows
+    what is stored, view "stored": what is edited cannot be seen then, but each field of it was acknowledged.
 
     Edits of another project that were not saved are lost. Call it inside `Alone`, for another caller's selection in
     between would lead these edits elsewhere. Reports `Progress`. Raises RequestError for a number that may not be
@@ -99,26 +102,37 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     acknowledged. An error from the middle has a note that says what may be half written.
     """
     before = decode_image(before_image, node.order)
-    fresh = edits(after, rows=_filled(after))
-    some = _orders(node, fresh if before.is_cleared else edits_between(before, after, rows=STEPS))
+    some = _orders(node, edits_to(before, after))
     if not some and not every:
         return Readback(before_image, "untold", 0, 0)
     whole = _orders(node, edits(after, rows=STEPS), strict=False)
-    spent = 0
-    dumps = 0
+    commands, dumps, unmoved = 0, 0, True
     for orders in (whole if every else some, whole):
         yield from _told(node, after.number, orders)
-        spent += len(orders)
-        image, count = yield from _noted(read_back(node, after), _unsaved(after.number))
-        dumps += count
-        if decode_image(image, node.order) == after:
-            return Readback(image, "working" if some else "untold", spent, dumps)
-    if _is_alike(decode_image(image, node.order), before):
-        return Readback(image, "stored", spent, dumps)
+        image, count = yield from noted(read_back(node, after), _unsaved(after.number))
+        commands, dumps = commands + len(orders), dumps + count
+        shown = decode_image(image, node.order)
+        if shown == after:
+            return Readback(image, "working" if some else "untold", commands, dumps)
+        unmoved = unmoved and _is_alike(shown, before)
+    if unmoved:
+        return Readback(image, "stored", commands, dumps)
     raise differs(
         node, image, after, f"project {after.number} is being edited and does not read as it was written",
-        f"nothing was saved; {_unsaved(after.number)}",
+        f"write it again; {_unsaved(after.number)}",
     )  # fmt: skip
+
+
+def edits_to(before: Project, after: Project) -> list[Edit]:
+    """The commands that make one project of the other, none when nothing differs; a cleared one is written in full."""
+    if before.is_cleared:
+        return edits(after, rows=_filled(after))
+    return edits_between(before, after, rows=STEPS)
+
+
+def selected(node: Node, project: Project) -> Operation[None]:
+    """Select a project with the number of steps it has. Raises RequestError when it has none."""
+    yield from _told(node, project.number, _orders(node, edits(project, rows=0)[:1]))
 
 
 def read_back(node: Node, meant: Project) -> Operation[tuple[bytes, int]]:
@@ -127,11 +141,16 @@ def read_back(node: Node, meant: Project) -> Operation[tuple[bytes, int]]:
     One reading is enough when it is as `meant` in every named field, for no line changes bytes into that; any other is
     believed when two agree. Raises as `dump`.
     """
-    image = (yield from dump_once(node, meant.number))[wire.REPLY_LENGTH :]
-    if decode_image(image, node.order) == meant:
+    return (yield from read_until(node, meant.number, lambda shown: shown == meant))
+
+
+def read_until(node: Node, project: int, right: Callable[[Project], bool]) -> Operation[tuple[bytes, int]]:
+    """As `read_back`, where more than one project would be right."""
+    image = (yield from dump_once(node, project))[wire.REPLY_LENGTH :]
+    if right(decode_image(image, node.order)):
         return image, 1
-    seen = yield from readings(node, meant.number)
-    return agreed(node, meant.number, seen)[wire.REPLY_LENGTH :], 1 + len(seen)
+    seen = yield from readings(node, project)
+    return agreed(node, project, seen)[wire.REPLY_LENGTH :], 1 + len(seen)
 
 
 def differs(node: Node, image: bytes, meant: Project, what: str, advice: str) -> VerificationFailed:
@@ -172,19 +191,21 @@ def _filled(project: Project) -> int:
 
 
 def _order(node: Node, edit: Edit) -> Exchange[None]:
-    def acknowledged(reply: bytes) -> None:
-        if edit.command == "select_project":
-            node.memory.selected = edit.values["project"]
-
     values: dict[str, Any] = dict(edit.values)
-    return command(node, edit.command, acknowledged, rank=Rank.CONFIGURATION, expert=True, **values)
+    return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, expert=True, **values)
 
 
 def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> Operation[None]:
-    node.memory.selected = None
-    for number, order in enumerate(orders):
-        yield from Report(Progress(number, len(orders), f"writing project {project}"))
-        yield from _noted(order, f"{number} of {len(orders)} commands were acknowledged; {_unsaved(project)}")
+    if node.memory.unsaved is not None and node.memory.unsaved.number != project:
+        node.memory.unsaved = None  # those edits are lost with the selection of this one
+    number = 0
+    try:
+        for number, order in enumerate(orders):
+            yield from Report(Progress(number, len(orders), f"writing project {project}"))
+            yield from order
+    except BaseException as error:
+        error.add_note(f"{number} of {len(orders)} commands were acknowledged; {_unsaved(project)}")
+        raise
     yield from Report(Progress(len(orders), len(orders), f"writing project {project}"))
 
 
@@ -195,7 +216,7 @@ def _unsaved(project: int) -> str:
     )
 
 
-def _noted(runnable: Runnable[T], note: str) -> Operation[T]:
+def noted(runnable: Runnable[T], note: str) -> Operation[T]:
     """Carry it out; an error or an interruption of it gets this note."""
     try:
         return (yield from runnable)
@@ -206,7 +227,7 @@ def _noted(runnable: Runnable[T], note: str) -> Operation[T]:
 
 def _is_alike(shown: Project, before: Project) -> bool:
     """Whether it is the old one; stop mode and its like may belong to the device and be another's already."""
-    flags = {name: getattr(before, name) for name in ("stop_mode", "mode4", "power_on_home")}
+    flags = {name: getattr(before, name) for name in FLAGS}
     return replace(shown, number=before.number, **flags) == before
 
 

@@ -32,7 +32,8 @@ def command(
 ) -> Exchange[T]:
     """A command by its name and its numbers; `read` makes a value of the whole reply, once that is the right one.
 
-    `goals` is what it orders, for what moves the motor, `refusal` why it must not leave after all. `expert` lets a step use inputs 3 and 4.
+    `goals` is what it orders, for what moves the motor, `refusal` tells why it must not leave after all. `expert` lets
+    a step use inputs 3 and 4.
 
     Raises RequestError, naming the field and its range, for a number that may not be sent. The exchange raises
     UnexpectedReply when the reply differs from what is due.

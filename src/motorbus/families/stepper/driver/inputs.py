@@ -20,7 +20,7 @@ PORTS: Final = tuple(range(1, INPUTS + 1))
 
 
 class InputChanged(NamedTuple):
-    """An event: an input, 1 to 5, has become active or inactive. `at` is when it was first read so (s, link's clock)."""
+    """An event: input 1 to 5 has become active or inactive; `at` is when it was first read so (s, link's clock)."""
 
     port: int
     active: bool
@@ -136,7 +136,12 @@ def checked(ports: Iterable[int]) -> Sequence[int]:
 
 
 def _check_seconds(seconds: float) -> None:
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not isfinite(seconds) or seconds <= 0:
+    if (
+        isinstance(seconds, bool)
+        or not isinstance(seconds, int | float)
+        or not isfinite(seconds)
+        or seconds <= 0
+    ):
         raise RequestError(
             f"{seconds!r} is no time to watch for",
             expected="seconds, more than 0",

@@ -6,27 +6,27 @@ bus, and it is never called more than that: another host, a button or a power cy
 
 from __future__ import annotations
 
-from motorbus.families.stepper.table import OUTPUTS, OutputPort
+from motorbus.families.stepper.table import OUTPUTS, OutputPort, Project
 
 
 class Memory:
     """What was said to the controller of one bus since it was opened.
 
     `stops`    how many stops it has accepted
+    `stopping` how many stops are being said just now, accepted or not yet
     `owed`     a project was started, and neither its notice nor an accepted stop has come since: it may still run
     `outputs`  the level last commanded, by output 1 to 3 and 5, the LEDs; None where that is not known
     `proven`   a dump has come: there is a controller, and not only a line that echoes
-    `selected` the project that was selected last, which all edits go to and which is saved; None: not known
-    `unsaved`  the project that was edited without being saved; None: none was
+    `unsaved`  the project that was edited last without being saved, as it was meant to be; None: none was
     """
 
     def __init__(self) -> None:
         self.stops = 0
+        self.stopping = 0
         self.owed = False
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), int(OutputPort.LEDS)))
         self.proven = False
-        self.selected: int | None = None
-        self.unsaved: int | None = None
+        self.unsaved: Project | None = None
 
     def commanded(self, ports: tuple[int, ...], active: bool | None) -> None:
         """These outputs were switched; None: something that nobody can see may have switched them."""

@@ -40,14 +40,18 @@ def stop(node: Node) -> Operation[Promise]:
     port is gone.
     """
     failures = {}
-    for name in STOPS:
-        told = yield from _insisted(node, name)
-        if told is not None:
-            failures[name] = told
-    if failures:
-        raise _not_accepted(node, failures)
-    node.memory.stops += 1
-    node.memory.owed = False
+    node.memory.stopping += 1  # a run that waits for its notice does not take one of this stop for it
+    try:
+        for name in STOPS:
+            told = yield from _insisted(node, name)
+            if told is not None:
+                failures[name] = told
+        if failures:
+            raise _not_accepted(node, failures)
+        node.memory.stops += 1
+        node.memory.owed = False
+    finally:
+        node.memory.stopping -= 1
     return Promise.STOP_ACCEPTED
 
 

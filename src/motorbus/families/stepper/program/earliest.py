@@ -18,7 +18,7 @@ FEWEST: Final = Behaviour(seg_loop="total", proj_loop="total")
 
 
 def earliest(project: Project) -> float:
-    """s from the start of a project before which it has not run to its end, in every behaviour; infinity if it never does.
+    """s from its start before which a project has not run to its end, in any behaviour; infinity if it never does.
 
     All its pauses, and all its pulses at full speed from the first to the last but one (with rounding=carry a step may
     send one less than it has), each step as often as it is carried out at least. A step with a stop input counts with

@@ -165,6 +165,9 @@ def lint(project: Project, conditions: Conditions = USUALLY) -> list[Finding]:
 
 
 def _geometry(project: Project, _: Conditions) -> Iterator[Finding]:
+    if project == Project(number=project.number):
+        yield Finding("L1", 0, "the project has been cleared: it has no steps either")
+        return
     for name in ("step_angle", "microsteps", "turn_distance"):
         if not getattr(project, name):
             yield Finding("L1", 0, f"{name} is 0")

@@ -10,7 +10,8 @@ from motorbus.core.entry import shown
 from motorbus.families.stepper.program.quantities import refuse
 from motorbus.families.stepper.table import INPUTS, OUTPUTS, PARAMETERS, STEP_INPUTS, step_output_of
 
-_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9 _-]{0,31}", re.ASCII)
+NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9 _-]{0,31}", re.ASCII)
+"""What a file may call an input or an output."""
 _TAKEN: Final = frozenset({"none", "all", "input", "output", "on", "off"})
 _HIGHEST: Final = {"input": INPUTS, "output": OUTPUTS}
 
@@ -23,7 +24,7 @@ def named(table: object, kind: str) -> dict[str, int]:
     found: dict[str, int] = {}
     for name, number in table.items():
         if (
-            not _NAME.fullmatch(name)
+            not NAME.fullmatch(name)
             or name.lower() in _TAKEN
             or name.lower().startswith(("input ", "output "))
         ):

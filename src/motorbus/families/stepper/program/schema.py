@@ -10,12 +10,18 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from motorbus.core.entry import Entry
-from motorbus.families.stepper.program import text
-from motorbus.families.stepper.program.quantities import DISTANCES, SPEEDS
+from motorbus.families.stepper.program import names, text
+from motorbus.families.stepper.program.quantities import DISTANCES, LENGTH, SPEEDS
 from motorbus.families.stepper.table import ENDLESS, INPUTS, OUTPUTS, PARAMETERS, STEPS, UNITS
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
-_NUMBER: Final = r"(\d+(\.\d*)?|\.\d+)"
+_NUMBER: Final = r"([0-9]{1,20}(\.[0-9]{0,20})?|\.[0-9]{1,20})"
+_SPELLINGS: Final = {
+    "units": "units?", "pulses": "pulses?", "turns": "turns?", "deg": "(deg|degrees|°)", "rpm": "(rpm|RPM)",
+}  # fmt: skip
+"""What else a unit may be called."""
+_NAMED: Final = rf"(?!input |output ){names.NAME.pattern}"
+"""A name of the file; which words it may not be besides, only reading tells."""
 
 
 def schema() -> dict[str, Any]:
@@ -53,18 +59,19 @@ def _motor() -> dict[str, Any]:
     made = _object(
         {
             "microsteps": _integer(rows["microsteps"]),
-            "step_angle": _quantity(("deg", "°"), rows["step_angle"].note),
+            "step_angle": _quantity(("deg",), rows["step_angle"].note),
             "full_steps": {
                 "type": "integer",
                 "minimum": 1,
+                "maximum": PARAMETERS["microsteps"].high * 36000,
                 "description": "of one turn, instead of step_angle",
             },
             "turn_distance": _integer(rows["turn_distance"]),
-            "unit": {
-                "type": "string",
-                "description": "one user unit, instead of turn_distance: pulse, 0.001 mm",
-            },
-            "lead": _quantity(("mm", "um", "cm", "m"), "how far the load goes in one turn"),
+            "unit": _said(
+                rf"\s*(pulse|turn|\+?\s*{_NUMBER}\s*({_spelled([unit for unit in DISTANCES if unit != 'units'])}))\s*",
+                "one user unit, instead of turn_distance: pulse, 0.001 mm",
+            ),
+            "lead": _quantity(LENGTH, "how far the load goes in one turn"),
             "stop": {"enum": list(text.STOPS), "description": "what a stop does"},
             "mode4": _integer(rows["mode4"]),
             "home_at_power_on": {"type": "boolean", "description": rows["power_on_home"].note},
@@ -91,8 +98,11 @@ def _step() -> dict[str, Any]:
             "speed": _quantity(SPEEDS, PARAMETERS["speed"].note),
             "start": _quantity(hertz, PARAMETERS["start_frequency"].note),
             "acceleration": _quantity(hertz, PARAMETERS["acceleration"].note),
-            "delay": {"type": "string", "description": PARAMETERS["delay"].note},
-            "output": {"type": "string", "description": "none, all on, all off, output 1 on, or NAME off"},
+            "delay": _said(rf"(\s*{_NUMBER}\s*(ms|s|min|h)\s*)+", PARAMETERS["delay"].note),
+            "output": _said(
+                rf"\s*(none|(all|output [1-{OUTPUTS}]|{_NAMED}) (on|off))\s*",
+                "none, all on, all off, output 1 on, or NAME off",
+            ),
             "wait_for": _input("the step waits for it"),
             "stop_on": _input("it ends the motion of the step"),
         }
@@ -111,11 +121,16 @@ def _integer(row: Entry) -> dict[str, Any]:
 
 
 def _quantity(units: Iterable[str], described: str, *, signed: bool = False) -> dict[str, Any]:
-    listed = "|".join(units)
     sign = "[+-]?" if signed else r"\+?"
-    loose = "turns?|units?|pulses?|" if "turns" in listed else ""
-    pattern = rf"^\s*{sign}\s*{_NUMBER}\s*({loose}{listed})\s*$"
-    return {"type": "string", "pattern": pattern, "description": described}
+    return _said(rf"\s*{sign}\s*{_NUMBER}\s*({_spelled(units)})\s*", described)
+
+
+def _spelled(units: Iterable[str]) -> str:
+    return "|".join(_SPELLINGS.get(unit, unit) for unit in units)
+
+
+def _said(pattern: str, described: str) -> dict[str, Any]:
+    return {"type": "string", "pattern": f"^{pattern}$", "description": described}
 
 
 def _names(highest: int, what: str) -> dict[str, Any]:
@@ -123,9 +138,13 @@ def _names(highest: int, what: str) -> dict[str, Any]:
     return {
         "type": "object",
         "additionalProperties": number,
+        "propertyNames": {"pattern": f"^{_NAMED}$"},
+        "maxProperties": highest,
         "description": f"a name for the number of {what}",
     }
 
 
 def _input(described: str) -> dict[str, Any]:
-    return {"type": ["string", "integer"], "description": f"none, input 1, or NAME: {described}"}
+    described = f"none, input 1, or NAME: {described}; 3 and 4 need `expert`"
+    numbers = {"type": "integer", "minimum": 0, "maximum": INPUTS}
+    return {"anyOf": [numbers, _said(rf"\s*(none|input [1-{INPUTS}]|{_NAMED})\s*", described)]}

@@ -140,7 +140,7 @@ class StepperBus:
         self.switches = switches
         self._harm.change(switches, reseed=reseed)
         self._line.change(switches)
-        self._later(self.now, self.controller.rewire, outside=True)
+        self.controller.rewire(self.now)
         self.settle()
 
     def notice(self) -> None:

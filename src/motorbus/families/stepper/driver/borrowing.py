@@ -1,0 +1,325 @@
+"""Project 1 is borrowed for a motion by hand, and given back: the only way to say how fast and how far.
+
+The frames of jog, single move and homing carry no speed: they take it from step 1 of project 1. So this step is edited,
+the motion made, and the project brought back to what it was, all with nobody else on the bus but for a stop. Nothing is
+saved, so a power cycle gives it back as well. What project 1 was is in the journal before the first edit leaves, and
+the journal is closed when it reads as before: whatever cuts this off, an error, Ctrl-C or kill -9, the next one who
+opens the bus is told, no motion of this host begins, and `recover` gives it back.
+
+The motion is always followed by a stop, and while that is not accepted nothing is given back: nobody knows what an
+edit does to a motor that turns. What cannot be given back at all: afterwards project 1 is the selected one, for no
+controller tells which was before. Input 3 then starts project 1, where it starts the selected one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Final, TypeVar
+
+from motorbus.core.operation import (
+    ASKED,
+    INTENT,
+    OUTCOME,
+    REACHED,
+    Alone,
+    Journal,
+    Operation,
+    Report,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver import commands
+from motorbus.families.stepper.driver.editing import brought
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.reading import dump
+from motorbus.families.stepper.driver.stopping import stop
+from motorbus.families.stepper.driver.turning import refuse_unless_idle
+from motorbus.families.stepper.table import (
+    BASE_NAMES,
+    STEPS,
+    Order,
+    Project,
+    check,
+    checked_order,
+    decode_image,
+    differences,
+    edits_between,
+    encode_image,
+)
+
+T = TypeVar("T")
+
+PROJECT: Final = 1
+"""From its step 1 every motion by hand has its speed: stepper controller serial protocol manual, items 18, 19, 22."""
+VERBS: Final = ("jog", "move_by", "home")
+"""Those that may borrow."""
+BORROWED: Final = "borrowed"
+"""It was read back as wanted, so reading shows what is being edited."""
+GIVEN_BACK: Final = "old"
+"""How every borrow ends, in the journal and for `recover`."""
+TRIES: Final = 3
+"""How often giving back is tried: after an emergency stop the bus itself repeats nothing."""
+NOTE: Final = "project 1 may still be borrowed: recover() gives it back, and so does a power cycle"
+
+
+class Loan:
+    """Project 1 as it was and as it is `wanted` meanwhile, for this verb, and how far it has come.
+
+    `image`    its 220 bytes as they were, with numbers in this `order` of bytes
+    `open`     the journal may hold it as unfinished
+    `seen`     it was read back as wanted: a reading shows what is being edited, and can be believed
+    `restless` a motion was ordered and no stop was accepted since
+    """
+
+    def __init__(self, verb: str, image: bytes, order: Order, wanted: Project) -> None:
+        self.verb = verb
+        self.image = image
+        self.order: Final[Order] = order
+        self.before = replace(decode_image(image, order), number=PROJECT)
+        self.wanted = replace(wanted, number=PROJECT)
+        self.open = self.seen = self.restless = self.restored = False
+
+    @property
+    def needed(self) -> bool:
+        """Whether anything has to be edited at all."""
+        return self.wanted != self.before
+
+    def name(self, node: Node) -> dict[str, object]:
+        """Which borrow it is, among its facts."""
+        return {"node": node.node, "image": self.image.hex()}
+
+    def facts(self, node: Node) -> dict[str, object]:
+        """All that is needed to give it back, as plain data."""
+        return {
+            **self.name(node),
+            "what": f"the borrow of project {PROJECT} (for {self.verb})",
+            "order": self.order,
+            "wanted": {
+                f"step_{step}_{name}" if step else name: value
+                for name, step, _, value in differences(self.before, self.wanted)
+            },
+        }
+
+    def refuse_unless_returnable(self, node: Node) -> None:
+        """Raise RequestError, before anything is sent, for a project that no command could bring back."""
+        ways = [edits_between(self.before, self.wanted, rows=STEPS)]
+        if not self.before.is_cleared:
+            ways.append(edits_between(self.wanted, self.before, rows=STEPS))
+        elif any(self.image[1:]):
+            raise _not_returnable(node, "it has no steps, and holds something all the same")
+        for edit in [one for way in ways for one in way]:
+            try:
+                check(edit.command, edit.values, expert=True)
+            except RequestError as refusal:
+                raise _not_returnable(node, refusal.summary) from refusal
+
+
+def loan_of(verb: str, facts: Mapping[str, Any]) -> Loan:
+    """The borrow that these facts tell of. Raises RequestError when they tell of none."""
+    try:
+        image, order = bytes.fromhex(facts["image"]), checked_order(facts["order"])
+        loan = Loan(verb, image, order, _changed(decode_image(image, order), facts["wanted"]))
+        if verb not in VERBS:
+            raise ValueError(verb)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise RequestError(
+            f"these are not the facts of a borrow that can be recovered: {error!r}",
+            expected="what the journal of the bus holds of a jog(), a move_by() or a home()",
+            advice="nothing was sent",
+        ) from error
+    loan.seen = BORROWED in facts.get(REACHED, ())
+    return loan
+
+
+def _changed(project: Project, values: Mapping[str, int]) -> Project:
+    """The project with these values, by the names of the rows."""
+    for name, value in values.items():
+        if name in BASE_NAMES:
+            changes: dict[str, Any] = {name: value}
+            project = replace(project, **changes)
+        else:
+            _, step, field = name.split("_", 2)
+            project = project.with_step(int(step), **{field: value})
+    return project
+
+
+def borrowed(
+    node: Node,
+    verb: str,
+    wanted: Callable[[Project], Operation[Project]],
+    motion: Callable[[Project], Operation[T]],
+    *,
+    expert: bool = False,
+    leave: bool = False,
+) -> Operation[T]:
+    """Make a motion with project 1 as `wanted` makes it of what it is, then stop, then give it back, come what may.
+
+    Where it is so already nothing is edited. With `leave` it is not stopped, and it must be so already. `expert` goes
+    on where what was edited cannot be read back.
+
+    Raises RequestError, with nothing sent that changes anything, while a borrow that was cut off is unfinished on this
+    bus, while a project may run, for unsaved edits of another project, which a borrow would lose, and for a project 1
+    that could not be given back; VerificationFailed when it does not read as wanted; whatever `motion` raises;
+    OutcomeUnknown when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
+    still borrowed.
+    """
+    return (yield from Alone(_borrowing(node, verb, wanted, motion, expert, leave)))
+
+
+def _borrowing(
+    node: Node,
+    verb: str,
+    wanted: Callable[[Project], Operation[Project]],
+    motion: Callable[[Project], Operation[T]],
+    expert: bool,
+    leave: bool,
+) -> Operation[T]:
+    refuse_unless_idle(node, verb)
+    yield from Report(Journal(verb, ASKED, {"node": node.node}))
+    image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
+    loan = Loan(verb, image, node.order, (yield from wanted(decode_image(image, node.order))))
+    if loan.needed:
+        _refuse(node, loan, leave)
+    try:
+        return (yield from afterwards(_lent(node, loan, motion, expert, leave), lambda: _ended(node, loan)))
+    except BaseException as error:
+        if loan.open:
+            error.add_note(NOTE)
+        raise
+
+
+def _lent(
+    node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], expert: bool, leave: bool
+) -> Operation[T]:
+    if loan.needed:
+        yield from _recorded(node, loan)
+        found = yield from brought(node, loan.image, loan.wanted)
+        loan.seen = found.view == "working"
+        if not loan.seen and not expert:
+            raise _unseen(node)
+        if loan.seen:
+            yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
+    loan.restless = not leave
+    return (yield from motion(loan.wanted))
+
+
+def _recorded(node: Node, loan: Loan) -> Operation[None]:
+    """Record the intent. What cannot be recorded does not begin, and nothing need be given back."""
+    loan.open = True
+    try:
+        yield from Report(Journal(loan.verb, INTENT, loan.facts(node)))
+    except MotorbusError:
+        told = yield from outcome(_closed(node, loan))  # the record may be on the disk all the same
+        if isinstance(told, RequestError):  # that of another change says so itself
+            loan.open = False
+        raise
+
+
+def _ended(node: Node, loan: Loan) -> Operation[None]:
+    """Whatever has happened: the motor is told to stop, then project 1 is given back, then the journal is closed."""
+    if loan.restless:
+        yield from stop(node)
+        loan.restless = False
+    if loan.open:
+        yield from given_back(node, loan)
+
+
+def given_back(node: Node, loan: Loan) -> Operation[None]:
+    """Bring project 1 back to what it was, see that it is, and close the journal. May be repeated at any point.
+
+    Raises what the last of several tries has raised.
+    """
+    if not loan.restored:
+        unsaved = node.memory.unsaved
+        told = yield from _insisted(node, loan)
+        if told is not None:
+            raise told
+        node.memory.unsaved = unsaved
+        loan.restored = True
+    yield from _closed(node, loan)
+
+
+def _insisted(node: Node, loan: Loan) -> Operation[MotorbusError | None]:
+    told: MotorbusError | None = None
+    for _ in range(TRIES):
+        told = yield from outcome(_restored(node, loan))
+        if told is None or isinstance(told, LinkError):
+            break
+    return told
+
+
+def _closed(node: Node, loan: Loan) -> Operation[None]:
+    yield from Report(Journal(loan.verb, OUTCOME, {"outcome": GIVEN_BACK, **loan.name(node)}))
+    loan.open = False
+
+
+def _restored(node: Node, loan: Loan) -> Operation[None]:
+    """What is being edited may be anything by now: as wanted, half of it, or as it was, after a power cycle.
+
+    A reading tells which, and only what differs is written; where no reading can be believed, all that was edited is
+    written once more.
+    """
+    if loan.before.is_cleared:
+        yield from _cleared(node)
+        return
+    image = encode_image(loan.wanted, loan.order, over=loan.image)
+    if loan.seen:
+        image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
+    yield from brought(node, image, loan.before)
+
+
+def _cleared(node: Node) -> Operation[None]:
+    """A project without steps: no command writes that but the one that clears, and what is stored was clear too."""
+    told = yield from outcome(commands.clear_project(node, PROJECT))
+    image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
+    if any(image):
+        raise told or VerificationFailed(
+            "project 1 was cleared and does not read so",
+            received=image,
+            expected="zeros",
+            advice="recover() tries again, and a power cycle brings back what is stored",
+            node=node.node,
+        )
+
+
+def _refuse(node: Node, loan: Loan, leave: bool) -> None:
+    """Raise RequestError for a borrow that must not begin."""
+    loan.refuse_unless_returnable(node)
+    unsaved = node.memory.unsaved
+    if unsaved is not None and unsaved.number != PROJECT:
+        raise RequestError(
+            f"project {unsaved.number} has edits that were not saved, and {loan.verb}() would lose them",
+            cause="it has to select project 1, and there is one copy only that is edited",
+            advice=f"save({unsaved.number}) first; nothing was sent",
+            node=node.node,
+        )
+    if leave:
+        raise RequestError(
+            f"{loan.verb}(wait=False) is possible only with what project 1 has already",
+            cause="what is borrowed for a motion must be given back behind it, so somebody has to wait",
+            advice="wait in another thread or task; nothing was sent",
+            node=node.node,
+        )
+
+
+def _not_returnable(node: Node, why: str) -> RequestError:
+    return RequestError(
+        "project 1 could not be given back as it is, so it is not borrowed",
+        cause=why,
+        advice="write a sound project 1 and save it; nothing was sent",
+        node=node.node,
+    )
+
+
+def _unseen(node: Node) -> VerificationFailed:
+    return VerificationFailed(
+        "what was edited for this motion cannot be read back, so nothing was moved",
+        expected="project 1 as it is wanted for the motion",
+        cause="this controller shows what is stored while something else is being edited, or heeds no edit before it "
+        "is saved",
+        advice="write step 1 of project 1, save it, and run_once(); or say expert=True",
+        node=node.node,
+    )

@@ -1,0 +1,117 @@
+"""Everything a controller has stored, taken out and put back.
+
+Each project is read until two dumps agree, for a copy that nobody can check later must be right when it is made. What
+is put back is equal in all that has a name: bytes that the manual does not name cannot be written, and are told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+from motorbus.core.operation import Alone, Operation, Pause, Progress, Report
+from motorbus.errors import RequestError
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.costs import Taken, taken
+from motorbus.families.stepper.driver.editing import FLAGS, changes, differs, read_back
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.selecting import cleared, is_blank
+from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
+from motorbus.families.stepper.program.backups import Backup
+from motorbus.families.stepper.table import PROJECTS, Project, decode_image, refusals
+
+ALL: Final = tuple(range(1, PROJECTS + 1))
+
+
+def backup(node: Node, projects: Iterable[int] = ALL) -> Operation[Backup]:
+    """Read these projects, each until two dumps agree; about 0.5 s for each. Only reads.
+
+    Edits of the selected project that were not saved are read in place of what is stored of it, or so it is assumed.
+    Reports `Progress`. Raises RequestError for a number that is none, and as `dump`.
+    """
+    numbers = _numbers(projects)
+    return (yield from Alone(_read(node, numbers)))
+
+
+def _read(node: Node, numbers: tuple[int, ...]) -> Operation[Backup]:
+    dumps = {}
+    for done, number in enumerate(numbers):
+        yield from Report(Progress(done, len(numbers), f"reading project {number}"))
+        dumps[number] = wire.encode_dump(number, (yield from taken(node, number)).image)
+    yield from Report(Progress(len(numbers), len(numbers), "reading projects"))
+    return Backup(dumps=dumps, order=node.order)
+
+
+def restore(
+    node: Node, backup: Backup, projects: Iterable[int] | None = None
+) -> Operation[tuple[Written, ...]]:
+    """Put projects of a backup back, all that are in it when none are said: written, saved and read back, each in turn.
+
+    As `write_project`, but rows behind the last step are put back too, and nothing is asked of lint: it was there
+    before. What was cleared is cleared, project 1 as well. `Written.reserved` are the bytes that cannot be written and
+    differ. Reports `Planned` and `Progress`. Raises RequestError, before anything is sent, for what no project can
+    hold; as `write_project` and `clear` else, with a note that says which projects are restored; VerificationFailed
+    also when stop mode, mode 4 or homing at power-on differ among them and this controller has one of each for all.
+    """
+    numbers = _numbers(backup.projects if projects is None else projects)
+    meant = {number: replace(backup.project(number), number=number) for number in numbers}
+    for project in meant.values():
+        for error in () if project.is_cleared else refusals(project, expert=True):
+            raise RequestError(
+                f"project {project.number} of this backup cannot be written: {error.summary}",
+                expected=error.expected,
+                advice="restore the others; nothing was sent",
+            )
+    return (yield from Alone(_restored(node, backup, meant)))
+
+
+def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> Operation[tuple[Written, ...]]:
+    done: list[Written] = []
+    try:
+        for number, project in meant.items():
+            began = yield from Pause(0)
+            found = yield from taken(node, number)
+            image = backup.image(number)
+            if project.is_cleared:
+                done.append((yield from _emptied(node, found, number, image, began)))
+            else:
+                done.append((yield from written(node, found, project, image, save=True, began=began)))
+        yield from _still_so(node, meant)
+    except BaseException as error:
+        told = ", ".join(str(one.project) for one in done) or "none"
+        error.add_note(f"of the projects {', '.join(map(str, meant))} these were restored: {told}")
+        raise
+    return tuple(done)
+
+
+def _emptied(node: Node, found: Taken, number: int, image: bytes, began: float) -> Operation[Written]:
+    before = decode_image(found.image, node.order)
+    commands, dumps, proof = 0, 0, Proof.UNCHANGED
+    if not is_blank(before):
+        commands, dumps = yield from cleared(node, number)
+        proof = Proof.CLEARED
+    ended = yield from Pause(0)
+    return Written(
+        number, tuple(changes(before, Project())) if commands else (), commands, found.dumps + dumps, ended - began,
+        bool(commands), proof, unwritable(found.image, image),
+    )  # fmt: skip
+
+
+def _still_so(node: Node, meant: dict[int, Project]) -> Operation[None]:
+    """Flags that belong to the device are those of the project that was written last."""
+    written_ones = [project for project in meant.values() if not project.is_cleared]
+    if len({tuple(getattr(project, name) for name in FLAGS) for project in written_ones}) < 2:
+        return
+    for project in written_ones:
+        image, _ = yield from read_back(node, project)
+        if decode_image(image, node.order) != project:
+            raise differs(
+                node, image, project, f"project {project.number} was restored and has changed with the others",
+                "this controller has one stop mode, mode 4 and homing at power-on for all projects: say which is meant",
+            )  # fmt: skip
+
+
+def _numbers(projects: Iterable[int]) -> tuple[int, ...]:
+    """These projects, each once, in the order they are said in. Raises RequestError for a number that is none."""
+    return tuple(dict.fromkeys(checked_project(number) for number in projects))

@@ -1,0 +1,114 @@
+"""Homing that ends: the controller's own turns in reverse until input 5 is active, and for ever when that never comes.
+
+It has no limit of travel, no limit of time and no notice of its end. So this host looks at input 5 before, and does not
+begin when it is active; watches it meanwhile; and says stop when it is active, when the deadline has passed, when it
+cannot be read, when the order was not acknowledged, and whatever else happens. A host that dies leaves it homing.
+
+That the controller counts from 0 where it has met the switch, and that it stops there at once, are assumptions.
+"""
+
+from __future__ import annotations
+
+from math import tau
+from typing import Final, NamedTuple
+
+from motorbus.core.operation import Operation, Pause, Progress, Report
+from motorbus.errors import NotHomed
+from motorbus.families.stepper.driver import commands, goals
+from motorbus.families.stepper.driver.borrowing import borrowed
+from motorbus.families.stepper.driver.jogging import grounded, paced, whole_rpm
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.reading import read_input
+from motorbus.families.stepper.driver.stopping import Promise
+from motorbus.families.stepper.driver.turning import Watch, finite, refuse_unless_turning, within
+from motorbus.families.stepper.table import HOME_INPUT, Project
+
+DEADLINE: Final = 30.0
+"""s until homing is given up, when nobody says another time."""
+LONGEST: Final = 600.0
+"""s that anybody may say."""
+READS: Final = 2
+"""How often in a row input 5 must read active to be believed."""
+TOLD: Final = 0.25
+"""s between two reports of progress."""
+
+
+class Homed(NamedTuple):
+    """Input 5 was seen active twice in a row, after so many `seconds` in reverse at this `velocity` (rad/s), and the stop
+    was accepted."""
+
+    node: int
+    seconds: float
+    velocity: float
+    promise: Promise
+
+    def __str__(self) -> str:
+        found = f"input {HOME_INPUT} was active after {self.seconds:.1f} s in reverse at {self.velocity:.4g} rad/s"
+        return f"{found}; {self.promise.value}"
+
+
+def home(
+    node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, expert: bool = False
+) -> Operation[Homed]:
+    """Turn in reverse until input 5 is active, at most for so long (s, up to 600), then stop: always.
+
+    The speed is that of step 1 of project 1; with a `velocity` (rad/s, above 0, in whole RPM) project 1 is borrowed for
+    it as for `move_by`. Reports `Progress` in ms.
+
+    Raises NotHomed, with the stop accepted, when input 5 is active before (nothing was moved: it stands at the switch,
+    or the switch is stuck) or not active by the deadline; RequestError, before anything is moved, when there is no
+    speed, and as `borrowed`; OutcomeUnknown when the order, or the stop, was not acknowledged: where the stop was not,
+    the motor may be turning, and the error says so; whatever reading an input raises.
+    """
+    within(deadline, LONGEST, "deadline")
+    rpm = None if velocity is None else whole_rpm(finite(velocity, "velocity"))
+    watch = Watch(node)
+
+    def wanted(project: Project) -> Operation[Project]:
+        yield from _refuse_active(node)
+        if rpm is None:
+            refuse_unless_turning(node, project, "home")
+            return project
+        return paced((yield from grounded(node, project, "home", rpm)), rpm, None)
+
+    def motion(project: Project) -> Operation[Homed]:
+        return (yield from _until_active(node, project, deadline, watch))
+
+    return (yield from borrowed(node, "home", wanted, motion, expert=expert))
+
+
+def _refuse_active(node: Node) -> Operation[None]:
+    """Raise NotHomed unless input 5 reads inactive each time."""
+    for _ in range(READS):
+        if (yield from read_input(node, HOME_INPUT)):
+            raise NotHomed(
+                f"input {HOME_INPUT} is active already, so homing is refused",
+                expected="not active",
+                cause="it stands at the home switch, the switch is stuck or wired to be active at rest, or its contact "
+                "is bad",
+                advice="move away from the switch first, forward; nothing was moved",
+                node=node.node,
+            )
+
+
+def _until_active(node: Node, project: Project, deadline: float, watch: Watch) -> Operation[Homed]:
+    yield from commands.motion(node, "home", goals.of_jog(node, project, -1), watch.refusal)
+    began = now = told = yield from Pause(0)
+    row = 0
+    while now - began < deadline:
+        row = row + 1 if (yield from read_input(node, HOME_INPUT)) else 0
+        watch.check()
+        now = yield from Pause(0)
+        if row >= READS:
+            velocity = project.step(1).speed * tau / 60
+            return Homed(node.node, now - began, velocity, Promise.STOP_ACCEPTED)
+        if now - told >= TOLD:
+            told = now
+            yield from Report(Progress(round(1000 * (now - began)), round(1000 * deadline), "homing"))
+    raise NotHomed(
+        f"input {HOME_INPUT} was not active within {deadline:g} s, so homing was stopped",
+        expected=f"input {HOME_INPUT} active",
+        cause="the switch is farther away, its wire is broken, or the motor does not turn",
+        advice=f"see input {HOME_INPUT} change by hand, then home again, with a longer deadline if it is far",
+        node=node.node,
+    )

@@ -1,0 +1,141 @@
+"""One experiment carried out: what is edited for it, what is said, and at which moments answers and notices came.
+
+All times are those of the host's link. The controller begins when it has heard the start; how much later that is
+answered is the same each time, and comes out of runs whose time is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.operation import (
+    Answer,
+    Exchange,
+    Goal,
+    Listen,
+    Notice,
+    Operation,
+    Pause,
+    Rank,
+    Step,
+    Together,
+    outcome,
+)
+from motorbus.errors import Interrupted, MotorbusError
+from motorbus.families.stepper.driver import goals
+from motorbus.families.stepper.driver.commands import nothing
+from motorbus.families.stepper.driver.exchanges import command
+from motorbus.families.stepper.driver.experiments import Act
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.stopping import stop
+from motorbus.families.stepper.table import Edit, Project, edits
+
+FLAGS: Final = ("set_stop_mode", "set_mode4", "set_power_on_home")
+"""What may belong to the device and not to a project, so no experiment touches it unasked."""
+
+
+class Heard(NamedTuple):
+    """What came: when each command was sent, when it was answered (None: it was not), and when notices came (s)."""
+
+    sent: tuple[float, ...]
+    answered: tuple[float | None, ...]
+    notices: tuple[float, ...]
+
+
+def write(node: Node, project: Project, *, leave: str = "") -> Operation[None]:
+    """Edit every field that carrying out this project heeds, but none that may be the device's; nothing is saved.
+
+    Which numbers were there before does not matter then. `leave` names a command that is left out.
+    """
+    for edit in edits(project):
+        if edit.command not in FLAGS and edit.command != leave:
+            yield from told(node, edit)
+
+
+def told(node: Node, edit: Edit) -> Exchange[None]:
+    """One command that sets parameters."""
+    values: dict[str, Any] = dict(edit.values)
+    return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, **values)
+
+
+def listened(
+    node: Node, project: Project, acts: Sequence[Act], seconds: float, wanted: int = 1
+) -> Operation[Heard]:
+    """Say these commands at their moments, and listen until so many notices have come, for `seconds` at most.
+
+    What is not answered is no error here. In the end everything is stopped. Raises Interrupted when somebody else has
+    stopped it meanwhile, OutcomeUnknown when no stop is accepted.
+    """
+    notices: list[float] = []
+    stops = node.memory.stops
+
+    def heard(notice: Notice) -> bool:
+        notices.append(notice.at)
+        return len(notices) >= wanted
+
+    node.memory.owed = True
+    said, _ = yield from Together[Any]([_said(node, project, acts), _listening(heard, seconds)])
+    if node.memory.stops != stops:
+        raise Interrupted(
+            "somebody stopped the controller during an experiment", advice="characterise it again when it is free"
+        )
+    yield from stop(node)
+    sent, answered = said
+    return Heard(sent, answered, tuple(notices))
+
+
+def _listening(heard: Any, seconds: float) -> Operation[Notice | None]:
+    return (yield from Listen(heard, seconds))
+
+
+def _said(
+    node: Node, project: Project, acts: Sequence[Act]
+) -> Generator[Step, Any, tuple[tuple[float, ...], tuple[float | None, ...]]]:
+    began = now = yield from Pause(0.0)
+    sent: list[float] = []
+    answered: list[float | None] = []
+    for act in acts:
+        if (rest := began + act.at - now) > 0:
+            yield from Pause(rest)
+        now = yield from Pause(0.0)
+        sent.append(now)
+        came = yield from outcome(timed(order(node, project, act.command)))
+        answered.append(None if isinstance(came, MotorbusError) else came)
+        if answered[0] is None:
+            break
+    return tuple(sent), tuple(answered)
+
+
+def order(node: Node, project: Project, name: str) -> Exchange[None]:
+    """The exchange for one command of an experiment, with the goals of what it moves."""
+    if name == "start_project":
+        far = goals.of_project(node, project) if project.total_steps else (_nowhere(node),)
+        return command(node, name, nothing, rank=Rank.CONTROL, goals=far, project=project.number)
+    if name == "run_once":
+        return command(node, name, nothing, rank=Rank.CONTROL, goals=goals.of_move(node, project))
+    return command(node, name, nothing, rank=Rank.STOP)
+
+
+def _nowhere(node: Node) -> Goal:
+    return Goal(node.node, "relative", 0.0, -float("inf"), float("inf"))
+
+
+def timed(exchange: Exchange[Any]) -> Exchange[float]:
+    """The same exchange, whose value is when its answer came (s)."""
+
+    def read(answer: Answer) -> float:
+        if exchange.read is not None:
+            exchange.read(answer)
+        return answer.at
+
+    return Exchange(
+        exchange.request,
+        exchange.replies,
+        read,
+        rank=exchange.rank,
+        effect=exchange.effect,
+        goals=exchange.goals,
+        timeout=exchange.timeout,
+        repeatable=exchange.repeatable,
+    )

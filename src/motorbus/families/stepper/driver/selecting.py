@@ -1,0 +1,160 @@
+"""Selecting, saving and clearing a project by itself: three short commands, each of which does more than it says.
+
+Selecting carries the number of steps and sets it. Saving stores whatever is being edited, under any number, so the
+wrong project in the right place if it is not the one that is selected. Clearing project 1 takes the speed of jog,
+single move and homing with it. So each reads the project first, and again when it is done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from motorbus.core.operation import Alone, Operation, Pause, outcome
+from motorbus.errors import OutcomeUnknown, RequestError, WireError
+from motorbus.families.stepper.driver import commands
+from motorbus.families.stepper.driver.costs import taken
+from motorbus.families.stepper.driver.editing import differs, noted, read_back, read_until, selected
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
+from motorbus.families.stepper.table import Project, decode_image
+
+JOGS: Final = 1
+"""The project whose step 1 says how manual motion goes."""
+
+
+def select(node: Node, project: int) -> Operation[int]:
+    """Select a project, 1 to 4, without changing it; gives how many steps it has.
+
+    It is read before, for the command says how many steps there are, and read after. Edits that were not saved are
+    lost. Raises RequestError for one that has been cleared, which has none to say; VerificationFailed when it does not
+    read as before: then this controller goes on editing another project's numbers under this number.
+    """
+    checked_project(project)
+    return (yield from Alone(_selected(node, project)))
+
+
+def _selected(node: Node, project: int) -> Operation[int]:
+    held = decode_image((yield from taken(node, project)).image, node.order)
+    if held.is_cleared:
+        raise RequestError(
+            f"project {project} has been cleared: selecting it would give it a step",
+            expected="a project with steps",
+            advice="write it; nothing was changed",
+            node=node.node,
+        )
+    before = replace(held, number=project)
+    yield from selected(node, before)
+    image, _ = yield from read_back(node, before)
+    if decode_image(image, node.order) != before:
+        raise differs(
+            node, image, before, f"project {project} was selected and does not read as before",
+            "save nothing now; write_project writes whole projects on such a controller, and a power cycle brings back "
+            "what is stored",
+        )  # fmt: skip
+    return before.total_steps
+
+
+def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written]:
+    """Save what this host has edited of a project, 1 to 4, and not saved, as `write_project` saves what it writes.
+
+    What is not there any more, because the controller has lost its supply, is written again first. It is refused when
+    this host left nothing of this project unsaved: whatever else is being edited would be stored in its place. An
+    `expert` may do that; then all that can be verified is that it reads as before, and an acknowledgement that is lost
+    is not asked for again.
+    Raises RequestError, and as `write_project`.
+    """
+    number = checked_project(project)
+    meant = node.memory.unsaved
+    if meant is not None and meant.number == number:
+        return (yield from Alone(_kept(node, meant)))
+    if expert:
+        return (yield from Alone(_saved_as_is(node, number)))
+    raise RequestError(
+        f"nothing of project {number} was edited on this bus and left unsaved",
+        expected="edits of this host: saving stores whatever is being edited, also another project",
+        advice="write_project saves what it writes; expert saves all the same; nothing was sent",
+        node=node.node,
+    )
+
+
+def _kept(node: Node, meant: Project) -> Operation[Written]:
+    began = yield from Pause(0)
+    found = yield from taken(node, meant.number)
+    return (yield from written(node, found, meant, found.image, save=True, began=began))
+
+
+def _saved_as_is(node: Node, project: int) -> Operation[Written]:
+    began = yield from Pause(0)
+    found = yield from taken(node, project)
+    before = replace(decode_image(found.image, node.order), number=project)
+    note = f"project {project} was being saved: what it holds is not known; read it"
+    yield from noted(commands.save_project(node, project), note)
+    image, dumps = yield from noted(read_back(node, before), note)
+    if decode_image(image, node.order) != before:
+        raise differs(
+            node, image, before, f"project {project} was saved and does not read as before",
+            "another project was being edited, or this controller shows what is stored; write it if it is not as meant",
+        )  # fmt: skip
+    ended = yield from Pause(0)
+    spent = found.dumps + dumps
+    return Written(project, (), 1, spent, ended - began, True, Proof.ACKNOWLEDGED, unwritable(image, b""))
+
+
+def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]:
+    """Set all of a project, 1 to 4, to zero, stored and edited; gives the 220 bytes it had, which `Program` reads.
+
+    Nothing is sent when it reads as cleared already. Project 1 is refused but to an `expert`: jog, single move and
+    homing go by its step 1, and without it have no speed. Verified by reading it: zero in all that has a name, but for
+    stop mode, mode 4 and homing at power-on, where these belong to the device. Saying it twice does no more than once,
+    whichever project is selected, so an acknowledgement that is lost is asked for again.
+    Raises RequestError for project 1; VerificationFailed when it does not read as cleared; OutcomeUnknown when it was
+    not acknowledged in two tries.
+    """
+    number = checked_project(project)
+    if number == JOGS and not expert:
+        raise RequestError(
+            f"project {number} is not cleared: jog, single move and homing take their speed from its step 1",
+            expected="project 2, 3 or 4",
+            advice="expert clears it all the same; nothing was sent",
+            node=node.node,
+        )
+    return (yield from Alone(_emptied(node, number)))
+
+
+def _emptied(node: Node, project: int) -> Operation[bytes]:
+    found = yield from taken(node, project)
+    if not is_blank(decode_image(found.image, node.order)):
+        yield from cleared(node, project)
+    return found.image
+
+
+def cleared(node: Node, project: int) -> Operation[tuple[int, int]]:
+    """Clear a project and read it; gives how many commands and dumps that took. Call it inside `Alone`."""
+    note = f"project {project} was being cleared: it may hold what it held, or nothing"
+    tries = yield from noted(_until_cleared(node, project), note)
+    image, dumps = yield from noted(read_until(node, project, is_blank), note)
+    shown = decode_image(image, node.order)
+    if not is_blank(shown):
+        raise differs(
+            node, image, Project(), f"project {project} was cleared and does not read as cleared",
+            "what was read is what the controller shows now; clear it again",
+        )  # fmt: skip
+    if node.memory.unsaved is not None and node.memory.unsaved.number == project:
+        node.memory.unsaved = None
+    return tries, dumps
+
+
+def _until_cleared(node: Node, project: int) -> Operation[int]:
+    told = yield from outcome(commands.clear_project(node, project))
+    if told is None:
+        return 1
+    if not isinstance(told, OutcomeUnknown | WireError):
+        raise told
+    yield from commands.clear_project(node, project)
+    return 2
+
+
+def is_blank(project: Project) -> bool:
+    """Whether nothing is left of it; its number may be, and what may belong to the device."""
+    return replace(project, number=0, stop_mode=0, mode4=0, power_on_home=0) == Project()

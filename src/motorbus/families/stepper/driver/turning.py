@@ -1,0 +1,131 @@
+"""What every motion by hand has in common: when it may begin, how long it may take, and that a stop of others ends it.
+
+A controller tells nothing of a jog, a single move or a homing but that it has heard the order. So their time is
+reckoned, by the slowest of the readings of the acceleration, and while it passes this host watches for stops: one that
+was sent by anybody on this bus ends the wait, and none of these orders leaves after one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, isfinite
+from typing import Final
+
+from motorbus.core.operation import Operation, Pause, Progress, Report, Stops
+from motorbus.errors import Interrupted, MotorbusError, RequestError
+from motorbus.families.stepper import execution
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.execution import USUAL, Behaviour
+from motorbus.families.stepper.program.plan import READINGS
+from motorbus.families.stepper.table import Project
+
+LOOK: Final = 0.1
+"""s between two looks at whether somebody has stopped it."""
+CLOCK: Final = 1.02
+"""Its clock may be slower by so much, an assumption: a controller with a resonator is good for 0.5 %."""
+SPARE: Final = 0.05
+"""s added to every reckoned time."""
+
+
+class Watch:
+    """Whether anybody has told the motor to stop since this was made: another task, another face, an emergency."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node.node
+        self._memory = node.memory
+        self._before = node.memory.stops
+        self._stops: Stops | None = None
+        self._left = 0
+
+    def refusal(self, stops: Stops) -> MotorbusError | None:
+        """For the exchange that begins the motion: it must not leave after a stop."""
+        if self._memory.stops != self._before:
+            return _stopped("before it began", "the motor was not told to move")
+        self._stops, self._left = stops, stops(self._node)
+        return None
+
+    def check(self) -> None:
+        """Raise Interrupted when a stop has left since the motion was ordered."""
+        if self._stops is not None and self._stops(self._node) != self._left:
+            raise _stopped("by somebody else", "where the motor stands now is not known")
+
+
+def _stopped(when: str, state: str) -> Interrupted:
+    return Interrupted(
+        f"the motion was stopped {when}",
+        cause="a stop was sent on this bus, by another task or as an emergency",
+        advice=f"{state}; give the order again if it is still wanted",
+    )
+
+
+def waited(watch: Watch, seconds: float, what: str) -> Operation[None]:
+    """Let so much time (s) pass while something turns; reports `Progress` in ms, by the clock alone.
+
+    Raises Interrupted when somebody has stopped it.
+    """
+    began = yield from Pause(0)
+    now = began
+    while now - began < seconds:
+        yield from Report(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
+        now = yield from Pause(min(LOOK, began + seconds - now))
+        watch.check()
+
+
+def longest(project: Project, count: int | None) -> float:
+    """s that a move of so many pulses with the speed of step 1 may take, by the slowest reading of its ramp.
+
+    With a little more for a slow clock; infinity for a move without an end.
+    """
+    step = project.step(1)
+    readings: list[Behaviour] = [USUAL, *(replace(USUAL, **changes) for changes in READINGS.values())]
+    seconds = max(execution.move(project, step, count, how).duration for how in readings)
+    return seconds * CLOCK + SPARE if seconds < inf else inf
+
+
+def refuse_unless_idle(node: Node, verb: str) -> None:
+    """Raise RequestError while a project that was started on this bus may still run: it would be stopped half-way."""
+    if node.memory.owed:
+        raise RequestError(
+            f"a project that was started may still run, so {verb}() is refused",
+            expected="its notice, or an accepted stop",
+            cause="a controller that runs a project ignores the order, and the stop at its end would end the project",
+            advice="wait for the project, or stop(); nothing was sent",
+            node=node.node,
+        )
+
+
+def refuse_unless_turning(node: Node, project: Project, verb: str) -> None:
+    """Raise RequestError when step 1 of project 1 has no speed, or nothing says how far a turn is."""
+    if project.step(1).speed and not project.is_cleared and project.pulses_per_unit is not None:
+        return
+    what = "is cleared" if project.is_cleared else "has no speed in step 1, or no pulses for a turn"
+    raise RequestError(
+        f"project 1 {what}, so {verb}() has no speed",
+        expected="a speed in step 1 of project 1, from which jog, single move and homing take it",
+        advice="write project 1, or say a velocity; nothing was sent",
+        node=node.node,
+    )
+
+
+def within(seconds: float, most: float, what: str) -> float:
+    """A time that somebody has said (s). Raises RequestError when it is not above 0 and at most `most`."""
+    if _is_finite(seconds) and 0 < seconds <= most:
+        return seconds
+    raise RequestError(
+        f"{what}: {seconds!r} s is not possible",
+        expected=f"above 0, at most {most:g} s",
+        advice="nothing was sent",
+    )
+
+
+def finite(value: float, what: str) -> float:
+    """A number that somebody has said. Raises RequestError for one that is none, or not finite."""
+    if _is_finite(value):
+        return value
+    raise RequestError(
+        f"{what}: {value!r} is not a finite number", expected="a finite number", advice="nothing was sent"
+    )
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,358 @@
+"""A program put into a controller: only what differs, read back before it is saved and after, and no more claimed.
+
+The order is what makes it safe. The project is read until two dumps agree; what differs is sent, and read back as a
+whole; then it is saved, and read back again. A controller that lost its supply in between has another project
+selected, and saving would put that one's numbers into this slot: so the read-back comes right before the save, and the
+one behind it tells when even that was too late.
+
+Source of the commands: stepper controller serial protocol manual, items 1 to 12, 15, 16, 21, 25 and 26. That edits go
+to a copy which saving keeps is an assumption, see `editing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.entry import Entry, Value, shown
+from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
+from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
+from motorbus.families.stepper.driver import commands
+from motorbus.families.stepper.driver.costs import Cost, Taken, taken
+from motorbus.families.stepper.driver.editing import (
+    Change,
+    Readback,
+    brought,
+    changes,
+    differs,
+    edits_to,
+    noted,
+    read_back,
+)
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.program import Conditions, Program
+from motorbus.families.stepper.table import (
+    BASE_NAMES,
+    BLANK,
+    PROJECTS,
+    RESERVED,
+    STEPS,
+    Edit,
+    Project,
+    decode_image,
+    refusals,
+)
+
+AFTER: Final = 2
+"""Dumps behind the edits when all goes well: one before the save, one after it."""
+
+
+class Proof(Enum):
+    """What is known of a project when it has been written; the value says it, and says no more than that."""
+
+    STORED = (
+        "stored: the controller went on showing the old values until they were saved, so what it shows now is what it "
+        "has stored"
+    )
+    ACKNOWLEDGED = (
+        "what is being edited was read back as meant, and saving it was acknowledged; that it is stored is proved by a "
+        "power cycle only"
+    )
+    NOT_SAVED = (
+        "what is being edited was read back as meant; it was not saved, and a power cycle takes it away"
+    )
+    NOT_SEEN = (
+        "every command was acknowledged; this controller shows what is stored, so what is being edited cannot be read; "
+        "it was not saved, and a power cycle takes it away"
+    )
+    UNCHANGED = (
+        "it read like this already, so nothing was written; edits that somebody else made and did not save read the "
+        "same, and a power cycle takes those away"
+    )
+    CLEARED = (
+        "clearing was acknowledged, and the project reads as cleared; that it stays so is proved by a power cycle "
+        "only"
+    )
+
+
+class Difference(NamedTuple):
+    """What would be written, and what that takes.
+
+    `changes` are the parameters by name, step and both values; `edits` the commands for them, the one that selects the
+    project first; `reserved` the bytes of the image that no command writes and that are not as in the program, or not
+    0 when that was not read from a controller: by offset, what the controller has there. `cost` is that of writing it
+    as a whole, with the dumps before and after.
+    """
+
+    project: int
+    before: Project
+    after: Project
+    changes: tuple[Change, ...]
+    edits: tuple[Edit, ...]
+    reserved: Mapping[int, int]
+    cost: Cost
+
+    def __bool__(self) -> bool:
+        return bool(self.edits)
+
+    def __str__(self) -> str:
+        if not self:
+            return f"project {self.project}: nothing differs"
+        lines = [f"  {change}" for change in self.changes]
+        return "\n".join([f"project {self.project}: {self.cost}", *lines])
+
+
+class Planned(NamedTuple):
+    """An event: this is about to be written; its handler returns before the first command leaves."""
+
+    difference: Difference
+
+
+class Written(NamedTuple):
+    """What was written, and what is known of it.
+
+    `commands` that changed something and `dumps` that were read, `seconds` all of it took, `saved` whether it was
+    saved now, `proof` how far that is known, `reserved` as in `Difference`.
+    """
+
+    project: int
+    changes: tuple[Change, ...]
+    commands: int
+    dumps: int
+    seconds: float
+    saved: bool
+    proof: Proof
+    reserved: Mapping[int, int]
+
+    def __str__(self) -> str:
+        spent = Cost(self.commands, self.dumps, self.seconds)
+        return f"project {self.project}, {len(self.changes)} changed, {spent}: {self.proof.value}"
+
+
+class Kept(NamedTuple):
+    """What came of saving: the image that was read at last, what was spent, and what is known."""
+
+    image: bytes
+    commands: int
+    dumps: int
+    proof: Proof
+
+
+def difference(
+    node: Node, program: Program, project: int | None = None, *, save: bool = True
+) -> Operation[Difference]:
+    """What `write_project` would write, and its cost; only reads.
+
+    The cost is that of a controller that does as is assumed. One that shows what is stored, or keeps another project's
+    numbers when a project is selected, is found out while writing, and takes 78 commands more.
+    Raises RequestError as `write_project` does for what no project can hold, and as `dump`.
+    """
+    number, wanted = _wanted(program, project)
+    found = yield from Alone(taken(node, number))
+    return compared(node, found, _meant(node, found, wanted), program.raw, save=save)
+
+
+def write_project(
+    node: Node, program: Program, project: int | None = None, *, save: bool = True, expert: bool = False
+) -> Operation[Written]:
+    """Write a program into project 1 to 4, its own number when none is said, save it, and read it back.
+
+    Only what differs is sent, nothing when nothing does; rows behind its last step stay as they are. Unless it is to
+    `save`, a power cycle takes it away again. Edits of another project that were not saved are lost, for this selects
+    its own. While a project runs, what edits do to it is not known. `expert` writes what lint calls an error, never
+    what is out of range.
+
+    An acknowledgement of the save that is lost is not believed to be either: unless what is stored can be read, all of
+    it is written once more and saved once more, which does no harm, whereas saving alone would store another project
+    here if the controller had lost its supply.
+
+    Reports `Planned` before the first command, then `Progress`. Raises RequestError before anything is sent;
+    VerificationFailed, with what the controller holds, when it does not read as it is meant; OutcomeUnknown when a
+    command was never acknowledged. An error has a note that says what may be half written, and whether it was saved.
+    Writing it again mends whatever an error has left.
+    """
+    number, wanted = _wanted(program, project)
+    _linted(program, wanted, expert)
+    return (yield from Alone(_written(node, number, wanted, program.raw, save)))
+
+
+def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Operation[Written]:
+    """Write parameters of a project by name, in API units, as `write_project` does: `write(step_3_delay=0.5)`.
+
+    All are checked before anything is sent, each by itself; whether they make a good project is said by its lint, and
+    starting it asks for that. A project that has been cleared needs its `total_steps` too.
+    Raises RequestError for what is unknown, out of range or not written by name, and as `write_project`.
+    """
+    checked_project(project)
+    raws = {name: _raw(node, node.table[name], value) for name, value in values.items()}
+    return (yield from Alone(_amended(node, project, raws, save)))
+
+
+def written(
+    node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool, began: float
+) -> Operation[Written]:
+    """Bring a project that was just read to `meant` in all ten rows, and save it. Call it inside `Alone`."""
+    plan = compared(node, found, meant, raw, save=save)
+    edited = Readback(found.image, "working", 0, 0)
+    if plan:
+        yield from Report(Planned(plan))
+        edited = yield from brought(node, found.image, meant)
+    elif not (save and node.memory.unsaved == meant):
+        return (yield from _done(plan, edited, found.dumps, began, Proof.UNCHANGED))
+    if not save:
+        node.memory.unsaved = meant
+        proof = Proof.NOT_SEEN if edited.view == "stored" else Proof.NOT_SAVED
+        return (yield from _done(plan, edited, found.dumps, began, proof))
+    kept = yield from saved(node, meant, edited)
+    node.memory.unsaved = None
+    spent = Readback(kept.image, edited.view, edited.commands + kept.commands, edited.dumps + kept.dumps)
+    return (yield from _done(plan, spent, found.dumps, began, kept.proof, saved=True))
+
+
+def saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
+    """Save what has just been brought to be `meant`, and read it back. Raises as `write_project`."""
+    kept = yield from noted(
+        _saved(node, meant, edited),
+        f"project {meant.number} was being saved: it may hold the old values or the new ones; read it, and write it "
+        "again if it is not as meant",
+    )
+    if decode_image(kept.image, node.order) != meant:
+        raise differs(
+            node, kept.image, meant, f"project {meant.number} was saved and does not read as it was written",
+            "what was read is what the controller shows now; write the project again, which sends what differs",
+        )  # fmt: skip
+    return kept._replace(proof=Proof.STORED) if edited.view == "stored" else kept
+
+
+def _saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
+    told = yield from outcome(commands.save_project(node, meant.number))
+    if isinstance(told, MotorbusError) and not isinstance(told, OutcomeUnknown | WireError):
+        raise told
+    image, dumps = yield from read_back(node, meant)
+    as_meant = decode_image(image, node.order) == meant
+    if told is None or (as_meant and edited.view == "stored"):
+        return Kept(image, 1, dumps, Proof.ACKNOWLEDGED)
+    again = yield from brought(node, image, meant, every=True)
+    yield from commands.save_project(node, meant.number)
+    image, last = yield from read_back(node, meant)
+    return Kept(image, 2 + again.commands, dumps + again.dumps + last, Proof.ACKNOWLEDGED)
+
+
+def compared(node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool) -> Difference:
+    """How a project that was just read differs from `meant`."""
+    before = decode_image(found.image, node.order)
+    edits = tuple(edits_to(before, meant))
+    commands_ = len(edits) + (1 if save and edits else 0)
+    dumps = found.dumps + ((AFTER if save else AFTER - 1) if edits else 0)
+    return Difference(
+        meant.number,
+        before,
+        meant,
+        tuple(changes(before, meant)),
+        edits,
+        unwritable(found.image, raw),
+        found.tempo.cost(commands_, dumps, saves=1 if save and edits else 0),
+    )
+
+
+def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
+    """The bytes that no command writes and that are not as wanted, 0 where nothing is: offset -> what is there."""
+    other = wanted or BLANK
+    return {at: image[at] for run in RESERVED for at in run if image[at] != other[at]}
+
+
+def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -> Operation[Written]:
+    began = yield from Pause(0)
+    found = yield from taken(node, number)
+    return (yield from written(node, found, _meant(node, found, wanted), raw, save=save, began=began))
+
+
+def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Operation[Written]:
+    began = yield from Pause(0)
+    found = yield from taken(node, number)
+    before = decode_image(found.image, node.order)
+    if before.is_cleared and "total_steps" not in raws:
+        raise RequestError(
+            f"project {number} has been cleared, and a project needs steps",
+            expected="total_steps among the parameters, 1 to 10",
+            advice="nothing was written",
+            node=node.node,
+        )
+    meant = amended(replace(before, number=number), raws)
+    return (yield from written(node, found, meant, found.image, save=save, began=began))
+
+
+def amended(project: Project, raws: Mapping[str, int]) -> Project:
+    """The project with these rows different, by the names of the table."""
+    base: dict[str, Any] = {name: raw for name, raw in raws.items() if name in BASE_NAMES}
+    project = replace(project, **base)
+    for name, raw in raws.items():
+        if name not in BASE_NAMES:
+            _, number, field = name.split("_", 2)
+            project = project.with_step(int(number), **{field: raw})
+    return project
+
+
+def _done(
+    plan: Difference, spent: Readback, before: int, began: float, proof: Proof, *, saved: bool = False
+) -> Operation[Written]:
+    now = yield from Pause(0)
+    dumps = before + spent.dumps
+    return Written(
+        plan.project, plan.changes, spent.commands, dumps, now - began, saved, proof, plan.reserved
+    )
+
+
+def _wanted(program: Program, project: int | None) -> tuple[int, Project]:
+    """The number and the numbers to write. Raises RequestError for what no project can hold."""
+    number = checked_project(program.project.number if project is None else project)
+    wanted = replace(program.project, number=number)
+    if wanted.is_cleared:
+        raise RequestError(
+            f"there is nothing to write into project {number}: the program has no steps",
+            expected=f"1 to {STEPS} steps",
+            advice="clear() makes a project empty; nothing was sent",
+        )
+    for error in refusals(wanted, expert=True):
+        raise error
+    return number, wanted
+
+
+def checked_project(number: object) -> int:
+    """The number of a project, 1 to 4. Raises RequestError for anything else."""
+    if isinstance(number, int) and not isinstance(number, bool) and 1 <= number <= PROJECTS:
+        return number
+    raise RequestError(
+        f"there is no project {shown(number)}", expected=f"1 to {PROJECTS}", advice="nothing was sent"
+    )
+
+
+def _linted(program: Program, wanted: Project, expert: bool) -> None:
+    judged = replace(program, project=wanted)
+    errors = [str(found) for found in judged.lint(Conditions()) if found.level == "error"]
+    if errors and not expert:
+        raise RequestError(
+            f"the program for project {wanted.number} would not do what it says: {errors[0]}",
+            expected=f"no errors of lint; it has {len(errors)}",
+            advice="see program.lint(); expert writes it all the same; nothing was sent",
+        )
+
+
+def _meant(node: Node, found: Taken, wanted: Project) -> Project:
+    """With the rows behind the last step as the controller has them."""
+    held = decode_image(found.image, node.order)
+    return replace(wanted, steps=wanted.steps[: wanted.total_steps] + held.steps[wanted.total_steps :])
+
+
+def _raw(node: Node, row: Entry, value: Value) -> int:
+    """The raw value to write. Raises RequestError when this may not be written by name."""
+    refusal = "" if row.writable else "it is set by selecting the project"
+    if row.protected:
+        refusal = "write a program that says it; see its note in the table for what it does"
+    if refusal:
+        raise RequestError(f"{row.name} is not written by name: {refusal}", advice="nothing was sent")
+    raw = node.raw(row, value)
+    row.encode(raw)  # raises when it is out of range
+    return raw

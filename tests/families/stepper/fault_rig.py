@@ -1,0 +1,259 @@
+"""A controller at the end of a line that lies, and an oracle that compares what is told with what it really did.
+
+What is asked is drawn by lot among everything a host asks of it. An acknowledgement is right when its request reached
+the controller unharmed during this very call and the controller is as that command leaves it; a value is right when it
+is the controller's own at that moment. Every call has to end by a moment that is worked out beforehand.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from random import Random
+from typing import Any
+
+from motorbus.bus.pump import Bus
+from motorbus.bus.turns import RETRIES
+from motorbus.core.operation import Exchange, Rank, Runnable
+from motorbus.errors import MotorbusError
+from motorbus.families.stepper import FAMILY, Controller, wire
+from motorbus.families.stepper.driver import commands, goals
+from motorbus.families.stepper.driver.reading import READINGS, dump, dump_once, read_input
+from motorbus.families.stepper.execution import Phase
+from motorbus.families.stepper.simulator import simulate
+from motorbus.families.stepper.table import BLANK, EDITS, ORDERS, PARAMETERS, decode_image
+from motorbus.link.base import Line
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+from tests.families.stepper.mischief import Mischief
+
+PORTS = (1, 2, 3, 4, 5)
+ACTIVE = (2, 5)
+STOPS = ("stop_project", "stop_motor")
+MOTIONS = ("jog_forward", "jog_reverse", "run_once", "home", "start_project")
+KEPT = ("save_project", "clear_project")
+UNMOVED = (Phase.IDLE, Phase.RAMPDOWN)
+
+
+class FalseWord(AssertionError):
+    """Something was told that is not so."""
+
+
+class Rig:
+    """One exchange after the other, each judged.
+
+    `right` and `failed` count what was told truly and what was said to have failed, by kind; `levels` are levels of an
+    input that a single reading had wrong, which nobody can see.
+    """
+
+    def __init__(self, line: Line, seed: int, *, pace: bool = True, **options: Any) -> None:
+        self.simulator = simulate((1,), **options)
+        self.line = line
+        self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
+        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate())
+        self.device = Controller(self.bus)
+        self.there = self.simulator.nodes[1]
+        self.random = Random(seed)
+        self.right: Counter[str] = Counter()
+        self.failed: Counter[str] = Counter()
+        self.levels = 0
+        self.longest = 0.0
+        self.errors: list[MotorbusError] = []
+        self._asked = 0
+        for port in ACTIVE:
+            self.there.set_input(port, True)
+        if isinstance(line, Mischief):
+            line.cut = self.there.power_cycle
+
+    def open(self) -> None:
+        """Find out about echo, as opening a bus does."""
+        test = FAMILY.echo_test()
+        self.bus.turns.expect_echo(test)
+        with suppress(MotorbusError):
+            self.bus.run(test)
+
+    # -- what is asked ------------------------------------------------------------------------------------------------
+
+    def anything(self) -> bool:
+        """One call drawn by lot. True when it succeeded."""
+        lot = self.random.random()
+        if lot < 0.25:
+            return self.input()
+        if lot < 0.32:
+            return self.dump()
+        if lot < 0.62:
+            return self.edit(self.random.choice(EDITS))
+        if lot < 0.78:
+            return self.output()
+        if lot < 0.88:
+            return self.stop()
+        return self.motion(self.random.choice(MOTIONS)) if lot < 0.96 else self.keep(self.random.choice(KEPT))
+
+    def input(self) -> bool:
+        """An input, read until two readings agree; a single reading has one bit that nothing vouches for."""
+        port = self.random.choice(PORTS)
+        seen: list[bool] = []
+
+        def agreed() -> Any:
+            while len(seen) < 2 or seen[-1] is not seen[-2]:
+                seen.append((yield from read_input(self.device, port)))
+            return seen[-1]
+
+        done = self._judged("input", agreed(), 4 * _longest(read_input(self.device, port)))
+        self.levels += sum(level is not self._level(port) for level in seen)
+        if done is not None and done is not self._level(port):
+            raise FalseWord(f"input {port} was told to be {done}")
+        return done is not None
+
+    def _level(self, port: int) -> bool:
+        return port in self.there.state.inputs
+
+    def dump(self) -> bool:
+        """A project, as the driver reads it."""
+        project = self.random.randrange(1, 5)
+        told = self._judged(
+            "dump", dump(self.device, project), READINGS * _longest(dump_once(self.device, 1))
+        )
+        if told is not None and told[wire.REPLY_LENGTH :] != self.there.store.image(project):
+            raise FalseWord(f"the dump of project {project} is not what it holds")
+        return told is not None
+
+    def edit(self, name: str) -> bool:
+        """One of the commands that set parameters, with numbers that are possible."""
+        values = self._numbers(name)
+        if not self._acknowledged(getattr(commands, name)(self.device, **values), name):
+            return False
+        project = decode_image(self.there.store.working)
+        step = project.step(values.get("step", 1))
+        for field, value in values.items():
+            holder = step if "step" in values else project
+            held = self.there.store.selected if field == "project" else getattr(holder, field, value)
+            if held != value:
+                raise FalseWord(f"{name}: {field} was acknowledged as {value} and is {held}")
+        return True
+
+    def _numbers(self, name: str) -> dict[str, int]:
+        values = {}
+        for place in ORDERS[name].command.places:
+            row = PARAMETERS[place.name]
+            likely = (
+                [raw for raw in row.choices if raw <= row.high] if place.name.endswith("_input") else None
+            )
+            values[place.name] = (
+                self.random.choice(likely) if likely else self.random.randint(row.low, row.high)
+            )
+        if "loop_first" in values:
+            values["loop_first"], values["loop_last"] = sorted(self.random.sample(range(1, 11), 2))
+        return values
+
+    def output(self) -> bool:
+        """Switch one, or all, or the LEDs."""
+        port, level = self.random.randrange(1, 6), self.random.randrange(2)
+        if not self._acknowledged(commands.set_output(self.device, port, level), "set_output"):
+            return False
+        state = self.there.state
+        told = (
+            [state.leds]
+            if port == 5
+            else [*self.there.outputs]
+            if port == 4
+            else [self.there.outputs[port - 1]]
+        )
+        if set(told) != {bool(level)}:
+            raise FalseWord(f"output {port} was acknowledged as {level} and is not")
+        return True
+
+    def stop(self) -> bool:
+        """One of the two commands that stop, or the verb with both."""
+        return self.stop_by(self.random.choice((*STOPS, "stop")))
+
+    def stop_by(self, name: str) -> bool:
+        """This one of them."""
+        if name == "stop":
+            done = self._judged(name, self.device_stop(), 12.0) is not None
+        else:
+            done = self._acknowledged(getattr(commands, name)(self.device), name)
+        state = self.there.state
+        if done and name != "stop_motor" and state.run is not None and state.phase not in UNMOVED:
+            raise FalseWord(f"{name} was acknowledged and project {state.run.project.number} goes on")
+        if done and name != "stop_project" and state.phase not in UNMOVED:
+            raise FalseWord(f"{name} was acknowledged and it is {state.phase.value}")
+        return done
+
+    def device_stop(self) -> Runnable[Any]:
+        """The verb, not yet begun."""
+        return type(self.device).stop.function(self.device)
+
+    def motion(self, name: str) -> bool:
+        """A command that moves the motor, from rest."""
+        project = decode_image(self.there.store.image(1))
+        there = goals.of_jog(self.device, project, 1)
+        if name == "start_project":
+            return self._acknowledged(commands.motion(self.device, name, there, project=1), name)
+        return self._acknowledged(commands.motion(self.device, name, there), name)
+
+    def keep(self, name: str) -> bool:
+        """Save or clear, which write what is kept."""
+        project = self.random.randrange(1, 5)
+        if not self._acknowledged(getattr(commands, name)(self.device, project), name):
+            return False
+        store = self.there.store
+        due = BLANK if name == "clear_project" else store.as_saved(project)
+        if store.stored[project] != due:
+            raise FalseWord(f"{name} of project {project} was acknowledged and not done")
+        return True
+
+    # -- how it is judged ---------------------------------------------------------------------------------------------
+
+    def _acknowledged(self, exchange: Exchange[None], name: str) -> bool:
+        """Whether it was acknowledged; FalseWord when it was and the controller has not heard it meanwhile."""
+        heard = self.line.heard if isinstance(self.line, Mischief) else None
+        before = len(heard) if heard is not None else 0
+        done = self._judged(name, _sent(exchange), _longest(exchange))
+        if done is not None and heard is not None and exchange.request not in heard[before:]:
+            raise FalseWord(f"{name} was acknowledged and never heard")
+        return done is not None
+
+    def _judged(self, kind: str, operation: Runnable[Any], at_most: float) -> Any:
+        """What it gives, None for an error; AssertionError when it takes longer than it may (s)."""
+        began = self.link.now()
+        value = None
+        try:
+            value = self.bus.run(operation)
+            self.right[kind] += 1
+        except MotorbusError as error:
+            self.failed[kind] += 1
+            self.errors.append(error)
+            del self.errors[:-20]
+        took = self.link.now() - began
+        self.longest = max(self.longest, took)
+        assert took <= at_most, f"{kind} took {took:.2f} s of {at_most:.2f}"
+        return value
+
+    @property
+    def calls(self) -> int:
+        """How many there were."""
+        return sum(self.right.values()) + sum(self.failed.values())
+
+    @property
+    def tried_again(self) -> int:
+        """How often the bus has had to say something twice, or to ask whom it may believe."""
+        return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
+
+
+def _sent(exchange: Exchange[None]) -> Any:
+    yield from exchange
+    return True
+
+
+def _longest(exchange: Exchange[Any]) -> float:
+    """s after which this exchange is over whatever the line does: each try with its quiet time and a probe."""
+    probe = FAMILY.probe(1, 0)
+    quiet = FAMILY.quiet_time(9600)
+    each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (exchange, probe)]
+    tries = 1 if exchange.rank is Rank.STOP else RETRIES + 2
+    return tries * (sum(each) + 2 * quiet) + quiet
+
+
+Call = Callable[[Rig], bool]

@@ -1,0 +1,196 @@
+"""A line that hands back what is sent: in full, its first six bytes, late, or from some moment on.
+
+Six bytes are a whole acknowledgement of 15 of the 27 commands. So these tests let the controller be deaf while the
+line echoes, and whatever is acknowledged then is forged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from motorbus.core.operation import Data
+from motorbus.errors import MotorbusError
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.table import ORDERS
+from motorbus.link.base import Delivery, Side
+from tests.families.stepper.fault_rig import MOTIONS, FalseWord, Rig
+from tests.families.stepper.mischief import BYTE, Mischief
+from tests.families.stepper.test_single_faults import ask
+
+OFF, FULL, SIX, LATE = "off", "full", "six", "late"
+
+
+class Echoing(Mischief):
+    """Echoes as `mode` says, in pieces of so many bytes, at the moments at which a wire of 9600 baud has them.
+
+    While `deaf` nothing reaches the controller. `pace` is whether the link takes its time and says so; else this line
+    does, and the bus cannot know it.
+    """
+
+    def __init__(self, mode: str, *, piece: int = 1, pace: bool = True, deaf: bool = False) -> None:
+        super().__init__(1, 0.02, "unheard", "lost")
+        self.share = 0.0
+        self.mode = mode
+        self.piece = piece
+        self.pace = pace
+        self.deaf = deaf
+        self.echoes = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        assert isinstance(data, bytes)
+        if sender is Side.DEVICE:
+            return super().carry(sender, data, at)
+        echo = self._echo(data, at)
+        self.echoes += bool(echo)
+        heard = at if self.pace else at + len(data) * BYTE
+        return echo + ([] if self.deaf else super().carry(sender, data, heard))
+
+    def _echo(self, data: bytes, at: float) -> list[Delivery]:
+        back = {OFF: b"", SIX: data[: wire.REPLY_LENGTH]}.get(self.mode, data)
+        begin = at - len(data) * BYTE if self.pace else at
+        if self.mode == LATE:
+            begin += self.random.uniform(0.01, 0.3)
+        pieces = range(0, len(back), self.piece)
+        ends = [min(start + self.piece, len(back)) for start in pieces]
+        return [
+            Delivery(begin + end * BYTE, Side.HOST, back[start:end])
+            for start, end in zip(pieces, ends, strict=True)
+        ]
+
+
+def rig_on(line: Echoing, *, opened: bool) -> Rig:
+    rig = Rig(line, 2, pace=line.pace)
+    if opened:
+        rig.open()
+    return rig
+
+
+@pytest.mark.parametrize("opened", [True, False])
+@pytest.mark.parametrize("pace", [True, False])
+@pytest.mark.parametrize("piece", [1, 4, 6, 11])
+def test_a_line_that_only_echoes_acknowledges_nothing(piece: int, pace: bool, opened: bool) -> None:
+    line = Echoing(FULL, piece=piece, pace=pace, deaf=True)
+    rig = rig_on(line, opened=opened)
+    for name in (*ORDERS, "stop_motor", "start_project"):
+        assert not ask(rig, name), f"{name} was acknowledged by its own echo"
+    assert rig.device.ping() is False
+    assert line.echoes > 27
+
+
+@pytest.mark.parametrize("pace", [True, False])
+@pytest.mark.parametrize("piece", [1, 4, 6, 11])
+def test_with_a_controller_behind_it_everything_is_right_at_its_first_try(piece: int, pace: bool) -> None:
+    rig = rig_on(Echoing(FULL, piece=piece, pace=pace), opened=True)
+    assert rig.bus.turns.echo.present is True
+    for name in ORDERS:
+        assert ask(rig, name), name
+    assert rig.tried_again == 0
+
+
+@pytest.mark.parametrize("pace", [True, False])
+@pytest.mark.parametrize("piece", [1, 4, 6, 11])
+def test_an_echo_that_nobody_has_tested_for_is_found_by_what_comes_of_it(piece: int, pace: bool) -> None:
+    rig = rig_on(Echoing(FULL, piece=piece, pace=pace), opened=False)
+    told = [ask(rig, name) for name in ORDERS]
+    assert rig.bus.turns.echo.present is True
+    assert all(told[-10:])
+
+
+@pytest.mark.parametrize("deaf", [True, False])
+@pytest.mark.parametrize("piece", [1, 11])
+def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learned(
+    piece: int, deaf: bool
+) -> None:
+    line = Echoing(OFF, piece=piece)
+    rig = rig_on(line, opened=True)
+    for line.mode in (FULL, OFF, FULL, OFF):
+        line.deaf = deaf
+        for name in ("stop_project", "save_project", "set_output", "stop_motor", "start_project"):
+            if ask(rig, name):
+                assert not deaf, f"{name} was acknowledged by its own echo"
+        line.deaf = False
+        assert rig.dump()
+        assert ask(rig, "stop_motor"), "learned"
+        assert rig.bus.turns.echo.present is (line.mode == FULL)
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("pace", [True, False])
+def test_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Callable[[int], int]) -> None:
+    """With requests that are not heard and replies that are lost; every acknowledgement is held against what was."""
+    total = rounds(100_000)
+    line = Echoing(OFF, pace=pace)
+    line.share = 0.05
+    rig = rig_on(line, opened=True)
+    for number in range(total):
+        if number % 23 == 0:
+            line.mode = line.random.choice((OFF, FULL, LATE, SIX) if pace else (OFF, FULL, LATE))
+            line.piece = line.random.choice((1, 11))
+        rig.anything()
+    print(
+        f"\n{rig.calls} calls, {line.echoes} requests echoed in full, late or in part, on and off; "
+        f"{line.count} requests or replies lost: 0 forged, {sum(rig.right.values()) / rig.calls:.2%} succeeded"
+    )
+    assert line.echoes > total / 2
+    assert line.count > total / 50
+
+
+def test_six_bytes_of_an_echo_come_too_soon_on_a_line_of_its_own_baud(rounds: Callable[[int], int]) -> None:
+    """A reply cannot be there before the request has left, so on a real serial port even this forges nothing."""
+    total = rounds(10_000) // 10
+    line = Echoing(SIX, deaf=True)
+    rig = rig_on(line, opened=True)
+    for _ in range(total):
+        assert not rig.anything()
+    print(f"\n{total} calls to nobody, six bytes of each request echoed at 9600 baud: 0 forged")
+    assert line.echoes > total
+
+
+def forged(rig: Rig, name: str) -> bool:
+    try:
+        return ask(rig, name)
+    except FalseWord:
+        return True
+
+
+def test_six_bytes_and_silence_are_the_known_limit_where_nobody_knows_the_rate() -> None:
+    """Behind a socket nothing tells such an echo from a reply. It acknowledges these commands, and no other."""
+    names = []
+    for name in ORDERS:
+        rig = rig_on(Echoing(SIX, piece=6, pace=False, deaf=True), opened=False)
+        if forged(rig, name):
+            names.append(name)
+    print(f"\nsix bytes echoed, without pace: {len(names)} of 27 commands are forged: {', '.join(names)}")
+    assert set(names) <= {name for name in ORDERS if _may_be_its_reply(name)}
+    assert "read_project" not in names
+
+
+def _may_be_its_reply(name: str) -> bool:
+    """Whether the reply may be the first six bytes of the request, for some numbers of it."""
+    zero = {place.name: 0 for place in ORDERS[name].command.places}
+    return wire.looks_like_echo(wire.encode(name, **{**zero, "project": 1} if "project" in zero else zero))
+
+
+@pytest.mark.parametrize("pace", [True, False])
+@pytest.mark.parametrize("piece", [1, 6])
+def test_with_nobody_behind_such_an_echo_nothing_that_reads_first_succeeds(piece: int, pace: bool) -> None:
+    rig = rig_on(Echoing(SIX, piece=piece, pace=pace, deaf=True), opened=True)
+    for verb in (
+        rig.device.ping,
+        rig.device.identify,
+        rig.device.dump,
+        rig.device.read_project,
+        rig.device.read,
+    ):
+        with pytest.raises(MotorbusError):
+            verb()
+    assert not rig.device.memory.proven
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_a_controller_behind_such_an_echo_that_was_tested_is_doubted_and_not_believed(name: str) -> None:
+    """Both come, the echo and the reply: more than was asked for."""
+    rig = rig_on(Echoing(SIX), opened=True)
+    assert not ask(rig, name)

@@ -1,0 +1,180 @@
+"""One byte of a reply changed, lost, doubled or too many, for each of the 27 commands: no wrong value, ever.
+
+And what is asked next is right at its first try. A level of an input is one bit that nothing vouches for, so it is
+read until two readings agree, as a dump is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+
+import pytest
+
+from motorbus.core.operation import Data
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.table import EDITS, ORDERS
+from motorbus.link.base import Delivery, Line, PerfectLine, Side
+from motorbus.simulation.faults import Fault, ScriptedLine
+from tests.families.stepper.fault_rig import KEPT, MOTIONS, STOPS, Rig
+from tests.families.stepper.mischief import BYTE
+
+EDGES = (0x00, 0x01, 0x02, 0x03, 0x08, 0x0D, 0x3E, 0x5E, 0x80, 0xAA, 0xDD, 0xEE, 0xFF)
+"""Values that mean something somewhere in a reply."""
+COMMANDS = tuple(ORDERS)
+UNNAMED = ("set_segment_loop", "set_project_loop")
+"""Their replies name a project that their requests do not: one that is none is an error, and not asked for again."""
+
+
+def ask(rig: Rig, name: str) -> bool:
+    """Say this command once, with numbers drawn by lot, and judge what is told."""
+    if name in EDITS:
+        return rig.edit(name)
+    if name in KEPT or name in MOTIONS:
+        return rig.keep(name) if name in KEPT else rig.motion(name)
+    if name in STOPS:
+        return rig.stop_by(name)
+    other: dict[str, Callable[[], bool]] = {
+        "read_project": rig.dump,
+        "read_input": rig.input,
+        "set_output": rig.output,
+    }
+    return other[name]()
+
+
+def length_of(name: str) -> int:
+    return wire.DUMP_LENGTH if name == "read_project" else wire.REPLY_LENGTH
+
+
+class Bytewise:
+    """Hands over what another line delivers to the host as a wire of 9600 baud does."""
+
+    def __init__(self, line: Line) -> None:
+        self.line = line
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        return [piece for delivery in self.line.carry(sender, data, at) for piece in self._pieces(delivery)]
+
+    def _pieces(self, delivery: Delivery) -> list[Delivery]:
+        if delivery.to is Side.DEVICE or not isinstance(delivery.data, bytes):
+            return [delivery]
+        data = delivery.data
+        return [Delivery(delivery.at + n * BYTE, delivery.to, data[n : n + 1]) for n in range(len(data))]
+
+
+def every_fault(length: int, values: Iterable[int], places: range | None = None) -> Iterator[Fault]:
+    places = range(length + 1) if places is None else places
+    for byte in places:
+        if byte < length:
+            yield Fault(1, byte, "drop")
+            yield Fault(1, byte, "duplicate")
+            yield from (Fault(1, byte, "corrupt", value=value) for value in values if value)
+        yield from (Fault(1, byte, "insert", value=value) for value in values)
+
+
+def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> tuple[int, int]:
+    """Every fault in turn; how many, and how many calls succeeded in spite of theirs."""
+    rig = Rig(PerfectLine(), 1, pace=False)
+    rig.open()
+    total = succeeded = 0
+    for fault in faults:
+        total += 1
+        line = ScriptedLine([fault])
+        rig.link.line = Bytewise(line) if bytewise else line
+        succeeded += ask(rig, name)
+        assert len(line.fired) == 1, f"{fault} did not happen"
+        rig.link.line = PerfectLine()
+        again = rig.tried_again
+        assert rig.stop_by("stop_project") if name in MOTIONS else rig.output()
+        assert rig.input()
+        assert rig.tried_again == again, f"{fault}: not right at the first try"
+    return total, succeeded
+
+
+@pytest.mark.parametrize("bytewise", [False, True])
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "read_project"])
+def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> None:
+    total, succeeded = suffer(name, every_fault(length_of(name), EDGES), bytewise=bytewise)
+    assert total == 6 * (2 + len(EDGES) - 1) + 7 * len(EDGES)
+    if ORDERS[name].repeatable and name not in STOPS:
+        assert succeeded >= total - (name in UNNAMED), "what may be said again gets over any single fault"
+    else:
+        assert 0 < succeeded < total, "a byte too many in front does no harm"
+
+
+@pytest.mark.parametrize(
+    ("name", "bytewise"), [("read_input", False), ("stop_motor", True), ("set_step_delay", False)]
+)
+def test_every_single_byte_fault(name: str, bytewise: bool) -> None:
+    total, _ = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
+    assert total == 6 * (2 + 255) + 7 * 256
+
+
+@pytest.mark.parametrize("bytewise", [False, True])
+def test_single_byte_faults_of_a_dump(bytewise: bool) -> None:
+    places = chain(range(30), range(30, 227, 13 if bytewise else 5), range(222, 227))
+    faults = (fault for at in places for fault in every_fault(226, (0x01, 0xEE, 0xFF), range(at, at + 1)))
+    total, succeeded = suffer("read_project", faults, bytewise=bytewise)
+    assert succeeded == total > 300
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("bytewise", [False, True])
+def test_every_single_byte_fault_of_every_command(bytewise: bool) -> None:
+    total = succeeded = 0
+    for name in COMMANDS:
+        if name != "read_project":
+            more, good = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
+            total, succeeded = total + more, succeeded + good
+    how = "byte by byte" if bytewise else "in one piece"
+    print(f"\n26 commands, {how}: {total} single-byte faults, 0 false, {succeeded / total:.2%} succeeded")
+    assert total == 26 * (6 * 257 + 7 * 256)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("part", range(4))
+def test_every_single_byte_fault_of_a_dump(part: int) -> None:
+    places = range(part * 57, min(227, (part + 1) * 57))
+    total, succeeded = suffer("read_project", every_fault(226, range(256), places))
+    print(
+        f"\ndump, bytes {places[0]} to {places[-1]}: {total} single-byte faults, 0 false, {succeeded} succeeded"
+    )
+    assert succeeded == total
+
+
+class Inserting(PerfectLine):
+    """Puts EE DD into the next thing that the device says, before this byte."""
+
+    def __init__(self, place: int) -> None:
+        self.place = place
+        self.done = False
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.DEVICE and isinstance(data, bytes) and not self.done:
+            self.done = True
+            data = data[: self.place] + wire.NOTICE + data[self.place :]
+        return super().carry(sender, data, at)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_notice_between_any_two_bytes_makes_no_value_and_no_acknowledgement(name: str) -> None:
+    rig = Rig(PerfectLine(), 1, pace=False)
+    rig.open()
+    whole = length_of(name)
+    for place in range(whole + 1):
+        rig.bus.run(rig.device_stop())
+        heard = rig.bus.notices.subscribe()
+        rig.link.line = line = Inserting(place)
+        done = ask(rig, name)
+        assert line.done
+        assert done or not ORDERS[name].repeatable or name in STOPS
+        assert done or 0 < place < whole, "before and behind a reply it is a notice like any other"
+        inside_a_dump = whole > wire.REPLY_LENGTH and 0 < place < whole
+        told = list(heard)
+        assert [one.data for one in told] in ([wire.NOTICE], []), "never more than there was"
+        assert not (inside_a_dump and place > 5 and told), "what is inside a dump is no notice"
+        rig.bus.notices.unsubscribe(heard)
+        rig.link.line = PerfectLine()
+        assert rig.input()
