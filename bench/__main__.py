@@ -6,10 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from bench import can_rounds, estimates, machine, report, responder, rounds, startup, syscalls
+from bench import can_rounds, estimates, machine, report, responder, rounds, startup, stepper_line, syscalls
 from bench.places import BUILD, ROOT
 from bench.rounds import CANDIDATES, Candidate
 from bench.workloads import WORKLOADS
+from motorbus.errors import MotorbusError
 
 DOCUMENT = ROOT / "docs" / "performance.md"
 
@@ -63,6 +64,7 @@ def measured(given: argparse.Namespace) -> report.Results:
         missing=missing + can_rounds.missing(),
         can=() if given.only or can_rounds.missing() else can_rounds.rounds(given.count, given.rounds, say),
         forecasts=() if given.only else estimates.costs(given.rounds, say),
+        stepper=() if given.only else stepper_line.samples(given.rounds, say),
     )
 
 
@@ -71,7 +73,7 @@ def main() -> int:
     given = parsed()
     try:
         results = measured(given)
-    except (responder.NoCompiler, rounds.Failed, OSError) as error:
+    except (responder.NoCompiler, rounds.Failed, stepper_line.Wrong, MotorbusError, OSError) as error:
         print(f"\n{error}", file=sys.stderr)
         return 1
     say("")

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from bench import can_report, estimates
+from bench import can_report, estimates, stepper_line
 from bench.figures import Spread, cost, ratio
 from bench.rounds import Sample
 from bench.startup import Cost
@@ -34,6 +34,7 @@ class Results(NamedTuple):
     missing: list[str]
     can: Sequence[Sample] = ()
     forecasts: Sequence[estimates.Cost] = ()
+    stepper: Sequence[stepper_line.Sample] = ()
 
 
 class Table(NamedTuple):
@@ -118,6 +119,11 @@ def forecast_table(results: Results) -> Table:
     return Table("Estimates", ("", "ms", "min – max"), estimates.rows(results.forecasts))
 
 
+def stepper_table(results: Results) -> Table:
+    """What jobs on a stepper controller take."""
+    return Table("Stepper, at 9600 baud", stepper_line.COLUMNS, stepper_line.rows(results.stepper))
+
+
 def tables(results: Results) -> list[Table]:
     """All of them, in reading order."""
     found = list(wire_tables(results))
@@ -129,6 +135,8 @@ def tables(results: Results) -> list[Table]:
         found.append(can_table(results))
     if results.forecasts:
         found.append(forecast_table(results))
+    if results.stepper:
+        found.append(stepper_table(results))
     return found
 
 
@@ -182,6 +190,7 @@ def as_json(results: Results) -> str:
         "can": [sample._asdict() for sample in results.can],
         "start_up": [{**start._asdict(), "seconds": start.seconds._asdict()} for start in results.starts],
         "estimates": [{**one._asdict(), "seconds": one.seconds._asdict()} for one in results.forecasts],
+        "stepper": [sample._asdict() for sample in results.stepper],
         "missing": results.missing,
     }
     return json.dumps(document, indent=1) + "\n"
@@ -219,7 +228,7 @@ can be measured so.
 Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
 {start}
-{forecasts}"""
+{forecasts}{stepper}"""
 
 _FORECASTS = """
 ## Estimates
@@ -246,6 +255,7 @@ def page(results: Results) -> str:
         can=can_report.TEXT + as_markdown(can_table(results)) + "\n\n" if results.can else "",
         start=as_markdown(start_table(results)),
         forecasts=_estimated(results),
+        stepper=_on_the_line(results),
     )
 
 
@@ -253,3 +263,18 @@ def _estimated(results: Results) -> str:
     if not results.forecasts:
         return ""
     return f"{_FORECASTS}{as_markdown(forecast_table(results))}\n\n{estimates.verdict(results.forecasts)}\n"
+
+
+_STEPPER = """
+## Stepper, at 9600 baud
+
+A simulated controller in a process of its own, on a pseudo-terminal on which bytes take their time. *Said beforehand*
+is the cost that motorbus shows before it writes, and of a backup the time of its bytes: each project is read twice.
+
+"""
+
+
+def _on_the_line(results: Results) -> str:
+    if not results.stepper:
+        return ""
+    return f"{_STEPPER}{as_markdown(stepper_table(results))}\n\n{stepper_line.verdict(results.stepper)}\n"

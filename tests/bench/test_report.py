@@ -9,6 +9,8 @@ from bench.figures import Spread
 from bench.report import Results, as_json, as_text, page, spoiled, tables, verdict
 from bench.rounds import Sample
 from bench.startup import Cost
+from bench.stepper_line import BACKUP
+from bench.stepper_line import Sample as Job
 from bench.workloads import WORKLOADS
 
 MACHINE = {"processor": "A processor", "cores": "2", "system": "Linux", "python": "CPython"}
@@ -53,6 +55,10 @@ def test_the_page_holds_every_table() -> None:
     told = page(RESULTS._replace(forecasts=[Estimated("ten steps", Spread(0.0012, 0.001, 0.06))]))
     assert "| ten steps | 1.20 | 1.00 – 60.00 |" in told
     assert "estimated in 1.20 ms. Less than 50 ms: reached." in told
+    assert "Stepper" not in text
+    jobs = page(RESULTS._replace(stepper=[Job(BACKUP, 2.0, 1.9, 1.9)]))
+    assert f"| {BACKUP} | 2.000 s |" in jobs
+    assert "5.0%. At most 15%: reached." in jobs
 
 
 def test_the_json_has_every_sample() -> None:

@@ -1,7 +1,8 @@
 """`motorbus demo`: the whole of it without hardware. Six simulated devices are found, identified and moved.
 
 The devices live in a process of their own on a pseudo-terminal, so that everything between here and them is as it
-would be with a cable. Bytes take their time on the wire, so the loop rate is one that a real bus could reach.
+would be with a cable. Bytes take their time on the wire, so the loop rate is one that a real bus could reach. Of a
+family whose devices no loop controls, its face shows what they do.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ Examples:
 
     motorbus demo
     motorbus demo --output demo.png --duration 4
+    motorbus demo --family stepper --output run.png
     motorbus demo --json""",
 )
 
@@ -69,6 +71,7 @@ def demo(
     output_: Annotated[Path, Parameter(name="--output")] = Path("demo.png"),
     ids: str = "1-6",
     duration: float = 6.0,
+    family: str = "",
     output: Annotated[Output, Parameter(parse=False)],
 ) -> Exit:
     """Find, identify and move six simulated devices, and draw what they did.
@@ -81,14 +84,23 @@ def demo(
         The ids of the simulated devices.
     duration
         Seconds of motion.
+    family
+        Of which family; of a stepper controller a project is written and run.
     """
     from motorbus import session
 
     if not 1.0 <= duration <= 60.0:
         raise RequestError(f"--duration {duration}: too short or too long", expected="1 to 60 seconds")
     nodes = session.parse_ids(ids)
-    family = next((name for name in faces.names() if faces.offer(name, "Train")), "")
+    family = family or next((name for name in faces.names() if faces.offer(name, "Train")), "")
     output.simulated = True
+    if (own := faces.offer(family, "demo")) is not None:
+        with _served(family, "1", output) as bus, opened(bus, {}, output) as opening:
+            own(opening, duration, output_, output)
+        return Exit.OK
+    if faces.offer(family, "Train") is None:
+        shown = [name for name in faces.names() if faces.offer(name, "Train") or faces.offer(name, "demo")]
+        raise RequestError(f"--family {family}: there is nothing to show", expected=", ".join(shown))
     with _served(family, ids, output) as bus, opened(bus, {}, output) as opening:
         found = _found(bus, opening, nodes, output)
         _introduce(opening, found, output)

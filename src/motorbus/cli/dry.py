@@ -10,17 +10,22 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from motorbus.cli import faces
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
 from motorbus.core.operation import (
     ANY,
     Alone,
+    Answer,
     CanFrame,
     Effect,
     Exchange,
+    Journal,
     Listen,
     Pause,
     Rank,
+    Reply,
+    Report,
     Together,
     Tune,
 )
@@ -28,10 +33,12 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Explanation
-    from motorbus.core.operation import Runnable
+    from motorbus.core.operation import Data, Runnable
 
 T = TypeVar("T")
 
@@ -78,6 +85,8 @@ class DryBus:
         self._gate = Gate()
         self._written: set[int] = set()
         self._waited = 0.0
+        self._read: dict[Data, Any] = {}
+        self._report: Callable[[object], None] | None = None
 
     def apart(self) -> DryBus:
         """The same bus for another device: what is withheld here and from it hides nothing of the other.
@@ -88,8 +97,12 @@ class DryBus:
         other.frames = self.frames
         return other
 
-    def run(self, operation: Runnable[T], report: object = None) -> T:
-        """Carry out an operation, reading only. Raises as the operation does, LimitExceeded of the gate included."""
+    def run(self, operation: Runnable[T], report: Callable[[object], None] | None = None) -> T:
+        """Carry out an operation, reading only. Raises as the operation does, LimitExceeded of the gate included.
+
+        `report` gets its events but for journal records: nothing is about to be changed.
+        """
+        self._report = report or self._report
         answer: Any = self._one(operation) if isinstance(operation, Exchange) else self._all(operation)
         return answer  # type: ignore[no-any-return]
 
@@ -123,11 +136,13 @@ class DryBus:
             return self.link.now() + self._waited
         if isinstance(step, Listen):
             self._waited += step.until
-        return None  # nobody has said anything; a report, another rate: nothing is sent
+        if isinstance(step, Report) and self._report is not None and not isinstance(step.event, Journal):
+            self._report(step.event)
+        return None  # nobody has said anything; another rate: nothing is sent
 
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
-            return _AsWritten() if self._follows(exchange) else self._bus.run(exchange)
+            return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
         self._gate(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
@@ -135,6 +150,22 @@ class DryBus:
         request = exchange.request
         self.frames.append(request.flat() if isinstance(request, CanFrame) else request)
         return None
+
+    def _told(self, exchange: Exchange[Any]) -> object:
+        answer = self._bus.run(exchange)
+        self._read[exchange.request] = answer
+        return answer
+
+    def _foreseen(self, exchange: Exchange[Any]) -> object:
+        """What it would read after what was withheld, where its family can say that."""
+        foresee = faces.offer(self.family.name, "as_written")
+        data = foresee(self.family, self._read, self.frames, exchange.request) if foresee else None
+        if data == b"":
+            return self._told(exchange)
+        if data is None or exchange.replies is ANY or exchange.read is None:
+            return _AsWritten()
+        reply = Reply(exchange.lane, exchange.replies[0].key, data)
+        return exchange.read(Answer((reply,), (), self.link.now() + self._waited))
 
     def _follows(self, exchange: Exchange[Any]) -> bool:
         """Does it ask somebody whom something was withheld from?"""

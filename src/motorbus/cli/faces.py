@@ -11,8 +11,10 @@ A family's face is the module (or package) of its name in this folder. Apart fro
     say(event)                                                 what an event of its operations says, "" if nothing
     sample(one)                                                what there is to watch of a device without telemetry:
                                                                words by name
-    demo(bus, seconds, picture, output)                        what a demonstration of these devices shows: draws the
-                                                               picture, and prints what came of it
+    demo(bus, seconds, picture, output)                        shows what these devices do in so many s, draws a picture
+                                                               of it, and prints what came of it
+    as_written(family, read, withheld, request)                the reply to a request after frames that a dry run has
+                                                               withheld, b"" if they make no difference; None: unknown
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
     bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
     CUT_OFF                                                    what to do about a change that was cut off, where no

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 app = App(
     name="home",
     usage="Usage: motorbus home BUS#ID [OPTIONS]",
-    help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the switch
-is not met before the deadline it is stopped, and the command ends with exit
-code 8. Ctrl-C stops it too.
+    help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the
+switch is not met before the deadline it is stopped, and the command ends with
+exit code 8. Ctrl-C stops it too.
 
 A stepper controller homes in reverse, with the speed of step 1 of its project
 1, until its input 5 is active. Is it active beforehand, then it stands on the
@@ -31,7 +31,8 @@ Examples:
 
     motorbus home stepper:/dev/ttyUSB0#1
     motorbus home stepper:/dev/ttyUSB0#1 --deadline 20s --velocity 30rpm --yes
-    motorbus home stepper:sim,home_switch=wired#1 --dry-run""",
+    motorbus home stepper:/dev/ttyUSB0#1 --dry-run
+    motorbus home stepper:sim,home_switch=wired#1 --yes""",
 )
 
 

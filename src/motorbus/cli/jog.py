@@ -18,9 +18,10 @@ from motorbus.errors import RequestError
 app = App(
     name="jog",
     usage="Usage: motorbus jog BUS#ID=VELOCITY --seconds SECONDS [OPTIONS]",
-    help_epilogue="""VELOCITY is in rad/s, or with a unit: 60rpm, 90deg/s; its sign is the direction.
-A way of more than 180 degrees needs --yes. It is stopped when the time is over,
-and also when this is interrupted; keep a switch in the supply within reach.
+    help_epilogue="""VELOCITY is in rad/s, or with a unit: 60rpm, 90deg/s; its sign is the
+direction. A way of more than 180 degrees needs --yes. It is stopped when the
+time is over, and also when this is interrupted; keep a switch in the supply
+within reach.
 
 A stepper controller jogs with the speed of step 1 of its project 1: that is
 borrowed and put back, nothing is saved, and `motorbus recover` puts it back

@@ -27,11 +27,11 @@ app = App(
     usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
     help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again. What no device tells has
-no column; of a stepper controller there are its inputs to watch, each asked for
-by itself. Where the line allows less than --rate, the rate that was reached is
-told at the end. --listen asks nobody: it prints what others say, such as
-position reports, and works where listen_only=yes lets nothing out; --count is
-of frames then.
+no column; of a stepper controller there are its inputs to watch, each asked
+for by itself. Where the line allows less than --rate, the rate that was
+reached is told at the end. --listen asks nobody: it prints what others say,
+such as position reports, and works where listen_only=yes lets nothing out;
+--count is of frames then.
 
 Examples:
 

@@ -162,7 +162,12 @@ def _moved_by(
         )
     devices, _, angle = texts[0].rpartition("=")
     bus, family, (node,) = device(devices[:-1])
-    offers(family, "move_by")
+    if not hasattr(family.devices.blocking, "move_by"):
+        raise RequestError(
+            f"{family.name} devices are not moved by an angle from where they stand",
+            expected=f"a position: {devices[:-1]}=POSITION",
+            advice="nothing was sent",
+        )
     way = units.parse(angle, "position") * (-1 if devices.endswith("-") else 1)
     question = f"move #{node} by {units.show(way, 'position')}" if abs(way) > FAR and not yes else ""
     how: dict[str, Any] = {**bounds, "wait": wait}

@@ -51,7 +51,7 @@ class Rig:
         self.simulator = simulate((1,), **options)
         self.line = line
         self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
-        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate())
+        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate(), report=lambda event: None)
         self.device = Controller(self.bus)
         self.there = self.simulator.nodes[1]
         self.random = Random(seed)

@@ -25,7 +25,9 @@ from motorbus.motion.safety import Gate
 T = TypeVar("T")
 
 MINE = with_steps(
-    Project(number=1, microsteps=8, step_angle=180, turn_distance=400, loop_first=1, loop_last=2, loop_count=3),
+    Project(
+        number=1, microsteps=8, step_angle=180, turn_distance=400, loop_first=1, loop_last=2, loop_count=3
+    ),
     (
         Step(distance=7, direction=1, start_frequency=60, acceleration=40, speed=90, delay=300, output=2),
         Step(distance=50, start_frequency=50, acceleration=30, speed=120),
@@ -80,11 +82,13 @@ class Line1:
         self.events: list[object] = []
         self.now = 0.0
         self.line: Line | None = None
+        self.settings: dict[str, Any] = {}
         self.sent: list[str] = []
         self.count = 0
         self.react: Callable[[object, Bus], None] = lambda event, bus: None
         if project is not None:
             self.simulated.put(1, project)
+        self.simulator.advance(0.0)  # the supply comes now
         self.before = self.simulated.store.image(1)
 
     @property
@@ -103,7 +107,7 @@ class Line1:
             self.events.append(event)
             self.react(event, bus)
 
-        bus = Bus(link, FAMILY.configured(), admit=Gate(), report=report, journal=record)
+        bus = Bus(link, FAMILY.configured(**self.settings), admit=Gate(), report=report, journal=record)
         trace = bus.trace.subscribe(limit=100_000)
         try:
             return work(Controller(bus))
@@ -111,7 +115,11 @@ class Line1:
             return error
         finally:
             self.count = link.count
-            self.sent = [one.data.hex(" ").upper() for one in trace if one.direction == "tx" and isinstance(one.data, bytes)]
+            self.sent = [
+                one.data.hex(" ").upper()
+                for one in trace
+                if one.direction == "tx" and isinstance(one.data, bytes)
+            ]
             self.now = link.now() + 0.1
             self.simulator.advance(self.now)
 

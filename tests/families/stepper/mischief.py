@@ -42,6 +42,7 @@ EVERYTHING = (*REQUESTS, *REPLIES, *NOTICES)
 
 class Mischief(PerfectLine):
     """Strikes with this probability, by one of these kinds; `fired` counts them, `last` is when one struck last.
+    `heard` are the requests, and `noticed` the moments of the notices, that came through unharmed.
 
     A reply that is `late` is so by at most `late_by` (s); a copy of one comes `copy_after` it (s), or as soon as the
     wire can carry it. `cut` takes the supply away for a moment, with the reply that is about to be said.
@@ -60,6 +61,7 @@ class Mischief(PerfectLine):
         self.fired: Counter[str] = Counter()
         self.last = float("-inf")
         self.heard: list[bytes] = []
+        self.noticed: list[float] = []
         self.cut: Callable[[], None] = lambda: None
         self._free = float("-inf")
 
@@ -77,7 +79,9 @@ class Mischief(PerfectLine):
         pieces = self._pieces(kind, data) if kind else [(0.0, data)]
         if kind == "cut":
             self.cut()
-        return [Delivery(self._moment(at + later), Side.HOST, piece) for later, piece in pieces if piece]
+        told = [Delivery(self._moment(at + later), Side.HOST, piece) for later, piece in pieces if piece]
+        self.noticed += [one.at for one in told if one.data == wire.NOTICE]
+        return told
 
     def _to_device(self, data: bytes, at: float) -> list[Delivery]:
         kind = self._kind(self.requests, at)

@@ -74,7 +74,9 @@ def test_what_was_not_accepted_is_said_again(times: int) -> None:
 def test_the_second_is_said_though_the_first_never_was_accepted() -> None:
     with bench(line=Losing("FF AA 5E")) as there:
         turning(there)
-        with pytest.raises(OutcomeUnknown, match="stop project was not accepted, said 5 times: the motor may be"):
+        with pytest.raises(
+            OutcomeUnknown, match="stop project was not accepted, said 5 times: the motor may be"
+        ):
             there.device.stop()
         assert there.sent() == [PROJECT] * 5 + [MOTOR]
         assert at_rest(there)

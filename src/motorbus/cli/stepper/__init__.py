@@ -7,6 +7,7 @@ use, see `motorbus.cli.faces`.
 from __future__ import annotations
 
 from motorbus.cli.stepper import (
+    characterise,
     convert,
     copies,
     inputs,
@@ -21,12 +22,17 @@ from motorbus.cli.stepper import (
 from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.offers import COMMANDS, sample
+from motorbus.cli.stepper.rehearsal import as_written
+from motorbus.cli.stepper.showing import demo
 
 __all__ = [
     "COMMANDS",
     "app",
+    "as_written",
+    "characterise",
     "convert",
     "copies",
+    "demo",
     "inputs",
     "manual",
     "moves",

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from motorbus.cli import dry
 from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Unforeseeable
+from motorbus.cli.output import Bar
 from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from motorbus.bus.pump import Bus
-    from motorbus.cli.output import Bar, Output
+    from motorbus.cli.output import Output
     from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
@@ -68,7 +69,7 @@ def carried_out(
     _refused_early(do)
     with opened(bus, options, output) as opening:
         if dry_run:
-            _shown(opening, rehearse or do, output)
+            _shown(opening, rehearse or do, output, hear)
             return None
         question = consent if isinstance(consent, str) else consent(opening)
         consent_to(question, output, yes=not question, rehearse=lambda: _rehearsed(opening, rehearse or do))
@@ -91,11 +92,18 @@ def _rehearsed(bus: Bus, do: Callable[[Controller], Runnable[object]]) -> dry.Dr
     return rehearsal
 
 
-def _shown(bus: Bus, do: Callable[[Controller], Runnable[object]], output: Output) -> None:
+def _shown(
+    bus: Bus,
+    do: Callable[[Controller], Runnable[object]],
+    output: Output,
+    hear: Callable[[object, Bar], None] | None,
+) -> None:
     """What would be sent, as far as that can be foreseen."""
     rehearsal = dry.DryBus(bus)
     try:
-        rehearsal.run(do(face(rehearsal, 1)))
+        rehearsal.run(
+            do(face(rehearsal, 1)), report=lambda event: hear(event, Bar()) if hear is not None else None
+        )
     except Unforeseeable as error:
         output.note(f"note: {error.summary}; what is shown is as far as it can be foreseen")
     dry.show(rehearsal, output)

@@ -17,17 +17,15 @@ from motorbus.cli.files import usable
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
 from motorbus.cli.stepper.files import LONGEST, app
-from motorbus.cli.stepper.writing import result, sent
+from motorbus.cli.stepper.writing import result
 from motorbus.cli.target import face
 from motorbus.errors import RequestError
-from motorbus.families.stepper.driver import Node, commands, writing
-from motorbus.families.stepper.driver.reading import read_project
+from motorbus.families.stepper.driver import writing
 from motorbus.families.stepper.program.backups import Backup
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Bar, Output
-    from motorbus.core.operation import Operation
 
 BackupFile = Annotated[Path, Parameter(name="FILE", help="The backup: TOML, with each dump as it came.")]
 Projects = Annotated[str, Parameter(help="Which projects, as 1,3 or 1-4; all when left out.")]
@@ -120,8 +118,7 @@ def restore(
         what="restoring",
         consent="" if yes else partial(_question, kept, numbers, output),
         dry_run=dry_run,
-        rehearse=partial(_sent, kept, numbers) if dry_run else None,
-        hear=partial(_planned, output, yes=yes),
+        hear=partial(_planned, output, yes=yes or dry_run),
     )
     if told is not None:
         output.document("motorbus.stepper.restore/1", {"projects": [result(one) for one in told]})
@@ -158,16 +155,6 @@ def _question(kept: Backup, numbers: tuple[int, ...], output: Output, bus: Bus) 
             output.text(str(differs))
         touched += [str(number)] if differs else []
     return f"write project {', '.join(touched)}" if touched else ""
-
-
-def _sent(kept: Backup, numbers: tuple[int, ...], one: Node) -> Operation[None]:
-    """All that would be sent, as if each read-back were right."""
-    for number in numbers:
-        if not kept.project(number).is_cleared:
-            found = yield from writing.difference(one, kept.program(number), number)
-            yield from sent(found, one, save=True)
-        elif not (yield from read_project(one, number)).project.is_cleared:
-            yield from commands.clear_project(one, number)
 
 
 def _planned(output: Output, event: object, bar: Bar, *, yes: bool) -> None:

@@ -47,10 +47,10 @@ _EDITS: Final = tuple(name for name in EDITS if name != "select_project")
 _STOPS: Final = ("stop_project", "stop_motor")
 _SELECTED: Final = """Plain numbers are those of the manual; some may have a unit: 500ms, 100rpm.
 
-It goes to the project that is selected, which nobody can ask; --project selects
-it first, keeping its number of steps, and that loads what is stored of it, or
-so it is assumed: what was set before and not saved is lost then. So select a
-project once (`select-project`), set what there is to set, read it
+It goes to the project that is selected, which nobody can ask; --project
+selects it first, keeping its number of steps, and that loads what is stored of
+it, or so it is assumed: what was set before and not saved is lost then. So
+select a project once (`select-project`), set what there is to set, read it
 (`read-project`), save it (`save-project`). `write` does all that, verified."""
 _BOTH: Final = "`motorbus stop` says both stops, each until it is accepted."
 _EXPLAINED: Final = """{note}{more}

@@ -15,6 +15,7 @@ from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.writing import result
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.driver import Node, commands, reading
+from motorbus.families.stepper.table import check
 
 if TYPE_CHECKING:
     from motorbus.core.operation import Exchange, Operation
@@ -102,7 +103,7 @@ def read_project(
     facts = {
         "project": project,
         "dump": plain(data),
-        "program": text,
+        "program": text or None,
         "file": str(output_) if output_ else None,
     }
     output.document("motorbus.stepper.read-project/1", facts)
@@ -112,6 +113,7 @@ def read_project(
 
 
 def _read(project: int, one: Node) -> Operation[tuple[bytes, str]]:
+    check("read_project", {"project": project})
     data = yield from reading.dump(one, project)
     program = Program.from_dump(data, name=f"project {project}", order=one.order)
     return data, "" if program.project.is_cleared else program.text()
@@ -120,15 +122,15 @@ def _read(project: int, one: Node) -> Operation[tuple[bytes, str]]:
 @app.command(
     usage="Usage: motorbus stepper save-project BUS --project PROJECT [OPTIONS]",
     help_epilogue="""Asks first: whatever is being edited is stored then, also if that is another
-project, and what was stored is gone. It is read before and after, and what that
-proves is said: only a power cycle shows for sure what is stored. `write` saves
-what it writes.
+project, and what was stored is gone. It is read before and after, and what
+that proves is said: only a power cycle shows for sure what is stored. `write`
+saves what it writes.
 
 Examples:
 
     motorbus stepper save-project stepper:/dev/ttyUSB0 --project 2
     motorbus stepper save-project stepper:sim --project 1 --yes
-    motorbus stepper save-project stepper:sim --project 1 --dry-run""",
+    motorbus stepper save-project stepper:/dev/ttyUSB0 --project 1 --dry-run""",
 )
 def save_project(
     bus: BusName,
@@ -151,7 +153,7 @@ def save_project(
     told = carried_out(
         bus, options, output, verb("save", project, expert=True), consent=question, dry_run=dry_run
     )
-    if not dry_run:
+    if told is not None:
         output.document("motorbus.stepper.save-project/1", result(told))
         output.text(str(told))
     return Exit.OK
@@ -167,7 +169,7 @@ Examples:
 
     motorbus stepper clear-project stepper:/dev/ttyUSB0 --project 4
     motorbus stepper clear-project stepper:sim --project 4 --yes
-    motorbus stepper clear-project stepper:sim --project 4 --dry-run""",
+    motorbus stepper clear-project stepper:sim --project 1 --expert --dry-run""",
 )
 def clear_project(
     bus: BusName,

@@ -49,7 +49,7 @@ more than 180 degrees needs --yes.
 Examples:
 
     motorbus stepper run stepper:/dev/ttyUSB0 --project 2
-    motorbus stepper run stepper:/dev/ttyUSB0 --project 2 --watch 1,2 --progress
+    motorbus stepper run stepper:COM7 --project 2 --watch 1,2 --progress
     motorbus stepper run stepper:/dev/ttyUSB0 --project 2 --timeout 5min --yes
     motorbus stepper run stepper:sim --project 1 --yes
     motorbus stepper run stepper:sim --project 1 --dry-run""",
@@ -105,7 +105,7 @@ def run(
         consent="" if yes else partial(_question, project, how),
         dry_run=dry_run,
         rehearse=verb("start_project", project, **chosen),
-        hear=partial(_heard, progress, output),
+        hear=partial(heard, progress, output),
     )
     if told is not None:
         _ended(project, told, output)
@@ -181,7 +181,8 @@ def _question(project: int, how: Behaviour, bus: Bus) -> str:
     )
 
 
-def _heard(told: bool, output: Output, event: object, bar: Bar) -> None:
+def heard(told: bool, output: Output, event: object, bar: Bar) -> None:
+    """Show where it should be, as a bar, and in words where these are to be told."""
     if isinstance(event, Estimated):
         bar.advance(event.fraction or 0.0, 1.0, _where(event))
         if told:

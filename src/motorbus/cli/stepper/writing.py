@@ -11,14 +11,11 @@ from motorbus.cli.plain import plain
 from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
 from motorbus.cli.stepper.files import DumpOrder, File, app, loaded
 from motorbus.cli.target import face
-from motorbus.core.operation import Rank
-from motorbus.families.stepper.driver import Node, commands, writing
-from motorbus.families.stepper.driver.exchanges import command
+from motorbus.families.stepper.driver import writing
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Bar, Output
-    from motorbus.core.operation import Operation
     from motorbus.families.stepper import Program
 
 
@@ -109,11 +106,9 @@ def write(
         what="writing",
         consent="" if yes else partial(_question, program, project, met, output),
         dry_run=dry_run,
-        rehearse=partial(_sent, program, project, save, met) if dry_run else None,
         hear=partial(_planned, met, output),
     )
     if told is None:
-        output.text(str(met[-1]))
         return Exit.OK
     plan = facts(met[-1]) if met else None
     output.document("motorbus.stepper.write/1", {"difference": plan, **result(told)})
@@ -137,25 +132,6 @@ def _planned(met: list[writing.Difference], output: Output, event: object, bar: 
 def _show(found: writing.Difference, met: list[writing.Difference], output: Output) -> None:
     met.append(found)
     output.text(str(found))
-
-
-def _sent(
-    program: Program, project: int | None, save: bool, met: list[writing.Difference], one: Node
-) -> Operation[None]:
-    """All that would be sent, one after the other, as if each read-back were right."""
-    found = yield from writing.difference(one, program, project, save=save)
-    met.append(found)
-    yield from sent(found, one, save=save)
-
-
-def sent(found: writing.Difference, one: Node, *, save: bool) -> Operation[None]:
-    """The commands that writing this difference takes, and nothing that reads."""
-    for edit in found.edits:
-        numbers: dict[str, Any] = dict(edit.values)
-        said = command(one, edit.command, commands.nothing, expert=True, rank=Rank.CONFIGURATION, **numbers)
-        yield from said
-    if save and found:
-        yield from commands.save_project(one, found.project)
 
 
 def facts(found: Any) -> dict[str, object]:

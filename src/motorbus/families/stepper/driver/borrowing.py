@@ -222,6 +222,7 @@ def _ended(node: Node, loan: Loan) -> Operation[None]:
     """Whatever has happened: the motor is told to stop, then project 1 is given back, then the journal is closed."""
     if loan.restless:
         yield from stop(node)
+        node.memory.ends += 1
         loan.restless = False
     if loan.open:
         yield from given_back(node, loan)

@@ -5,27 +5,43 @@ comes of it is compared with every combination of the readings, and an answer is
 can see from here, as the level of an output or the effect of an input, stays open, and the profile says why. So does
 all that rests on something which did not come, when anything else on this line was lost.
 
-Nothing is saved. In the end what is edited is a stored project again, in every field, whatever happens.
+Nothing is saved. In the end what is edited is a stored project again, in every field, whatever happens; until then the
+journal says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from math import isfinite
-from typing import Final, NamedTuple
+from typing import Any, Final
 
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, Alone, Journal, Operation, Report, afterwards
-from motorbus.errors import RequestError, VerificationFailed
+from motorbus.core.operation import (
+    ASKED,
+    INTENT,
+    OUTCOME,
+    Alone,
+    Journal,
+    Operation,
+    Report,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkError, RequestError, VerificationFailed
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.editing import brought
 from motorbus.families.stepper.driver.experiments import Motor
+from motorbus.families.stepper.driver.findings import Case
+from motorbus.families.stepper.driver.listening import rested
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import dump
-from motorbus.families.stepper.driver.stopping import stop
-from motorbus.families.stepper.driver.study import Experiment, Study
-from motorbus.families.stepper.driver.trials import RAMP_SECONDS, RAMP_STEPS, controls, trials
+from motorbus.families.stepper.driver.study import SELECTION, VIEWS, Experiment, ramp_experiment, studied
+from motorbus.families.stepper.driver.trials import controls, trials
+from motorbus.families.stepper.driver.turning import refuse_unless_idle
 from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.table import (
+    BLANK,
+    OUTPUTS,
     PROJECTS,
     TABLE,
     Order,
@@ -38,34 +54,32 @@ from motorbus.families.stepper.table import (
 LEAST_TRAVEL: Final = 0.5
 MOST_TRAVEL: Final = 100.0
 VERB: Final = "characterise"
+GIVEN_BACK: Final = "old"
+"""How every characterisation ends, in the journal and for `recover`."""
+TRIES: Final = 3
+"""How often it is tried to edit the stored project again; after an emergency stop the bus itself repeats nothing."""
 _CLEARLY: Final = 8
+"""Bits by which numbers must be smaller in the other order of bytes to be read so."""
+_FACTS: Final = ("node", "what", "project", "image")
 _NOMINAL: Final = Project(microsteps=8, step_angle=180)
 
 
-class Borrowed(NamedTuple):
-    """What is stored, by project, and the project that is edited again in the end."""
-
-    stored: Mapping[int, bytes]
-    home: Project
-    order: Order
-
-
 def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Operation[Profile]:
-    """Find out what can be found out: about two minutes, in which the motor turns now and then.
+    """Find out what can be found out: one to two minutes, in which the motor turns now and then.
 
     Take the load off the motor first: it goes by up to 240 RPM, never more than `travel` turns (0.5 to 100) each way
-    from where it is. Whatever runs is stopped first. Project `scratch`, 1 to 4, and project 1 are edited and not saved;
-    edits of any project that were not saved are lost. In the end the first project of 1 to 4 that has steps is
-    selected and edited as it is stored, and every project reads as before. How many microsteps the motor has is taken
-    from the scratch project, or from that one.
+    from where it is, and outputs may go off. Whatever runs is stopped first. Project `scratch`, 1 to 4, and project 1
+    are edited and not saved. In the end the first project that has steps is selected, the scratch project last, and
+    edited as it is stored, and every project reads as before. How many microsteps the motor has is taken from the
+    scratch project, or from that one.
 
-    Reports `Experiment` before each experiment, `Progress` while writing, and what it is about to do to the journal:
-    cut off by a crash, `recover` puts back what was edited; so does a power cycle.
+    Reports `Experiment` before each experiment, and to the journal what it is about to do: cut off by a crash,
+    `recover` puts back what was edited; so does a power cycle. A line that loses something leaves questions open.
 
-    Raises RequestError for impossible numbers and when no project has steps, before anything is written;
-    VerificationFailed when something does not read as it was written; OutcomeUnknown when a command that
-    must be heard was not acknowledged: the motor may be turning if that was a stop; Interrupted when somebody
-    stops the controller meanwhile.
+    Raises RequestError, before anything is written, for impossible numbers, while a project that was started on this
+    bus may run, for edits that were not saved, and when no project has steps; VerificationFailed when something does
+    not read as it was written; Interrupted when somebody stops the controller meanwhile; OutcomeUnknown when a stop is
+    not accepted: the motor may be turning then; whatever reading and writing raise on a line that is too bad.
     """
     if scratch not in range(1, PROJECTS + 1):
         raise _refused(f"scratch: there is no project {scratch!r}", f"1 to {PROJECTS}")
@@ -77,17 +91,33 @@ def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Operat
 def experiments(*, travel: float = 1.0) -> tuple[Experiment, ...]:
     """What `characterise` would do, for a motor of 1600 pulses a turn: sends nothing.
 
-    Times are those of one repetition at most, without the commands that write it; each is done two or three times.
+    Times are those of one run at most, without what is written for it; each is made two or three times.
     """
     motor = Motor.of(_NOMINAL)
-    found = [
-        Experiment(one.name, one.what, one.settles, one.turns, one.longest({}))
-        for one in (*controls(motor, 4), *trials(motor, 4, 3))
-    ]
-    turns = min(travel, RAMP_SECONDS * 240 / 60)
-    ramps = ("ramp", "ramp_tick_ms")
-    what = "two moves forward and two back, at several speeds and accelerations"
-    return (*found, Experiment("ramp", what, ramps, turns, 2 * RAMP_SECONDS * RAMP_STEPS))
+    before = [VIEWS, *map(Experiment.of, controls(motor, 4)), SELECTION]
+    return (*before, *map(Experiment.of, trials(motor, 4, 3)), ramp_experiment(travel))
+
+
+def recovered(node: Node, facts: Mapping[str, Any]) -> Operation[str]:
+    """Put back what was edited when the host was cut off, `facts` being what the journal says. Gives "old".
+
+    Raises RequestError, with nothing sent, for facts of something else; else as `characterise`.
+    """
+    try:
+        image, project = bytes.fromhex(facts["image"]), int(facts["project"])
+        order = likely_order((image,), node.order)
+        refused = project not in range(1, PROJECTS + 1) or decode_image(image).is_cleared
+        known = {name: facts[name] for name in _FACTS}
+    except (KeyError, TypeError, ValueError):
+        refused = True
+    if refused:
+        raise RequestError(
+            "these are not the facts of a characterisation that can be recovered",
+            expected="what the journal of the bus holds",
+            advice="nothing was sent",
+        )
+    yield from Alone(put_back(Node(node.node, node.motor, order, node.memory), image, known))
+    return GIVEN_BACK
 
 
 def _refused(what: str, expected: str) -> RequestError:
@@ -95,36 +125,65 @@ def _refused(what: str, expected: str) -> RequestError:
 
 
 def _characterised(node: Node, scratch: int, travel: float) -> Operation[Profile]:
+    refuse_unless_idle(node, VERB)
+    _refuse_unsaved(node)
     yield from Report(Journal(VERB, ASKED, {"node": node.node}))
-    yield from stop(node)
+    yield from rested(node)
     stored: dict[int, bytes] = {}
     for number in range(1, PROJECTS + 1):
         stored[number] = (yield from dump(node, number))[wire.REPLY_LENGTH :]
     order = likely_order(tuple(stored.values()), node.order)
     home = _home(stored, order, scratch)
-    own = decode_image(stored[scratch], order)
-    motor = Motor.of(home if own.is_cleared else own)
-    facts = {"node": node.node, "image": stored[home.number].hex(), "project": home.number}
-    study = Study(Node(node.node, node.motor, order, node.memory), scratch, travel, stored, motor, home.number)
+    here = Node(node.node, node.motor, order, node.memory)
+    lent = decode_image(stored[scratch], order)
+    case = Case(here, scratch, travel, stored, home if lent.pulses_per_turn is None else scratch)
+    facts = _facts(node, stored, home)
+    node.memory.commanded(tuple(range(1, OUTPUTS + 1)), None)
     yield from Report(Journal(VERB, INTENT, facts))
-    found = yield from afterwards(
-        study.work(), lambda: put_back(study.node, Borrowed(stored, home, study.node.order))
-    )
-    yield from Report(Journal(VERB, OUTCOME, {"node": node.node, "outcome": "restored"}))
+    found = yield from afterwards(studied(case), lambda: put_back(case.node, stored[home], facts, case.seen))
+    yield from _compared(case.node, stored)
     return found
 
 
-def put_back(node: Node, borrowed: Borrowed) -> Operation[None]:
-    """Stop it, and let what is edited be a stored project again, every field of it; then all four are read."""
-    yield from stop(node)
-    order = node.order
-    here = Node(node.node, node.motor, order, node.memory)
-    home = decode_image(borrowed.stored[borrowed.home.number], order)
-    home = _numbered(home, borrowed.home.number)
-    yield from brought(here, borrowed.stored[home.number], home, every=True)
-    for number, image in borrowed.stored.items():
-        now = (yield from dump(here, number))[wire.REPLY_LENGTH :]
-        if decode_image(now, order) != decode_image(image, order):
+def _facts(node: Node, stored: Mapping[int, bytes], home: int) -> dict[str, object]:
+    what = f"the loan of projects for {VERB}()"
+    return {"node": node.node, "what": what, "project": home, "image": stored[home].hex()}
+
+
+def _refuse_unsaved(node: Node) -> None:
+    if (unsaved := node.memory.unsaved) is not None:
+        raise RequestError(
+            f"project {unsaved.number} has edits that were not saved, and {VERB}() would lose them",
+            advice=f"save({unsaved.number}) first; nothing was sent",
+            node=node.node,
+        )
+
+
+def put_back(node: Node, image: bytes, facts: Mapping[str, Any], seen: bool = False) -> Operation[None]:
+    """Stop it, let what is edited be the project of these facts again, with this image, and say so.
+
+    `seen` says that reading shows what is edited: then every field is sent only where a reading says that it must be.
+    """
+    yield from rested(node)
+    for left in reversed(range(TRIES)):
+        told = yield from outcome(_edited_again(node, image, int(facts["project"]), seen))
+        if told is None:
+            break
+        if isinstance(told, LinkError) or not left:
+            raise told
+    yield from Report(Journal(VERB, OUTCOME, {"outcome": GIVEN_BACK, **facts}))
+
+
+def _edited_again(node: Node, image: bytes, number: int, seen: bool) -> Operation[None]:
+    project = replace(decode_image(image, node.order), number=number)
+    yield from brought(node, BLANK if seen else image, project, every=not seen)
+
+
+def _compared(node: Node, stored: Mapping[int, bytes]) -> Operation[None]:
+    """See that all of them read as before. Raises VerificationFailed when one does not."""
+    for number, image in stored.items():
+        now = (yield from dump(node, number))[wire.REPLY_LENGTH :]
+        if _carried_out(now, node.order) != _carried_out(image, node.order):
             raise VerificationFailed(
                 f"project {number} does not read as it did before the experiments",
                 received=now,
@@ -134,19 +193,17 @@ def put_back(node: Node, borrowed: Borrowed) -> Operation[None]:
             )
 
 
-def _numbered(project: Project, number: int) -> Project:
-    from dataclasses import replace
+def _carried_out(image: bytes, order: Order) -> Project:
+    """A project as it is carried out, whatever number it thinks it has."""
+    return replace(decode_image(image, order), number=0)
 
-    return replace(project, number=number)
 
-
-def _home(stored: Mapping[int, bytes], order: Order, scratch: int) -> Project:
+def _home(stored: Mapping[int, bytes], order: Order, scratch: int) -> int:
     """The project that is edited again in the end. Raises RequestError when there is none that could be."""
-    numbers = [number for number in stored if number != scratch]
-    for number in (*numbers, scratch):
-        project = _numbered(decode_image(stored[number], order), number)
+    for number in (*(one for one in stored if one != scratch), scratch):
+        project = replace(decode_image(stored[number], order), number=number)
         if not project.is_cleared and not any(refusals(project, expert=True)):
-            return project
+            return number
     raise RequestError(
         "no project has steps, so none could be edited again in the end",
         expected="one that was written and saved",

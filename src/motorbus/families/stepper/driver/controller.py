@@ -9,6 +9,7 @@ from __future__ import annotations
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import (
+    characterising,
     copying,
     homing,
     inputs,
@@ -60,6 +61,7 @@ class ControllerVerbs(Node):
     jog_forward = verb(jogging.jog_forward)
     jog_reverse = verb(jogging.jog_reverse)
     home = verb(homing.home)
+    characterise = verb(characterising.characterise)
     recover = verb(recovery.recover)
 
     @property

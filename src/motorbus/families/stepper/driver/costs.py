@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause, Tune
+from motorbus.core.operation import Operation, Tune
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.line import BITS
 from motorbus.families.stepper.driver.node import Node
@@ -67,11 +67,11 @@ class Taken(NamedTuple):
 def taken(node: Node, project: int) -> Operation[Taken]:
     """Read a project until two dumps agree, with a clock. Call it inside `Alone`. Raises as `dump`."""
     rate = yield from Tune(0)
-    began = yield from Pause(0)
-    seen = yield from readings(node, project)
-    ended = yield from Pause(0)
+    lasted: list[float] = []
+    seen = yield from readings(node, project, lasted)
     image = agreed(node, project, seen)[wire.REPLY_LENGTH :]
-    return Taken(image, len(seen), Tempo(rate, (ended - began) / len(seen)))
+    # the quickest, for whatever held one of them up would be reckoned for every command to come
+    return Taken(image, len(seen), Tempo(rate, min(lasted)))
 
 
 def _many(count: int, what: str) -> str:

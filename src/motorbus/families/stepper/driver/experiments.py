@@ -173,12 +173,20 @@ class Trial(NamedTuple):
         ends = [end for way in self.ways(known) for end in self.played(way, at).ends]
         return max(at[-1], *ends, 0.0)
 
+    def most(self, known: Mapping[str, Setting]) -> int:
+        """How many notices can come at most."""
+        at = tuple(act.at for act in self.acts)
+        return max(len(self.played(way, at).ends) for way in self.ways(known))
+
 
 class Verdict(NamedTuple):
-    """What an experiment says: answers, whether they rest on something that did not come, and the reason in words."""
+    """What an experiment says: answers, whether they rest on something that did not come, whether any reading does
+    what was seen, and all that in words.
+    """
 
     answers: Mapping[str, Setting]
     silent: bool
+    fits: bool
     why: str
 
 
@@ -202,7 +210,7 @@ def judged(
         if len(values) == 1:
             answers[name] = values.pop()
     silent = any(_lacks(one, it) for would in others for one, it in zip(found, would, strict=True))
-    return Verdict(answers, silent, _told(found, [would[0] for would in others], bool(alike)))
+    return Verdict(answers, silent, bool(alike), _told(found, [would[0] for would in others], bool(alike)))
 
 
 def _agrees(would: Seen, seen: Seen, least: float) -> bool:

@@ -6,7 +6,7 @@ answered is the same each time, and comes out of runs whose time is known.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import (
@@ -24,11 +24,12 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper.driver import goals
-from motorbus.families.stepper.driver.commands import nothing
+from motorbus.families.stepper.driver.commands import motion, nothing
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.experiments import Act
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.stopping import stop
+from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.table import Edit, Project, edits
 
 FLAGS: Final = ("set_stop_mode", "set_mode4", "set_power_on_home")
@@ -60,37 +61,44 @@ def told(node: Node, edit: Edit) -> Exchange[None]:
 
 
 def listened(
-    node: Node, project: Project, acts: Sequence[Act], seconds: float, wanted: int = 1
+    node: Node, watch: Watch, project: Project, acts: Sequence[Act], seconds: float, wanted: int = 1
 ) -> Operation[Heard]:
     """Say these commands at their moments, and listen until so many notices have come, for `seconds` at most.
 
     What is not answered is no error here. In the end everything is stopped. Raises Interrupted when somebody else has
-    stopped it meanwhile, OutcomeUnknown when no stop is accepted.
+    stopped it meanwhile, or since `watch` was made; OutcomeUnknown when no stop is accepted.
     """
     notices: list[float] = []
-    stops = node.memory.stops
 
     def heard(notice: Notice) -> bool:
         notices.append(notice.at)
         return len(notices) >= wanted
 
+    wanted_stops = node.memory.stops - node.memory.ends
     node.memory.owed = True
-    said, _ = yield from Together[Any]([_said(node, project, acts), _listening(heard, seconds)])
-    if node.memory.stops != stops:
+    said, _ = yield from Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
+    if node.memory.stops - node.memory.ends != wanted_stops:
         raise Interrupted(
-            "somebody stopped the controller during an experiment", advice="characterise it again when it is free"
+            "somebody stopped the controller during an experiment",
+            advice="characterise it again when nobody else uses it",
         )
-    yield from stop(node)
+    yield from rested(node)
     sent, answered = said
     return Heard(sent, answered, tuple(notices))
 
 
-def _listening(heard: Any, seconds: float) -> Operation[Notice | None]:
+def rested(node: Node) -> Operation[None]:
+    """Stop it, and keep in mind that nobody else did."""
+    yield from stop(node)
+    node.memory.ends += 1
+
+
+def _listening(heard: Callable[[Notice], bool], seconds: float) -> Operation[Notice | None]:
     return (yield from Listen(heard, seconds))
 
 
 def _said(
-    node: Node, project: Project, acts: Sequence[Act]
+    node: Node, watch: Watch, project: Project, acts: Sequence[Act]
 ) -> Generator[Step, Any, tuple[tuple[float, ...], tuple[float | None, ...]]]:
     began = now = yield from Pause(0.0)
     sent: list[float] = []
@@ -100,20 +108,22 @@ def _said(
             yield from Pause(rest)
         now = yield from Pause(0.0)
         sent.append(now)
-        came = yield from outcome(timed(order(node, project, act.command)))
+        came = yield from outcome(timed(order(node, watch, project, act.command)))
+        if isinstance(came, Interrupted):
+            raise came
         answered.append(None if isinstance(came, MotorbusError) else came)
         if answered[0] is None:
             break
     return tuple(sent), tuple(answered)
 
 
-def order(node: Node, project: Project, name: str) -> Exchange[None]:
+def order(node: Node, watch: Watch, project: Project, name: str) -> Exchange[None]:
     """The exchange for one command of an experiment, with the goals of what it moves."""
     if name == "start_project":
         far = goals.of_project(node, project) if project.total_steps else (_nowhere(node),)
-        return command(node, name, nothing, rank=Rank.CONTROL, goals=far, project=project.number)
+        return motion(node, name, far, watch.refusal, project=project.number)
     if name == "run_once":
-        return command(node, name, nothing, rank=Rank.CONTROL, goals=goals.of_move(node, project))
+        return motion(node, name, goals.of_move(node, project), watch.refusal)
     return command(node, name, nothing, rank=Rank.STOP)
 
 
@@ -138,4 +148,5 @@ def timed(exchange: Exchange[Any]) -> Exchange[float]:
         goals=exchange.goals,
         timeout=exchange.timeout,
         repeatable=exchange.repeatable,
+        refusal=exchange.refusal,
     )

@@ -13,6 +13,7 @@ class Memory:
     """What was said to the controller of one bus since it was opened.
 
     `stops`    how many stops it has accepted
+    `ends`     how many of these did no more than end a motion by hand, as each of them is ended
     `stopping` how many stops are being said just now, accepted or not yet
     `owed`     a project was started, and neither its notice nor an accepted stop has come since: it may still run
     `outputs`  the level last commanded, by output 1 to 3 and 5, the LEDs; None where that is not known
@@ -22,6 +23,7 @@ class Memory:
 
     def __init__(self) -> None:
         self.stops = 0
+        self.ends = 0
         self.stopping = 0
         self.owed = False
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), int(OutputPort.LEDS)))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Exchange, Operation, Timeout
+from motorbus.core.operation import Exchange, Operation, Pause, Timeout
 from motorbus.errors import FramingError, RequestError, UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.exchanges import command
@@ -40,11 +40,17 @@ def dump(node: Node, project: int = 1) -> Operation[bytes]:
     return agreed(node, project, (yield from readings(node, project)))
 
 
-def readings(node: Node, project: int) -> Operation[list[bytes]]:
-    """As many dumps of a project as it takes until they agree, at most five: `agreed` says what holds of them."""
+def readings(node: Node, project: int, lasted: list[float] | None = None) -> Operation[list[bytes]]:
+    """As many dumps of a project as it takes until they agree, at most five: `agreed` says what holds of them.
+
+    How long each has `lasted` (s) is added to that list.
+    """
     seen: list[bytes] = []
     while len(seen) < READINGS and not vote(seen):
+        began = yield from Pause(0)
         seen.append((yield from dump_once(node, project)))
+        if lasted is not None:
+            lasted.append((yield from Pause(0)) - began)
     return seen
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from motorbus.core.operation import REACHED, Alone, Journal, Operation, Report
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.stepper.driver import characterising
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, Loan, given_back, loan_of
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.stopping import stop
@@ -29,6 +30,8 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     of bytes; OutcomeUnknown when the stop is not accepted, for nothing is edited while the motor may turn; whatever
     writing and reading raise. The journal stays open then.
     """
+    if change == characterising.VERB:
+        return (yield from characterising.recovered(node, facts))
     loan = loan_of(change, facts)
     if loan.order != node.order:
         raise RequestError(

@@ -48,6 +48,8 @@ TICK: Final = 0.25
 """s between two reports of progress."""
 SOON: Final = 0.02
 """s between two rounds of watched inputs, and between two looks for the acknowledgement."""
+AGAIN: Final = 0.05
+"""s after which the branch that only listens looks whether the wait is over."""
 _UNHEARD: Final = (OutcomeUnknown, NoReply, WireError)
 """What leaves it open whether a start was carried out."""
 
@@ -116,18 +118,7 @@ def run(
     plan, stops = yield from _ready(node, project, how, endless, stop_first, expert)
     levels = Levels((yield from inputs(node, ports)))
     wait = Wait(node.memory, plan, (yield from Pause(0)), timeout)
-    over = _Over()
-    try:
-        yield from Together(
-            [_starting(node, wait, stops, over), _listening(wait, over), _following(node, wait, levels, over)]
-        )
-    except MotorbusError:
-        raise
-    except BaseException as interruption:
-        interruption.add_note(f"project {project} was started and goes on: nothing was sent to stop it")
-        raise
-    assert wait.ran is not None, "a wait ends with an outcome"
-    return wait.ran
+    return (yield from _waited(node, wait, levels, stops))
 
 
 # -- before it starts --------------------------------------------------------------------------------------------------
@@ -205,7 +196,7 @@ def _owed(project: int) -> RequestError:
     return RequestError(
         f"project {project} is not started: another that this host started may still run",
         cause="neither its notice nor an accepted stop has come since; its notice would be taken for this one's",
-        advice="stop() first, or say stop_first=True; nothing was sent",
+        advice="stop() first, or say stop_first=True; nothing was started",
     )
 
 
@@ -236,13 +227,18 @@ def _begin(node: Node, plan: Plan, stops: int) -> Operation[float]:
         )
 
     number, where = plan.project.number, goals.of_project(node, plan.project, plan.how)
+    if node.memory.owed:  # by another run, while this one was read
+        raise _owed(number)
     said = motion(node, "start_project", where, overtaken, project=number)
-    owed, node.memory.owed = node.memory.owed, True
+    node.memory.owed = True
     outputs.forget(node)
     try:
         return (yield from _timed(said))
-    except (LimitExceeded, RequestError, Interrupted) as refused:
-        node.memory.owed = owed or (isinstance(refused, Interrupted) and node.memory.stops == stops)
+    except (LimitExceeded, RequestError):
+        node.memory.owed = False
+        raise
+    except Interrupted:
+        node.memory.owed = node.memory.stops == stops
         raise
 
 
@@ -270,6 +266,22 @@ def _timed(said: Exchange[None]) -> Exchange[float]:
 # -- three branches of one run -----------------------------------------------------------------------------------------
 
 
+def _waited(node: Node, wait: Wait, levels: Levels, stops: int) -> Operation[Ran]:
+    over = _Over()
+    try:
+        yield from Together(
+            [_starting(node, wait, stops, over), _listening(wait, over), _following(node, wait, levels, over)]
+        )
+    except MotorbusError:
+        raise
+    except BaseException as interruption:
+        number = wait.plan.project.number
+        interruption.add_note(f"project {number} was started and goes on: nothing was sent to stop it")
+        raise
+    assert wait.ran is not None, "a wait ends with an outcome"
+    return wait.ran
+
+
 class _Over:
     """Whether one of the branches has failed, so that the others need not go on."""
 
@@ -290,7 +302,7 @@ def _starting(node: Node, wait: Wait, stops: int, over: _Over) -> Operation[None
 def _listening(wait: Wait, over: _Over) -> Operation[None]:
     """Nothing but listen: there is a listener also while the other branch reads inputs."""
     while wait.ran is None and not over.failed:
-        yield from Listen(wait.heard, TICK)
+        yield from Listen(wait.heard, AGAIN)
 
 
 def _following(node: Node, wait: Wait, levels: Levels, over: _Over) -> Operation[None]:

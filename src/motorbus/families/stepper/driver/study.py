@@ -1,57 +1,151 @@
-"""The course of a characterisation: which experiment after which, and what each adds to the profile.
+"""The course of a characterisation: which experiment after which, and what each adds to what is known.
 
-First what dumps tell by themselves, then two runs of a known time, which say what is fixed in each time. Only what
-these agree on is the ground for the rest. Whatever goes wrong on the line is a doubt, and with a doubt nothing is
-believed that rests on silence.
+First what dumps tell by themselves, then runs of a known time, which say what is fixed in each time. Only where these
+agree is there any ground for the rest. Whatever goes wrong on the line is a doubt, and with a doubt nothing is believed
+that rests on silence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Operation, Pause, Report
-from motorbus.errors import VerificationFailed
-from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver.experiments import Motor, Seen, Trial, Verdict, judged
-from motorbus.families.stepper.driver.listening import Heard, listened, timed, write
-from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.reading import dump, dump_once
-from motorbus.families.stepper.driver.trials import controls, trials
-from motorbus.families.stepper.driver.views import Views
-from motorbus.families.stepper.program.profile import KNOWN, Profile, Setting
-from motorbus.families.stepper.table import Order, Project
+from motorbus.core.operation import Operation, Report
+from motorbus.errors import NoReply, WireError
+from motorbus.families.stepper.driver import views
+from motorbus.families.stepper.driver.experiments import Seen, Trial, Verdict, judged
+from motorbus.families.stepper.driver.findings import UNTRIED, Case
+from motorbus.families.stepper.driver.listening import write
+from motorbus.families.stepper.driver.ramping import ramped
+from motorbus.families.stepper.driver.timing import MARGIN, Timing, controlled, once
+from motorbus.families.stepper.driver.trials import RAMP_SECONDS, RAMP_STEPS, controls, trials
+from motorbus.families.stepper.program.profile import KNOWN, Profile
 
-UNTRIED: Final[Mapping[str, str]] = {
-    "start_input": "only a hand on an input could tell",
-    "stop_input": "only a hand on an input could tell",
-    "stop_input_scope": "only a hand on an input could tell",
-    "notice_on_in3": "only a hand on input 3 could tell",
-    "home_stop": "only homing against its switch could tell",
-    "output_zero": "no command reads an output",
-    "outputs_on_stop": "no command reads an output",
-    "jog_reverse_while_jogging": "no command tells which way the motor turns",
-    "save_cross": "telling it would store over a project",
-    "save_cut": "only a supply that goes while it saves could tell",
-    "clear_notice": "no project is without steps, and none is cleared for it",
-}
-"""What no experiment here is made for, and why."""
-_STEADY: Final = 0.03
-"""s by which two runs of the same may differ."""
-_CLOCK: Final = 0.1
-"""Part by which the clock of a controller may be off."""
-_MARGIN: Final = 0.6
-"""s that are waited beyond the latest moment at which any reading says anything."""
+T = TypeVar("T")
+
+REPETITIONS: Final = 2
+IN_SILENCE: Final = 3
+"""How often an experiment is done whose answer rests on something that did not come."""
 
 
 class Experiment(NamedTuple):
     """An event, and an entry of the plan: this is about to be tried.
 
-    `settles` are the questions it asks, `turns` how far the motor turns each way, `seconds` how long one run takes.
+    `settles` are the questions it asks, `turns` how far the motor turns each way in one run, `seconds` how long one run
+    takes; what has to be written before comes on top.
     """
 
     name: str
     what: str
     settles: tuple[str, ...]
-    turns: float
-    seconds: float
+    turns: float = 0.0
+    seconds: float = 0.0
+
+    @classmethod
+    def of(cls, trial: Trial) -> Experiment:
+        """What a trial is, told."""
+        return cls(trial.name, trial.what, trial.settles, trial.turns, trial.longest({}))
+
+
+VIEWS: Final = Experiment(
+    "edits", "what is edited, and read again", ("read_view", "dump_order", "flags_scope")
+)
+RAMP: Final = ("ramp", "ramp_tick_ms")
+SELECTION: Final = Experiment("selection", "another project selected, and read", ("select",))
+
+
+def ramp_experiment(travel: float) -> Experiment:
+    """The one that times the ramp; `travel` is how many turns it may take."""
+    what = "two moves forward and two back, at several speeds and accelerations"
+    return Experiment("ramp", what, RAMP, travel, 2 * RAMP_SECONDS * RAMP_STEPS)
+
+
+def studied(case: Case) -> Operation[Profile]:
+    """All experiments, one after the other. One that a bad line spoils is given up, and the next is begun."""
+    yield from Report(VIEWS)
+    yield from views.view(case)
+    yield from _spared(case, ("flags_scope",), views.flags(case))
+    for trial in controls(case.motor, case.scratch):
+        yield from Report(Experiment.of(trial))
+    timing = yield from _spared(case, (), controlled(case))
+    if timing is None:
+        for name in KNOWN:
+            if name not in UNTRIED:
+                case.found.leave(name, f"no time could be taken on this line: {case.found.doubts[0]}")
+        return case.found.profile()
+    yield from Report(SELECTION)
+    yield from _spared(case, SELECTION.settles, _selected(case, timing))
+    for trial in trials(case.motor, case.scratch, _without_steps(case)):
+        yield from _spared(case, trial.settles, _tried(case, timing, trial))
+    yield from Report(ramp_experiment(case.travel))
+    yield from _spared(case, RAMP, ramped(case, timing))
+    return case.found.profile()
+
+
+def _spared(case: Case, names: tuple[str, ...], operation: Operation[T]) -> Operation[T | None]:
+    """Carry it out; a line that does not answer it leaves these questions open, and is a doubt."""
+    try:
+        return (yield from operation)
+    except (NoReply, WireError) as error:
+        case.found.doubt(f"an experiment failed: {error.summary}")
+        for name in names:
+            case.found.leave(name, f"its experiment failed: {error.summary}")
+    return None
+
+
+def _selected(case: Case, timing: Timing) -> Operation[None]:
+    if case.seen:
+        _, last = controls(case.motor, case.scratch)
+        yield from views.select(case, last.project)
+    else:
+        yield from views.select_unseen(case, timing.offset, timing.clock)
+
+
+def _without_steps(case: Case) -> int | None:
+    """A project that has no steps and is not lent."""
+    empty = [number for number, image in case.stored.items() if number != case.scratch and not image[1]]
+    return empty[0] if empty else None
+
+
+def _tried(case: Case, timing: Timing, trial: Trial) -> Operation[None]:
+    found = case.found
+    if all(name in found.known for name in trial.settles):
+        return None
+    missing = [name for name, value in trial.needs if found.known.get(name) != value]
+    if missing:
+        return _leave(case, trial, f"it is tried only where {missing[0]} is {dict(trial.needs)[missing[0]]}")
+    yield from Report(Experiment.of(trial))
+    if trial.project.total_steps:
+        yield from write(case.node, trial.project)
+    verdict = yield from _repeated(case, timing, trial)
+    if verdict is None:
+        return _leave(case, trial, f"on this line {found.doubts[-1]}")
+    if not verdict.fits:
+        found.doubt(f"the experiment {trial.name!r} did what no reading does")
+    for name in trial.settles:
+        if name in verdict.answers:
+            why = f"{trial.what}; {verdict.why}"
+            found.settle(name, verdict.answers[name], why, silent=verdict.silent)
+        else:
+            found.leave(name, f"{trial.what}; {verdict.why}")
+    return None
+
+
+def _leave(case: Case, trial: Trial, why: str) -> None:
+    for name in trial.settles:
+        case.found.leave(name, why)
+
+
+def _repeated(case: Case, timing: Timing, trial: Trial) -> Operation[Verdict | None]:
+    """Twice, or three times where the answer rests on silence; None when one of them was not acknowledged in time."""
+    found = case.found
+    seconds = trial.longest(found.known) * timing.clock + MARGIN
+    seen: list[tuple[tuple[float, ...], Seen]] = []
+    verdict: Verdict | None = None
+    while len(seen) < REPETITIONS or (verdict and verdict.silent and verdict.fits and len(seen) < IN_SILENCE):
+        heard = yield from once(case, trial, seconds, trial.most(found.known), timing.latency)
+        if heard is None:
+            return None
+        seen.append(timing.seen(heard))
+        verdict = judged(trial, found.known, seen, timing.turnaround)
+        verdict = verdict._replace(silent=verdict.silent or found.rests_on_silence(trial.depends))
+    return verdict

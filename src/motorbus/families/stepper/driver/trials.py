@@ -46,6 +46,7 @@ def trials(motor: Motor, scratch: int, empty: int | None) -> tuple[Trial, ...]:
         _zero_distance(motor, scratch),
         _notice_on_once(motor),
         _stop_scope(motor),
+        _stop_scope_by_notice(motor),
     )
     return found if empty is None else (*found, _cleared(empty))
 
@@ -152,6 +153,21 @@ def _stop_scope(motor: Motor) -> Trial:
         motor.project(1, motor.step(pulses, 100, rpm=1, reverse=True)),
         (Act(0.0, "run_once"), Act(0.3, "stop_project"), Act(0.6, "start_project")),
         float(2 * pulses / motor.per_turn),
+    )
+
+
+def _stop_scope_by_notice(motor: Motor) -> Trial:
+    """Where a start begins anew whatever runs, only the notice of the move tells that it went on."""
+    pulses = motor.slow(1.2)
+    return Trial(
+        "single move stopped, no start",
+        "a single move of 1.2 s, and the project stopped after 0.3 s",
+        ("stop_project_scope",),
+        ("notice_on_once",),
+        motor.project(1, motor.step(pulses, 100, rpm=1, reverse=True)),
+        (Act(0.0, "run_once"), Act(0.3, "stop_project")),
+        float(pulses / motor.per_turn),
+        needs=(("notice_on_once", True),),
     )
 
 

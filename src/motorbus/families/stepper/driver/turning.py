@@ -33,13 +33,18 @@ class Watch:
     def __init__(self, node: Node) -> None:
         self._node = node.node
         self._memory = node.memory
-        self._before = node.memory.stops
+        self._before = self._wanted
         self._stops: Stops | None = None
         self._left = 0
 
+    @property
+    def _wanted(self) -> int:
+        """The accepted stops that somebody wanted: not those that end each motion by hand, of whoever came before."""
+        return self._memory.stops - self._memory.ends
+
     def refusal(self, stops: Stops) -> MotorbusError | None:
         """For the exchange that begins the motion: it must not leave after a stop."""
-        if self._memory.stops != self._before:
+        if self._wanted != self._before:
             return _stopped("before it began", "the motor was not told to move")
         self._stops, self._left = stops, stops(self._node)
         return None

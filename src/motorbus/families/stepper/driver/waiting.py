@@ -17,6 +17,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.program import Estimate, Plan
 from motorbus.families.stepper.program.earliest import earliest
+from motorbus.families.stepper.table import RATE
 
 LONGER: Final = 1.2
 """How much longer than its slowest reading a project may take, an assumption."""
@@ -24,6 +25,8 @@ SPARE: Final = 2.0
 """s that it may take besides, an assumption."""
 CLOCK: Final = 0.98
 """How much less a controller's clock may show than the host's until a notice is called too early, an assumption."""
+SETTLES: Final = 20 / RATE
+"""s, two bytes: the bus takes a reply that came in pieces in so much later, and a notice may be close behind it."""
 
 
 class Outcome(Enum):
@@ -118,29 +121,30 @@ class Wait:
             self.ran = self._ended() or (self._overdue() if now >= self.deadline else None)
 
     def _ended(self) -> Ran | None:
-        counting = [(at, doubtful) for at, doubtful in self._notices if self._may_end(at)]
-        if counting:
-            self._memory.owed = False
         if self._memory.stops > self._stops:
             return self._said(Outcome.STOPPED, "a stop by this host was accepted while it was waited for")
         if self._button:
             return self._said(Outcome.STOPPED, "input 4, which stops projects, was read active")
+        counting = [(at, doubtful) for at, doubtful in self._notices if self._may_end(at)]
         if not counting:
             return None
+        self._memory.owed = False
         at, doubtful = counting[0]
         if doubtful:
             return self._said(
                 Outcome.UNKNOWN, "its notice came while a stop was said that was not acknowledged"
             )
         since = "its acknowledgement" if self._lost is None else "it was sent; its acknowledgement was lost"
-        return self._said(Outcome.COMPLETED, f"its notice came {at - self.start:.3f} s after {since}", at)
+        return self._said(
+            Outcome.COMPLETED, f"its notice came {max(0.0, at - self.start):.3f} s after {since}", at
+        )
 
     def _may_end(self, at: float) -> bool:
         """Whether a notice of this moment can be the end of this run.
 
         Reckoned from its sending: how long a controller thinks before it acknowledges is not known.
         """
-        return at >= self.start and at - self.asked >= self._least
+        return at > self.start - SETTLES and at - self.asked >= self._least
 
     def _overdue(self) -> Ran:
         waited = f"within {self.deadline - self.start:.1f} s"
@@ -160,5 +164,5 @@ class Wait:
         return f"a notice came {first:.3f} s after the start, and it cannot end before {self._least:.3f} s"
 
     def _said(self, outcome: Outcome, why: str, ended: float | None = None) -> Ran:
-        seconds = None if ended is None else ended - self.start
+        seconds = None if ended is None else max(0.0, ended - self.start)
         return Ran(outcome, seconds, self.plan.estimate, why)

@@ -315,6 +315,12 @@ def _wanted(program: Program, project: int | None) -> tuple[int, Project]:
             expected=f"1 to {STEPS} steps",
             advice="clear() makes a project empty; nothing was sent",
         )
+    if len(wanted.steps) != STEPS:
+        raise RequestError(
+            f"a project has {STEPS} rows of steps and not {len(wanted.steps)}",
+            expected="total_steps says how many of them are carried out",
+            advice="nothing was sent",
+        )
     for error in refusals(wanted, expert=True):
         raise error
     return number, wanted

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper.execution import USUAL, Behaviour
-from motorbus.families.stepper.program.plan import estimate
+from motorbus.families.stepper.program.plan import estimate, seconds_of
 from motorbus.families.stepper.table import Project
 
 SHORTEST: Final = 1e-3
@@ -86,7 +86,7 @@ def _per_tick(runs: Sequence[Run], how: Behaviour) -> Fit:
 
 def _left(runs: Sequence[Run], how: Behaviour) -> tuple[float, float]:
     """What every run takes besides, on average, and what is left then."""
-    left = [run.seconds - estimate(run.project, how).seconds for run in runs]
+    left = [run.seconds - seconds_of(run.project, how) for run in runs]
     overhead = sum(left) / len(left)
     return overhead, sqrt(sum((one - overhead) ** 2 for one in left) / len(left))
 

@@ -1,0 +1,110 @@
+"""What is fixed in every time that is taken, and the clock: the two things that runs of a known time tell.
+
+From the answer to a start until the notice there is what the project takes, less the time after which the start was
+answered. Two controls that differ in their pause alone give the rate of the controller's clock, and then that rest.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from motorbus.core.operation import Operation, Pause
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.experiments import Seen, Trial
+from motorbus.families.stepper.driver.findings import Case
+from motorbus.families.stepper.driver.listening import Heard, listened, timed, write
+from motorbus.families.stepper.driver.reading import dump_once
+from motorbus.families.stepper.driver.trials import controls
+
+MARGIN: Final = 0.6
+"""s that are waited beyond the latest moment at which any reading says anything."""
+STEADY: Final = 0.03
+"""s by which two runs of the same, or two answers, may differ."""
+CLOCK: Final = 0.1
+"""Part by which the clock of a controller may be off."""
+
+
+class Timing(NamedTuple):
+    """s that every run takes besides, s here for one of the controller, and s until a command is answered.
+
+    `turnaround` is the part of the last that is not spent on the wire.
+    """
+
+    offset: float
+    clock: float
+    latency: float
+    turnaround: float
+
+    def seen(self, heard: Heard) -> tuple[tuple[float, ...], Seen]:
+        """When the commands were heard, and what came of them, in s of the controller since the start was."""
+        begin = _answer(heard)
+        at = tuple(
+            (sent - heard.sent[0] if came is None else came - begin) / self.clock
+            for sent, came in zip(heard.sent, heard.answered, strict=True)
+        )
+        ends = tuple((end - begin - self.offset) / self.clock for end in heard.notices)
+        return at, Seen(tuple(came is not None for came in heard.answered), ends)
+
+
+def controlled(case: Case) -> Operation[Timing | None]:
+    """Run both controls; None, and a doubt, when they do not agree with themselves and each other."""
+    took: list[tuple[float, float]] = []
+    latency = float("inf")
+    for trial in controls(case.motor, case.scratch):
+        yield from write(case.node, trial.project)
+        known = trial.longest({})
+        times = []
+        for _ in range(2):
+            heard = yield from once(case, trial, known * (1 + CLOCK) + MARGIN, 1, latency)
+            if heard is None or len(heard.notices) != 1:
+                case.found.doubt("a project of known time was not seen to begin and to end")
+                return None
+            times.append(heard.notices[0] - _answer(heard))
+            latency = min(latency, _answer(heard) - heard.sent[0])
+        if abs(times[0] - times[1]) > STEADY:
+            case.found.doubt("a project of known time took another time when it was run again")
+            return None
+        took.append((known, sum(times) / 2))
+    return (yield from _timing(case, took, latency))
+
+
+def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Operation[Timing | None]:
+    (short, first), (long, second) = took
+    clock = (second - first) / (long - short)
+    if abs(clock - 1) > CLOCK:
+        case.found.doubt(f"a pause of 1 s takes {clock:.2f} s")
+        return None
+    asked = yield from Pause(0.0)
+    whole = (yield from timed(dump_once(case.node, case.scratch))) - asked
+    byte = max(0.0, whole - latency) / (wire.DUMP_LENGTH - wire.REPLY_LENGTH)
+    turnaround = max(0.0, latency - byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH))
+    found = Timing(first - clock * short, clock, latency, turnaround)
+    measured = {"overhead": found.offset, "turnaround": turnaround, "clock": clock}
+    case.found.measured.update({name: round(value, 5) for name, value in measured.items()})
+    if "read_view" not in case.found.known:
+        why = "a project that was edited reads as before, and runs as edited"
+        case.found.settle("read_view", "stored", why)
+    return found
+
+
+def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) -> Operation[Heard | None]:
+    """Carry it out once, `latency` being how soon its commands should be answered; None, and a doubt, when they were
+    not, or when a notice came that cannot be of this run.
+    """
+    heard = yield from listened(case.node, case.watch, trial.project, trial.acts, seconds, wanted)
+    came = [one - sent for sent, one in zip(heard.sent, heard.answered, strict=True) if one is not None]
+    if heard.answered[0] is None:
+        case.found.doubt("a start was not acknowledged")
+    elif max(came) > latency + STEADY:
+        case.found.doubt("an acknowledgement came late")
+    elif any(end < heard.answered[0] - STEADY for end in heard.notices):
+        case.found.doubt("a notice came before the project was started")
+    else:
+        return heard
+    return None
+
+
+def _answer(heard: Heard) -> float:
+    begin = heard.answered[0]
+    assert begin is not None, "a run that was not acknowledged is none"
+    return begin

@@ -1,0 +1,126 @@
+"""A host that dies at any request of a borrow, in virtual time: the next one is told, moves nothing, and mends it.
+
+Wherever it dies, before a request has left or after it, the motor comes to rest by itself, what was saved stays as it
+was, and `recover` brings project 1 back to what it was; dying in the middle of that changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import tau
+from typing import Any
+
+import pytest
+
+from motorbus.errors import LinkLost, RequestError
+from motorbus.families.stepper import Controller
+from tests.families.stepper.loans import Cut, Line1
+from tests.families.stepper.test_driver_borrowing import READINGS
+
+Work = Callable[[Controller], object]
+
+
+def jogged(device: Controller) -> object:
+    return device.jog(tau, 0.5)
+
+
+def moved(device: Controller) -> object:
+    return device.move_by(-tau, velocity=tau)
+
+
+def homed(device: Controller) -> object:
+    return device.home(velocity=tau, deadline=5.0)
+
+
+WORKS: dict[str, tuple[Work, dict[str, Any]]] = {
+    "jog": (jogged, {}),
+    "move_by": (moved, {}),
+    "home": (homed, {"home_switch": "wired", "home_at": -300}),
+}
+OTHERS: tuple[Work, ...] = (
+    jogged,
+    moved,
+    homed,
+    lambda device: device.run_once(),
+    lambda device: device.jog_forward(0.1),
+    lambda device: device.run(1),
+)
+
+
+def cuts(line: Callable[[], Line1], work: Callable[[Line1], Work]) -> Iterator[Cut]:
+    """Every request of this work, not sent and sent."""
+    whole = line()
+    whole.run(work(whole))
+    for request in range(whole.count):
+        yield Cut(request)
+        yield Cut(request, sent=True)
+
+
+def wrecked(cut: Cut, work: Work, options: dict[str, Any]) -> Line1:
+    """The line after a host has died so, and the time has passed in which the motor comes to its end."""
+    line = Line1(**options)
+    told = line.run(work, cut)
+    assert isinstance(told, LinkLost), told
+    line.later()
+    assert line.at_rest, cut
+    return line
+
+
+def refused(line: Line1, cut: Cut) -> None:
+    """While it is unfinished nothing moves, and nothing is sent that changes anything."""
+    for work in OTHERS:
+        told = line.run(work)
+        assert isinstance(told, RequestError), cut
+        assert "the borrow of project 1 (for" in told.summary
+        assert f"motorbus recover {line.journal.bus}" in told.advice
+        assert line.sent == []
+
+
+@pytest.mark.parametrize("options", READINGS)
+@pytest.mark.parametrize("verb", WORKS)
+def test_at_every_request(verb: str, options: dict[str, Any]) -> None:
+    work, more = WORKS[verb]
+    unfinished = 0
+    for cut in cuts(lambda: Line1(**options, **more), lambda line: work):
+        for cycle in (False, True):
+            line = wrecked(cut, work, {**options, **more})
+            if cycle:
+                line.simulated.power_cycle()
+            change = line.journal.unfinished()
+            if change is None:
+                assert line.as_before, cut
+                continue
+            unfinished += 1
+            assert f"the borrow of project 1 (for {verb})" in line.journal.warning()
+            refused(line, cut)
+            assert line.run(line.recovery) == "old", cut
+            assert line.as_before, cut
+            assert line.journal.unfinished() is None
+            assert not isinstance(line.run(jogged), Exception), cut
+            assert line.as_before
+    assert unfinished > 40
+
+
+@pytest.mark.parametrize("options", READINGS)
+def test_at_every_request_of_the_recovery(options: dict[str, Any]) -> None:
+    for cycle in (False, True):
+
+        def wreck(cycle: bool = cycle) -> Line1:
+            line = wrecked(Cut(6, sent=True), jogged, options)
+            if cycle:
+                line.simulated.power_cycle()
+            return line
+
+        for cut in cuts(wreck, lambda line: line.recovery):
+            line = wreck()
+            assert isinstance(line.run(line.recovery, cut), LinkLost)
+            assert line.journal.unfinished() is not None, cut
+            assert line.run(line.recovery) == "old", cut
+            assert line.as_before, cut
+
+
+def test_what_was_saved_is_never_touched() -> None:
+    for cut in cuts(Line1, lambda line: jogged):
+        line = wrecked(cut, jogged, {})
+        line.simulated.power_cycle()
+        assert line.as_before, "a power cycle gives it back as well"
