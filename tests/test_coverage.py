@@ -19,6 +19,7 @@ from motorbus.core.family import Explanation, Family
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
+from motorbus.families.stepper.wire import COMMANDS as COMMANDS_OF_THE_STEPPER
 from motorbus.simulation.named import Simulation
 from scripts import coverage
 from scripts.coverage import Command, Coverage, Object, Unsent
@@ -216,6 +217,25 @@ def test_every_register_of_every_feetech_map_is_on_the_page() -> None:
     assert set(told.maps) == set(told.family.tables)
     for name, table in told.family.tables.items():
         assert {one.row.name for one in told.objects if name in one.maps} == set(table)
+
+
+def test_every_stepper_command_is_on_the_page_and_nothing_is_left_for_later() -> None:
+    told = TOLD["stepper"]
+    numbers = [one.manual.removeprefix("item ") for one in told.commands]
+    assert sorted(numbers) == sorted(command.number for command in COMMANDS_OF_THE_STEPPER.values())
+    assert len(numbers) == 27
+    for one in told.commands:
+        own = f"stepper {_words_of(one)} BUS"
+        assert one.api
+        assert any(line.startswith(own) for line in one.cli), own
+        assert not one.later
+
+
+def _words_of(one: Command) -> str:
+    (found,) = (
+        name for name, command in COMMANDS_OF_THE_STEPPER.items() if f"item {command.number}" == one.manual
+    )
+    return found.replace("_", "-")
 
 
 @pytest.mark.parametrize(("told", "one", "map_"), OBJECTS)

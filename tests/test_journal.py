@@ -79,6 +79,19 @@ def test_nothing_begins_while_another_change_is_unfinished(path: Path, state: st
     assert len(lines(path)) == 2
 
 
+def test_a_change_may_say_itself_what_it_is(path: Path) -> None:
+    """The words of its family stand where its verb alone would tell nobody; anything but words is none."""
+    for said in ("the borrow of project 1 (for jog)", 7):
+        kept = BusJournal(BUS, path)
+        kept(Journal("jog", INTENT, {"node": 1, "what": said}))
+        what = said if isinstance(said, str) else "jog() of #1"
+        assert kept.warning().startswith(f"{what}, begun 20")
+        with pytest.raises(RequestError) as caught:
+            kept(Journal("home", ASKED, {"node": 1}))
+        assert caught.value.summary.startswith(f"{what}, begun 20")
+        kept.forget()
+
+
 def test_a_step_of_another_change_is_refused() -> None:
     kept = begun(None)
     with pytest.raises(RequestError, match="unfinished"):

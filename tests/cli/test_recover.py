@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -216,6 +217,60 @@ def test_a_family_that_keeps_no_journal_says_what_to_do_instead(run: Run) -> Non
 def test_programs_are_told_how_it_is_addressed_now(run: Run, half: Simulation) -> None:
     document = run("recover", half.url, "--yes", "--json").document
     assert (document["outcome"], "address" in document) == ("old", False)
+
+
+@pytest.fixture
+def lent() -> Iterator[Simulation]:
+    """A stepper controller whose project 1 was borrowed when its host was cut off."""
+    with motorbus.simulate("stepper") as simulation, motorbus.open(simulation.url) as bus:
+        image = simulation[1].store.image(1)
+        facts = {
+            "node": 1,
+            "what": "the borrow of project 1 (for jog)",
+            "image": image.hex(),
+            "order": "little",
+            "wanted": {"step_1_speed": 60},
+        }
+        assert bus.journal is not None
+        bus.journal(Journal("jog", INTENT, facts))
+        bus.close()
+        yield simulation
+
+
+def test_a_borrowed_project_is_called_by_its_name(run: Run, lent: Simulation) -> None:
+    asked = run("recover", lent.url)
+    assert asked.code == 8
+    assert "finish the borrow of project 1 (for jog), or take it back" in asked.err
+    ran = run("recover", lent.url, "--yes", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.document == {
+        "schema": "motorbus.recover/1",
+        "bus": lent.url,
+        "change": "jog",
+        "id": 1,
+        "what": "the borrow of project 1 (for jog)",
+        "begun": ran.document["begun"],
+        "outcome": "old",
+        "simulated": True,
+    }
+    assert run("recover", lent.url).out == f"simulated\nnothing is unfinished on {lent.url}\n"
+
+
+def test_a_dry_run_of_giving_back_shows_the_stop_first(run: Run, lent: Simulation) -> None:
+    ran = run("recover", lent.url, "--dry-run")
+    assert ran.code == 0, ran.err
+    assert ran.out.index("FF AA 5E") < ran.out.index("FF AA 03 0D") < ran.out.index("FF AA 03 05")
+    assert run("recover", lent.url, "--forget", "--yes").out.endswith(
+        "forgotten: the borrow of project 1 (for jog)\n"
+    )
+
+
+def test_a_borrow_is_listed(run: Run, state_folder: Path) -> None:
+    kept = BusJournal("stepper:/dev/ttyUSB7", journal_path("/dev/ttyUSB7"))
+    kept(Journal("move_by", INTENT, {"node": 1, "what": "the borrow of project 1 (for move_by)"}))
+    ran = run("recover")
+    assert "the borrow of project 1 (for move_by)" in ran.out
+    assert "motorbus recover stepper:/dev/ttyUSB7" in ran.out
 
 
 def test_nothing_to_do(run: Run, arm: Simulation, state_folder: Path) -> None:

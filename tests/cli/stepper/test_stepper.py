@@ -5,10 +5,8 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.cli.stepper import say
-from motorbus.core.operation import CanFrame
-from motorbus.families.stepper import Sends
 from tests.cli.conftest import Run
+from tests.cli.stepper.conftest import Line
 
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"
 WORKS = [
@@ -17,10 +15,30 @@ WORKS = [
     "info BUS#1",
     "info BUS#1 --registers",
     "read BUS#1 total_steps step_1_speed",
+    "read BUS#1",
+    "write BUS#1 step_1_delay=500ms --yes",
+    "write BUS#1 step_1_delay=500ms --dry-run",
+    "move BUS#1+=90deg",
+    "move BUS#1-=0.25turn --velocity 60rpm",
+    "move BUS#1+=90deg --dry-run",
+    "jog BUS#1=60rpm --seconds 0.3",
+    "monitor BUS#1 --count 1",
+    "recover BUS",
     "stop BUS",
     "stop BUS#1 --dry-run",
     "estop BUS#1",
 ]
+ASKS_ONLY = [
+    "scan BUS",
+    "scan BUS --baud all",
+    "ping BUS#1",
+    "info BUS#1",
+    "info BUS#1 --registers",
+    "read BUS#1 total_steps",
+    "stepper read-project BUS --project 4",
+    "recover BUS",
+]
+"""Commands that look at a controller; none of them needs to know an input."""
 
 
 @pytest.mark.parametrize("command", WORKS)
@@ -35,12 +53,27 @@ def test_it_works_and_says_that_it_is_simulated(command: str, run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["write BUS#1 step_1_speed=3 --yes", "move BUS#1=1", "torque on BUS#1", "set-id BUS#1 4 --yes"]
+    ("command", "told"),
+    [
+        ("move BUS#1=1", "do not know where they are"),
+        ("move BUS#1=90deg", "BUS#1+=90deg or BUS#1-=90deg"),
+        ("torque on BUS#1", "stepper devices have no"),
+        ("calibrate BUS#1 --yes", "stepper devices have no"),
+        ("set-id BUS#1 4 --yes", "stepper devices have no"),
+        ("move BUS#2+=1", "is not the id of a stepper controller"),
+        ("move BUS#1+=1 --acceleration 5", "without --acceleration"),
+        ("move BUS#1+=1 BUS#1+=1", "one device goes at a time"),
+        ("move BUS#1+=far", "is not a number"),
+        ("read BUS#1 colour", "colour"),
+        ("write BUS#1 colour=red --yes", "colour"),
+        ("write BUS#1 step_1_delay=soon --yes", "is not a number"),
+    ],
 )
-def test_what_it_cannot_is_refused_before_a_port_is_opened(command: str, run: Run) -> None:
+def test_what_it_cannot_is_refused_before_a_port_is_opened(command: str, told: str, run: Run) -> None:
     ran = run(*command.replace("BUS", "stepper:/dev/not-there").split(), "-vv")
     assert (ran.code, ran.out) == (2, "")
-    assert "stepper devices have no" in ran.err
+    assert told.replace("BUS", "stepper:/dev/not-there") in ran.err
+    assert ran.err.count("error: ") == 1
 
 
 def test_a_scan_tells_the_frame_it_sends(run: Run) -> None:
@@ -49,10 +82,41 @@ def test_a_scan_tells_the_frame_it_sends(run: Run) -> None:
     assert f"this is sent and nothing else: {READ_1} (read project 1)" in ran.err
 
 
-def test_only_what_is_sent_is_told() -> None:
-    assert say("anything else") == ""
-    assert say(Sends(CanFrame(1, b""), 9600)) == ""
-    assert READ_1 in say(Sends(bytes.fromhex(READ_1), 9600))
+@pytest.mark.parametrize("command", ASKS_ONLY)
+def test_looking_sends_nothing_but_read_project(command: str, run: Run, line: Line) -> None:
+    """A frame that begins with a motor number, or with 00, would set a register of an attitude sensor."""
+    run(*command.replace("BUS", line.url).split())
+    assert {data[2] for data in line.heard} == {0x3E}
+
+
+@pytest.mark.parametrize("command", ["stop BUS", "monitor BUS --count 1"])
+def test_whoever_names_no_controller_is_told_what_is_sent_to_find_it(
+    command: str, run: Run, line: Line
+) -> None:
+    ran = run(*command.replace("BUS", line.url).split())
+    assert (ran.code, ran.err.count(READ_1)) == (0, 1)
+
+
+def test_ports_are_listed_and_not_asked(run: Run, line: Line) -> None:
+    assert run("ports").code == 0
+    assert line.heard == []
+
+
+def test_an_input_is_watched_at_the_rate_that_the_line_allows(run: Run) -> None:
+    with motorbus.simulate("stepper", pace=True) as simulation:
+        ran = run("monitor", f"{simulation.url}#1", "--rate", "20", "--count", "5")
+    assert ran.code == 0
+    assert "which is all that the line and the devices allow" in ran.err
+
+
+def test_its_inputs_are_its_telemetry(run: Run, line: Line) -> None:
+    line.simulation[1].set_input(5, True)
+    assert run("read", f"{line.url}#1", "--json").document["input_5"] is True
+    (sample,) = run("monitor", f"{line.url}#1", "--count", "1", "--json").records
+    assert (sample["input_4"], sample["input_5"]) == (False, True)
+    head, row = run("monitor", f"{line.url}#1", "--count", "1").out.splitlines()[1:]
+    assert head.split("  ")[-2:] == ["input 5", "alarm"]
+    assert row.split() == ["1", "yes"]
 
 
 def test_a_dump_is_explained_by_the_names_it_is_read_by(run: Run) -> None:

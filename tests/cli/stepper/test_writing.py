@@ -88,7 +88,7 @@ def test_what_would_not_do_what_it_says_needs_an_expert(run: Run, line: Line, tm
     )
     ran = run("stepper", "write", str(path), line.url, "--yes")
     assert (ran.code, line.heard) == (2, [])
-    assert "--expert writes it all the same" in ran.err
+    assert "`motorbus stepper check` names them all; with --expert it is written all the same" in ran.err
     assert run("stepper", "write", str(path), line.url, "--yes", "--expert").code == 0
 
 

@@ -82,7 +82,7 @@ def apart(rounds: Rounds, usual: int) -> int:
 
 @pytest.mark.parametrize("verb", [*WORKS, "jog_forward", "home as it is"])
 def test_at_every_line(verb: str, rounds: Rounds) -> None:
-    more: dict[str, Any] = {"home_switch": "wired", "home_at": -300} if verb.startswith("home") else {}
+    more: dict[str, Any] = {"home_switch": "wired", "home_at": -30} if verb.startswith("home") else {}
     works: dict[str, Work] = {
         **{name: work for name, (work, _) in WORKS.items()},
         "jog_forward": lambda device: device.jog_forward(0.2),
@@ -90,7 +90,7 @@ def test_at_every_line(verb: str, rounds: Rounds) -> None:
     }
     at, notes = 0, START
     while notes is not None:
-        at += apart(rounds, 41)
+        at += apart(rounds, 61)
         line = Line1(**more)
         notes = interrupted(line, works[verb], Interrupt(at))
         check(line, notes, at)

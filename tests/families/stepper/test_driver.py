@@ -239,17 +239,16 @@ def test_verbs_can_be_awaited() -> None:
     assert program.dump() == DUMP_A
 
 
-def test_what_it_cannot_do_yet_is_absent() -> None:
+def test_what_it_cannot_do_is_absent() -> None:
     absent = {
-        "write",
-        "write_project",
-        "jog",
-        "home",
         "move",
-        "save",
         "telemetry",
         "position",
         "calibrate",
+        "zero",
+        "enable_torque",
+        "disable_torque",
+        "alarms",
     }
     assert [name for name in absent if hasattr(Controller, name)] == []
     with bench() as there:

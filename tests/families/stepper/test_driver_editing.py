@@ -21,7 +21,7 @@ from motorbus.families.stepper.table import (
 )
 from tests.families.stepper.bench import Bench, Tampering, bench
 from tests.families.stepper.program.projects import projects
-from tests.families.stepper.written import KINDS, LONGER, PICK, cut_at, named, stored
+from tests.families.stepper.written import KINDS, LONGER, PICK, cut_at, named, program, stored
 
 SELECT = "FF AA 6E"
 kinds = pytest.mark.parametrize("kind", KINDS, ids=named)
@@ -104,6 +104,30 @@ def test_what_another_project_left_under_this_name_is_written_over() -> None:
         found = bring(there, PICK.with_step(1, delay=1))
         assert (found.view, found.commands, found.dumps) == ("working", 2 + 78, 4)
         assert edited(there) == PICK.with_step(1, delay=1)
+
+
+def test_a_controller_that_shows_what_is_stored_is_found_out_once() -> None:
+    with bench(read_view="stored") as there:
+        there.simulated.put(2, PICK)
+        found = bring(there, PICK.with_step(1, delay=1))
+        assert (found.view, found.commands, found.dumps) == ("stored", 2 + 78, 2)
+        found = bring(there, PICK.with_step(1, delay=2))
+        assert (found.view, found.commands, found.dumps) == ("stored", 78, 1)
+        assert edited(there) == PICK.with_step(1, delay=2)
+
+
+class Numberless(Tampering):
+    """Dumps do not repeat the number of the project, which is an assumption."""
+
+    def change(self, data: bytes, number: int) -> bytes:
+        return data[:6] + b"\0" + data[7:] if len(data) == 226 else data
+
+
+def test_a_dump_without_its_number_will_do() -> None:
+    with bench(line=Numberless()) as there:
+        there.simulated.put(2, PICK)
+        assert there.device.write_project(program(PICK, delay=1)).commands == 3
+        assert stored(there.simulated, 2) == PICK.with_step(1, delay=1)
 
 
 def test_rows_behind_the_last_step_are_brought_too() -> None:

@@ -122,8 +122,8 @@ def test_the_estimate_is_the_simulated_position_to_a_pulse(made: Project, how: d
         there.simulated.put(1, made)
         beside = Beside(there)
         there.bus.report = beside
-        there.device.run(1, how=Behaviour(**how))
-        assert beside.pairs
+        ran = there.device.run(1, how=Behaviour(**how))
+        assert beside.pairs or ran.seconds == 0
         for _, truth, estimate in beside.pairs:
             assert estimate == pytest.approx(truth, abs=1.0 + 1e-6)
 

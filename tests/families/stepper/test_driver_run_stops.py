@@ -78,6 +78,7 @@ def test_input_4_stops_it_and_who_watches_knows(watch: tuple[int, ...], outcome:
 def test_input_4_that_was_active_before_has_stopped_nothing() -> None:
     with Running() as there:
         there.simulated.set_input(4, True)
+        there.simulator.press(4, False, 1.0)
         assert there.go(watch=(4,)).outcome is Outcome.COMPLETED
 
 

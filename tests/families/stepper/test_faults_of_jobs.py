@@ -136,10 +136,11 @@ class Jobs(Rig):
         return told is not None
 
     def selected(self, project: int) -> bool:
-        """Select it without damage."""
-        before = self.there.store.stored[project]
+        """Select it without damage. A controller that loses its supply after that tells nobody."""
+        before, cuts = self.there.store.stored[project], self.mischief.fired["cut"]
         told = self._judged("select", type(self.device).select.function(self.device, project), 60.0)
-        if told is not None and self.there.store.selected != project:
+        whole = self.mischief.fired["cut"] == cuts
+        if told is not None and whole and self.there.store.selected != project:
             raise FalseWord(f"project {project} was told to be selected")
         if self.there.store.stored[project] != before:
             raise FalseWord(f"selecting project {project} has damaged it")
@@ -147,7 +148,7 @@ class Jobs(Rig):
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("share", [0.005, 0.05])
+@pytest.mark.parametrize("share", [0.01, 0.1])
 def test_jobs_among_all_faults_are_as_they_are_told(share: float, rounds: Callable[[int], int]) -> None:
     total = rounds(100_000) // 10
     line = Mischief(31, share, *FAULTS)
@@ -162,8 +163,8 @@ def test_jobs_among_all_faults_are_as_they_are_told(share: float, rounds: Callab
         f"{jobs.refused} without steps refused; {jobs.untouched} jobs without a fault, all of which succeeded; the "
         f"longest took {jobs.longest:.1f} s of its own time"
     )
-    assert line.count > total / 20
-    assert jobs.outcomes[Outcome.COMPLETED] > total / 50
-    assert set(jobs.outcomes) >= {Outcome.COMPLETED, Outcome.UNKNOWN}
+    assert line.count > total / 10
+    assert set(jobs.outcomes) >= {Outcome.COMPLETED, *([Outcome.UNKNOWN] if share >= 0.1 else [])}
+    assert jobs.outcomes[Outcome.COMPLETED] > total / 20
     assert jobs.refused > 0
-    assert jobs.untouched > total / 20
+    assert jobs.untouched > total / 50

@@ -35,8 +35,10 @@ def test_each_bus_has_a_memory_of_its_own() -> None:
         assert Controller(bus).memory.owed and not Controller(other).memory.owed
 
 
-def test_nothing_of_it_moves_an_axis_yet() -> None:
-    assert FAMILY.axis("stepper controller") == {}
+def test_it_is_an_axis_that_moves_by_and_has_no_position() -> None:
+    axis = FAMILY.axis("stepper controller")
+    assert set(axis) == {"move_by", "jog", "home", "stop"}
+    assert FAMILY.axis("") == {}
 
 
 def test_a_simulation_has_the_motor_of_its_bus() -> None:

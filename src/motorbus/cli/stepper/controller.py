@@ -13,9 +13,10 @@ from motorbus.cli.output import Bar
 from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
+from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
-from motorbus.errors import RequestError
-from motorbus.families.stepper import Controller
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
 
 if TYPE_CHECKING:
@@ -81,9 +82,13 @@ def carried_out(
 
 def _refused_early(do: Callable[[Controller], Runnable[object]]) -> None:
     """Begin it on a controller of no bus, as far as its first step, which is not carried out."""
-    begun = iter(do(Node()))  # type: ignore[arg-type]
-    next(begun, None)
-    begun.close()
+    try:
+        begun = iter(do(Node()))  # type: ignore[arg-type]
+        next(begun, None)
+        begun.close()
+    except MotorbusError as error:
+        in_words_of_the_shell(error, FAMILY)
+        raise
 
 
 def _rehearsed(bus: Bus, do: Callable[[Controller], Runnable[object]]) -> dry.DryBus:

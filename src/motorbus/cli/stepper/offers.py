@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "set_output()": "`motorbus stepper set-output`",
     "read_input()": "`motorbus stepper read-input`",
     "inputs()": "`motorbus stepper inputs`",
+    "lint()": "`motorbus stepper check`",
     "expert=True": "--expert",
     "endless=True": "--endless",
     "stop_first=True": "--stop-first",

@@ -8,7 +8,10 @@ before a motor turns, and `simulator` makes it a device.
     Program      a project as a file, an image or frames: read, checked, timed, planned
     Conditions   what a project is judged against
     Behaviour    how a controller carries a project out where nobody knows
+    Profile      how one controller was found to carry them out
     Controller   what a real one has stored, the level of an input, and an end to whatever it does
+    Written      what was written to it, and as `Proof` how far that is known
+    Backup       what it had stored, as a file
 
 `FAMILY` is what the rest of motorbus knows of it.
 """
@@ -39,28 +42,35 @@ from motorbus.families.stepper.driver import (
     AsyncController,
     Controller,
     Promise,
+    Proof,
     Sends,
+    Written,
     line,
     presence,
     stopping,
 )
 from motorbus.families.stepper.execution import Behaviour
-from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
+from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Profile, Program
+from motorbus.families.stepper.program.backups import Backup
 from motorbus.families.stepper.table import RATE, TABLES, Order, checked_order
 
 __all__ = [
     "FAMILY",
     "AsyncController",
+    "Backup",
     "Behaviour",
     "Conditions",
     "Controller",
     "Estimate",
     "Finding",
     "Plan",
+    "Profile",
     "Program",
     "Promise",
+    "Proof",
     "Sends",
     "Stepper",
+    "Written",
 ]
 
 _SETTINGS: Final = (
@@ -71,6 +81,15 @@ _SETTINGS: Final = (
         "stepper controller serial protocol manual has the lowest first in requests and says nothing of the dump",
     ),
 )  # fmt: skip
+
+
+_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
+    "move_by": driver.move_by,
+    "jog": driver.jog,
+    "home": driver.home,
+    "stop": driver.stop,
+}
+"""No position and no move to one: there is none to ask for."""
 
 
 class Stepper:
@@ -148,7 +167,7 @@ class Stepper:
         return driver.scan(ids, rates, self._motor)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        return {}  # no position to ask for; what moves comes with the verbs that move
+        return _AXIS if model == presence.MODEL else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.stepper.simulator import simulate

@@ -7,11 +7,12 @@ each of its 226 bytes has a name, if only "reserved".
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Explanation, Part
+from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
 from motorbus.families.stepper.program.dumps import faults
 
@@ -135,15 +136,18 @@ def _head(data: bytes, command: wire.Command | None) -> list[Field]:
 
 def _request(data: bytes) -> Explanation:
     command = wire.command_of(data[2], data[3])
-    fields, faults, values = _head(data, command), [], []
+    fields, faults, values, raws = _head(data, command), [], [], {}
     for place in command.places if command else ():
         at = sum(field.size for field in fields)
         fields += _unused(data[at : place.offset])
         raw = int.from_bytes(data[place.offset : place.offset + place.size], "little")
         fields.append(Field(place.size, place.name, _value(place.name, raw, command)))
         values.append(f"{place.name.replace('_', ' ')} {_value(place.name, raw, command)}")
+        raws[place.name] = raw
         if not table.is_allowed(place.name, raw, expert=True):
             faults.append(f"{place.name} {raw} is not possible: {table.allowed(place.name, expert=True)}")
+    if command is not None and not faults:
+        faults += _refused(command, raws)
     fields += _unused(data[sum(field.size for field in fields) : -1])
     due = wire.checksum(data)
     right = data[-1] == due
@@ -156,6 +160,14 @@ def _request(data: bytes) -> Explanation:
         faults.insert(0, f"the checksum is {data[-1]:02X}, {due:02X} is right")
     title = table.ORDERS[command.name].title if command else "unknown request"
     return _made(data, f"request: {', '.join([title, *values])}", fields, "; ".join(faults))
+
+
+def _refused(command: wire.Command, raws: Mapping[str, int]) -> Iterator[str]:
+    """Why nobody would send numbers of which each is possible: a loop that ends before it begins."""
+    try:
+        table.check(command.name, raws, expert=True)
+    except RequestError as error:
+        yield f"{error.summary}: {error.expected}"
 
 
 def _unused(data: bytes) -> list[Field]:

@@ -124,7 +124,7 @@ def loan_of(verb: str, facts: Mapping[str, Any]) -> Loan:
         loan = Loan(verb, image, order, _changed(decode_image(image, order), facts["wanted"]))
         if verb not in VERBS:
             raise ValueError(verb)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise RequestError(
             f"these are not the facts of a borrow that can be recovered: {error!r}",
             expected="what the journal of the bus holds of a jog(), a move_by() or a home()",
@@ -142,6 +142,8 @@ def _changed(project: Project, values: Mapping[str, int]) -> Project:
             project = replace(project, **changes)
         else:
             _, step, field = name.split("_", 2)
+            if int(step) not in range(1, STEPS + 1):
+                raise ValueError(name)
             project = project.with_step(int(step), **{field: value})
     return project
 

@@ -14,7 +14,7 @@ from motorbus.core.operation import Alone, Operation, Pause, Progress, Report
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.costs import Taken, taken
-from motorbus.families.stepper.driver.editing import FLAGS, changes, differs, read_back
+from motorbus.families.stepper.driver.editing import FLAGS, changes, differs, held, read_back
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.selecting import cleared, is_blank
 from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
@@ -105,7 +105,7 @@ def _still_so(node: Node, meant: dict[int, Project]) -> Operation[None]:
         return
     for project in written_ones:
         image, _ = yield from read_back(node, project)
-        if decode_image(image, node.order) != project:
+        if held(node, image, project.number) != project:
             raise differs(
                 node, image, project, f"project {project.number} was restored and has changed with the others",
                 "this controller has one stop mode, mode 4 and homing at power-on for all projects: say which is meant",

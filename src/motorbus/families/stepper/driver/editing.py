@@ -92,30 +92,35 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
 
     `before_image` are the 220 bytes that were read before, and `after.number` says of which project. Only what differs
     is sent, behind the command that selects the project; nothing at all is sent, and nothing read, when nothing
-    differs, unless `every` field is wanted. A right read-back is one reading. If it is not right, every field is sent
-    and it is read again: then it is as meant, view "working", or both times as it was before, and the controller shows
-    what is stored, view "stored": what is edited cannot be seen then, but each field of it was acknowledged.
+    differs, unless `every` field is wanted. A read-back that is right, or as before, is one reading. If it is not
+    right, every field is sent and it is read again: then it is as meant, view "working", or both times as it was
+    before, and the controller shows what is stored, view "stored": what is edited cannot be seen then, but each field
+    of it was acknowledged. On a bus where that has shown, every field is sent at once.
 
     Edits of another project that were not saved are lost. Call it inside `Alone`, for another caller's selection in
     between would lead these edits elsewhere. Reports `Progress`. Raises RequestError for a number that may not be
     sent, before anything is; VerificationFailed when the read-back is neither; OutcomeUnknown when a command was not
     acknowledged. An error from the middle has a note that says what may be half written.
     """
-    before = decode_image(before_image, node.order)
+    before = held(node, before_image, after.number)
     some = _orders(node, edits_to(before, after))
     if not some and not every:
         return Readback(before_image, "untold", 0, 0)
-    whole = _orders(node, edits(after, rows=STEPS), strict=False)
+    whole = _orders(node, all_edits(after), strict=False)
+    rounds = [whole] if node.memory.shows_stored else [whole if every else some, whole]
     commands, dumps, unmoved = 0, 0, True
-    for orders in (whole if every else some, whole):
+    for orders in rounds:
         yield from _told(node, after.number, orders)
-        image, count = yield from noted(read_back(node, after), _unsaved(after.number))
+        reading = read_until(node, after.number, lambda it: it == after or _is_alike(it, before))
+        image, count = yield from noted(reading, _unsaved(after.number))
         commands, dumps = commands + len(orders), dumps + count
-        shown = decode_image(image, node.order)
+        shown = held(node, image, after.number)
         if shown == after:
+            node.memory.shows_stored = node.memory.shows_stored and not some
             return Readback(image, "working" if some else "untold", commands, dumps)
         unmoved = unmoved and _is_alike(shown, before)
     if unmoved:
+        node.memory.shows_stored = True
         return Readback(image, "stored", commands, dumps)
     raise differs(
         node, image, after, f"project {after.number} is being edited and does not read as it was written",
@@ -123,11 +128,22 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     )  # fmt: skip
 
 
+def held(node: Node, image: bytes, number: int) -> Project:
+    """The project of this number that an image holds; that it repeats its number there is an assumption, 0 will do."""
+    project = decode_image(image, node.order)
+    return project if project.number else replace(project, number=number)
+
+
 def edits_to(before: Project, after: Project) -> list[Edit]:
     """The commands that make one project of the other, none when nothing differs; a cleared one is written in full."""
     if before.is_cleared:
         return edits(after, rows=_filled(after))
     return edits_between(before, after, rows=STEPS)
+
+
+def all_edits(after: Project) -> list[Edit]:
+    """The commands that write every field of a project, all ten rows: 78."""
+    return edits(after, rows=STEPS)
 
 
 def selected(node: Node, project: Project) -> Operation[None]:
@@ -147,7 +163,7 @@ def read_back(node: Node, meant: Project) -> Operation[tuple[bytes, int]]:
 def read_until(node: Node, project: int, right: Callable[[Project], bool]) -> Operation[tuple[bytes, int]]:
     """As `read_back`, where more than one project would be right."""
     image = (yield from dump_once(node, project))[wire.REPLY_LENGTH :]
-    if right(decode_image(image, node.order)):
+    if right(held(node, image, project)):
         return image, 1
     seen = yield from readings(node, project)
     return agreed(node, project, seen)[wire.REPLY_LENGTH :], 1 + len(seen)
@@ -155,11 +171,11 @@ def read_until(node: Node, project: int, right: Callable[[Project], bool]) -> Op
 
 def differs(node: Node, image: bytes, meant: Project, what: str, advice: str) -> VerificationFailed:
     """The error for a project that does not read as it is meant; it says what the controller shows now."""
-    shown = decode_image(image, node.order)
+    shown = held(node, image, meant.number)
     found = [str(one) for one in changes(meant, shown)]
     more = f" and {len(found) - _MOST} more" if len(found) > _MOST else ""
     other: Order = "big" if node.order == "little" else "little"
-    swapped = decode_image(image, other) == meant
+    swapped = replace(decode_image(image, other), number=meant.number) == meant
     return VerificationFailed(
         what,
         received=image,

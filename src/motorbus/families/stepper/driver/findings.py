@@ -61,9 +61,10 @@ class Findings:
         if what not in self.doubts:
             self.doubts.append(what)
 
-    def rests_on_silence(self, names: tuple[str, ...]) -> bool:
-        """Whether one of these answers rests on something that did not come."""
-        return not self._silent.isdisjoint(names)
+    @property
+    def firm(self) -> dict[str, Setting]:
+        """The answers that do not rest on something that did not come."""
+        return {name: value for name, value in self.known.items() if name not in self._silent}
 
     def profile(self) -> Profile:
         """What is left of it now."""

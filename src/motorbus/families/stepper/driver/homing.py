@@ -34,8 +34,8 @@ TOLD: Final = 0.25
 
 
 class Homed(NamedTuple):
-    """Input 5 was seen active twice in a row, after so many `seconds` in reverse at this `velocity` (rad/s), and the stop
-    was accepted."""
+    """Input 5 was seen active twice in a row, after so many `seconds` in reverse at this `velocity` (rad/s, reckoned
+    from project 1), and the stop was accepted."""
 
     node: int
     seconds: float

@@ -50,8 +50,8 @@ _SPEED: Final = 0xFFFF
 class Moved(NamedTuple):
     """A motion that was ordered and has had its time: all of it *estimated*, for the controller tells nothing of it.
 
-    `angle` in rad of the motor, forward positive; `velocity` in rad/s, likewise; `seconds` how long it may take at most,
-    and what was waited.
+    `angle` in rad of the motor, forward positive; `velocity` in rad/s, likewise; `seconds` how long it may take at
+    most, and what was waited.
     """
 
     node: int

@@ -28,12 +28,19 @@ from motorbus.families.stepper.driver.commands import motion, nothing
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.experiments import Act
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.reading import read_input
 from motorbus.families.stepper.driver.stopping import stop
 from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.table import Edit, Project, edits
 
 FLAGS: Final = ("set_stop_mode", "set_mode4", "set_power_on_home")
 """What may belong to the device and not to a project, so no experiment touches it unasked."""
+
+
+QUIET: Final = 0.05
+"""s without a word before a run. With the reading before it, nothing of what was said earlier delays the start: behind
+a stop a bus makes sure first that the answers it gets are new.
+"""
 
 
 class Heard(NamedTuple):
@@ -100,7 +107,8 @@ def _listening(heard: Callable[[Notice], bool], seconds: float) -> Operation[Not
 def _said(
     node: Node, watch: Watch, project: Project, acts: Sequence[Act]
 ) -> Generator[Step, Any, tuple[tuple[float, ...], tuple[float | None, ...]]]:
-    began = now = yield from Pause(0.0)
+    yield from outcome(read_input(node, 1))
+    began = now = yield from Pause(QUIET)
     sent: list[float] = []
     answered: list[float | None] = []
     for act in acts:

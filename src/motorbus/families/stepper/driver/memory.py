@@ -19,6 +19,7 @@ class Memory:
     `outputs`  the level last commanded, by output 1 to 3 and 5, the LEDs; None where that is not known
     `proven`   a dump has come: there is a controller, and not only a line that echoes
     `unsaved`  the project that was edited last without being saved, as it was meant to be; None: none was
+    `shows_stored` when that was tried last, reading showed what was stored, and not what was being edited
     """
 
     def __init__(self) -> None:
@@ -29,6 +30,7 @@ class Memory:
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), int(OutputPort.LEDS)))
         self.proven = False
         self.unsaved: Project | None = None
+        self.shows_stored = False
 
     def commanded(self, ports: tuple[int, ...], active: bool | None) -> None:
         """These outputs were switched; None: something that nobody can see may have switched them."""

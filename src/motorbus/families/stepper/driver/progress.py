@@ -92,8 +92,8 @@ class Twin:
             return 0.0
         step, since = self._steps[state.run.place.step], at - state.since
         if state.phase is Phase.MOVE:
-            return min(since, step.motion)
-        return step.motion + (min(since, step.delay) if state.phase is Phase.DWELL else 0.0)
+            return since
+        return step.motion + (since if state.phase is Phase.DWELL else 0.0)
 
 
 def _offsets(plan: Plan) -> Mapping[Place, float]:

@@ -14,7 +14,7 @@ from motorbus.core.operation import Alone, Operation, Pause, outcome
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken
-from motorbus.families.stepper.driver.editing import differs, noted, read_back, read_until, selected
+from motorbus.families.stepper.driver.editing import differs, held, noted, read_back, read_until, selected
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
 from motorbus.families.stepper.table import Project, decode_image
@@ -35,18 +35,17 @@ def select(node: Node, project: int) -> Operation[int]:
 
 
 def _selected(node: Node, project: int) -> Operation[int]:
-    held = decode_image((yield from taken(node, project)).image, node.order)
-    if held.is_cleared:
+    before = held(node, (yield from taken(node, project)).image, project)
+    if before.is_cleared:
         raise RequestError(
             f"project {project} has been cleared: selecting it would give it a step",
             expected="a project with steps",
             advice="write it; nothing was changed",
             node=node.node,
         )
-    before = replace(held, number=project)
     yield from selected(node, before)
     image, _ = yield from read_back(node, before)
-    if decode_image(image, node.order) != before:
+    if held(node, image, project) != before:
         raise differs(
             node, image, before, f"project {project} was selected and does not read as before",
             "save nothing now; write_project writes whole projects on such a controller, and a power cycle brings back "
@@ -73,7 +72,7 @@ def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written
     raise RequestError(
         f"nothing of project {number} was edited on this bus and left unsaved",
         expected="edits of this host: saving stores whatever is being edited, also another project",
-        advice="write_project saves what it writes; expert saves all the same; nothing was sent",
+        advice="write_project() saves what it writes; with expert=True it is saved all the same; nothing was sent",
         node=node.node,
     )
 
@@ -87,11 +86,11 @@ def _kept(node: Node, meant: Project) -> Operation[Written]:
 def _saved_as_is(node: Node, project: int) -> Operation[Written]:
     began = yield from Pause(0)
     found = yield from taken(node, project)
-    before = replace(decode_image(found.image, node.order), number=project)
+    before = held(node, found.image, project)
     note = f"project {project} was being saved: what it holds is not known; read it"
     yield from noted(commands.save_project(node, project), note)
     image, dumps = yield from noted(read_back(node, before), note)
-    if decode_image(image, node.order) != before:
+    if held(node, image, project) != before:
         raise differs(
             node, image, before, f"project {project} was saved and does not read as before",
             "another project was being edited, or this controller shows what is stored; write it if it is not as meant",
@@ -116,7 +115,7 @@ def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]
         raise RequestError(
             f"project {number} is not cleared: jog, single move and homing take their speed from its step 1",
             expected="project 2, 3 or 4",
-            advice="expert clears it all the same; nothing was sent",
+            advice="with expert=True it is cleared all the same; nothing was sent",
             node=node.node,
         )
     return (yield from Alone(_emptied(node, number)))

@@ -147,5 +147,6 @@ def _repeated(case: Case, timing: Timing, trial: Trial) -> Operation[Verdict | N
             return None
         seen.append(timing.seen(heard))
         verdict = judged(trial, found.known, seen, timing.turnaround)
-        verdict = verdict._replace(silent=verdict.silent or found.rests_on_silence(trial.depends))
+        firm = judged(trial, found.firm, seen, timing.turnaround)
+        verdict = verdict._replace(silent=verdict.silent or firm.answers != verdict.answers)
     return verdict

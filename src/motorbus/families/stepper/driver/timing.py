@@ -13,7 +13,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.experiments import Seen, Trial
 from motorbus.families.stepper.driver.findings import Case
 from motorbus.families.stepper.driver.listening import Heard, listened, timed, write
-from motorbus.families.stepper.driver.reading import dump_once
+from motorbus.families.stepper.driver.reading import dump_once, read_input
 from motorbus.families.stepper.driver.trials import controls
 
 MARGIN: Final = 0.6
@@ -74,10 +74,7 @@ def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Oper
     if abs(clock - 1) > CLOCK:
         case.found.doubt(f"a pause of 1 s takes {clock:.2f} s")
         return None
-    asked = yield from Pause(0.0)
-    whole = (yield from timed(dump_once(case.node, case.scratch))) - asked
-    byte = max(0.0, whole - latency) / (wire.DUMP_LENGTH - wire.REPLY_LENGTH)
-    turnaround = max(0.0, latency - byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH))
+    turnaround = yield from _turnaround(case)
     found = Timing(first - clock * short, clock, latency, turnaround)
     measured = {"overhead": found.offset, "turnaround": turnaround, "clock": clock}
     case.found.measured.update({name: round(value, 5) for name, value in measured.items()})
@@ -87,21 +84,41 @@ def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Oper
     return found
 
 
+def _turnaround(case: Case) -> Operation[float]:
+    """s that it thinks: a short answer and a long one tell what a byte takes, and with that what is no byte."""
+    yield from read_input(case.node, 1)
+    begin = yield from Pause(0.0)
+    short = (yield from timed(read_input(case.node, 1))) - begin
+    begin = yield from Pause(0.0)
+    whole = (yield from timed(dump_once(case.node, case.scratch))) - begin
+    byte = max(0.0, whole - short) / (wire.DUMP_LENGTH - wire.REPLY_LENGTH)
+    return max(0.0, short - byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH))
+
+
 def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) -> Operation[Heard | None]:
     """Carry it out once, `latency` being how soon its commands should be answered; None, and a doubt, when they were
     not, or when a notice came that cannot be of this run.
     """
     heard = yield from listened(case.node, case.watch, trial.project, trial.acts, seconds, wanted)
-    came = [one - sent for sent, one in zip(heard.sent, heard.answered, strict=True) if one is not None]
     if heard.answered[0] is None:
         case.found.doubt("a start was not acknowledged")
-    elif max(came) > latency + STEADY:
+    elif _slowest(trial, heard) > latency + STEADY:
         case.found.doubt("an acknowledgement came late")
     elif any(end < heard.answered[0] - STEADY for end in heard.notices):
         case.found.doubt("a notice came before the project was started")
     else:
         return heard
     return None
+
+
+def _slowest(trial: Trial, heard: Heard) -> float:
+    """How late the latest answer was; not of a command behind a stop, before which a bus may have something to ask."""
+    behind = [False, *(act.command.startswith("stop") for act in trial.acts)]
+    return max(
+        came - sent
+        for sent, came, other in zip(heard.sent, heard.answered, behind, strict=False)
+        if came is not None and not other
+    )
 
 
 def _answer(heard: Heard) -> float:

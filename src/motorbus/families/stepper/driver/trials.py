@@ -36,19 +36,21 @@ def controls(motor: Motor, scratch: int) -> tuple[Trial, Trial]:
 
 
 def trials(motor: Motor, scratch: int, empty: int | None) -> tuple[Trial, ...]:
-    """All experiments with the clock, in their order; `empty` is a project without steps, when there is one."""
-    found = (
+    """All experiments with the clock, in their order; `empty` is a project without steps, when there is one.
+
+    That one is started while the scratch project is selected: a selected project is run as it is edited, so with steps.
+    """
+    with_scratch = (
         _loops(motor, scratch),
         _rounding(motor, scratch),
         _notice_on_stop(motor, scratch),
         _busy(motor, scratch),
         _motor_stop(motor, scratch),
         _zero_distance(motor, scratch),
-        _notice_on_once(motor),
-        _stop_scope(motor),
-        _stop_scope_by_notice(motor),
     )
-    return found if empty is None else (*found, _cleared(empty))
+    without_steps = () if empty is None else (_cleared(empty),)
+    by_hand = _notice_on_once(motor), _stop_scope(motor), _stop_scope_by_notice(motor)
+    return (*with_scratch, *without_steps, *by_hand)
 
 
 def _loops(motor: Motor, scratch: int) -> Trial:

@@ -71,7 +71,6 @@ class Wait:
         self._lost: MotorbusError | None = None
         self._button = False
         self._notices: list[tuple[float, bool]] = []
-        self._latest: Notice | None = None
 
     # -- what happens -----------------------------------------------------------------------------------------------
 
@@ -88,9 +87,8 @@ class Wait:
         self._button = True
 
     def heard(self, notice: Notice) -> bool:
-        """A notice; True when whoever listens should look. One that two listeners hear is one."""
-        if notice.kind == wire.COMPLETED and notice is not self._latest:
-            self._latest = notice
+        """A notice; True when whoever listens should look. One that two listeners hear counts as one."""
+        if notice.kind == wire.COMPLETED:
             self._notices.append((notice.at, self._memory.stopping > 0))
             self.look(notice.at)
         return self.pending or self.ran is not None

@@ -14,20 +14,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from motorbus.core.entry import Entry, Value, shown
 from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
-from motorbus.families.stepper.driver import commands
+from motorbus.families.stepper.driver.commands import save_project
 from motorbus.families.stepper.driver.costs import Cost, Taken, taken
 from motorbus.families.stepper.driver.editing import (
     Change,
     Readback,
+    all_edits,
     brought,
     changes,
     differs,
     edits_to,
+    held,
     noted,
     read_back,
 )
@@ -41,12 +43,8 @@ from motorbus.families.stepper.table import (
     STEPS,
     Edit,
     Project,
-    decode_image,
     refusals,
 )
-
-AFTER: Final = 2
-"""Dumps behind the edits when all goes well: one before the save, one after it."""
 
 
 class Proof(Enum):
@@ -145,8 +143,8 @@ def difference(
 ) -> Operation[Difference]:
     """What `write_project` would write, and its cost; only reads.
 
-    The cost is that of a controller that does as is assumed. One that shows what is stored, or keeps another project's
-    numbers when a project is selected, is found out while writing, and takes 78 commands more.
+    The cost is that of a controller that does as is assumed, or is known on this bus to show what is stored. One that
+    does, or keeps another project's numbers when a project is selected, is found out while writing: 78 commands more.
     Raises RequestError as `write_project` does for what no project can hold, and as `dump`.
     """
     number, wanted = _wanted(program, project)
@@ -197,6 +195,7 @@ def written(
     plan = compared(node, found, meant, raw, save=save)
     edited = Readback(found.image, "working", 0, 0)
     if plan:
+        node.memory.unsaved = None
         yield from Report(Planned(plan))
         edited = yield from brought(node, found.image, meant)
     elif not (save and node.memory.unsaved == meant):
@@ -218,7 +217,7 @@ def saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
         f"project {meant.number} was being saved: it may hold the old values or the new ones; read it, and write it "
         "again if it is not as meant",
     )
-    if decode_image(kept.image, node.order) != meant:
+    if held(node, kept.image, meant.number) != meant:
         raise differs(
             node, kept.image, meant, f"project {meant.number} was saved and does not read as it was written",
             "what was read is what the controller shows now; write the project again, which sends what differs",
@@ -227,34 +226,29 @@ def saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
 
 
 def _saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
-    told = yield from outcome(commands.save_project(node, meant.number))
+    told = yield from outcome(save_project(node, meant.number))
     if isinstance(told, MotorbusError) and not isinstance(told, OutcomeUnknown | WireError):
         raise told
     image, dumps = yield from read_back(node, meant)
-    as_meant = decode_image(image, node.order) == meant
+    as_meant = held(node, image, meant.number) == meant
     if told is None or (as_meant and edited.view == "stored"):
         return Kept(image, 1, dumps, Proof.ACKNOWLEDGED)
     again = yield from brought(node, image, meant, every=True)
-    yield from commands.save_project(node, meant.number)
+    yield from save_project(node, meant.number)
     image, last = yield from read_back(node, meant)
     return Kept(image, 2 + again.commands, dumps + again.dumps + last, Proof.ACKNOWLEDGED)
 
 
 def compared(node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool) -> Difference:
     """How a project that was just read differs from `meant`."""
-    before = decode_image(found.image, node.order)
+    before = held(node, found.image, meant.number)
     edits = tuple(edits_to(before, meant))
-    commands_ = len(edits) + (1 if save and edits else 0)
-    dumps = found.dumps + ((AFTER if save else AFTER - 1) if edits else 0)
-    return Difference(
-        meant.number,
-        before,
-        meant,
-        tuple(changes(before, meant)),
-        edits,
-        unwritable(found.image, raw),
-        found.tempo.cost(commands_, dumps, saves=1 if save and edits else 0),
-    )
+    saves = 1 if save and edits else 0
+    commands = 0 if not edits else len(all_edits(meant)) if node.memory.shows_stored else len(edits)
+    dumps = found.dumps + (1 + saves if edits else 0)
+    cost = found.tempo.cost(commands + saves, dumps, saves)
+    reserved = unwritable(found.image, raw)
+    return Difference(meant.number, before, meant, tuple(changes(before, meant)), edits, reserved, cost)
 
 
 def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
@@ -272,7 +266,7 @@ def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -
 def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Operation[Written]:
     began = yield from Pause(0)
     found = yield from taken(node, number)
-    before = decode_image(found.image, node.order)
+    before = held(node, found.image, number)
     if before.is_cleared and "total_steps" not in raws:
         raise RequestError(
             f"project {number} has been cleared, and a project needs steps",
@@ -280,7 +274,7 @@ def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Op
             advice="nothing was written",
             node=node.node,
         )
-    meant = amended(replace(before, number=number), raws)
+    meant = amended(before, raws)
     return (yield from written(node, found, meant, found.image, save=save, began=began))
 
 
@@ -342,14 +336,14 @@ def _linted(program: Program, wanted: Project, expert: bool) -> None:
         raise RequestError(
             f"the program for project {wanted.number} would not do what it says: {errors[0]}",
             expected=f"no errors of lint; it has {len(errors)}",
-            advice="see program.lint(); expert writes it all the same; nothing was sent",
+            advice="lint() names them all; with expert=True it is written all the same; nothing was sent",
         )
 
 
 def _meant(node: Node, found: Taken, wanted: Project) -> Project:
     """With the rows behind the last step as the controller has them."""
-    held = decode_image(found.image, node.order)
-    return replace(wanted, steps=wanted.steps[: wanted.total_steps] + held.steps[wanted.total_steps :])
+    there = held(node, found.image, wanted.number)
+    return replace(wanted, steps=wanted.steps[: wanted.total_steps] + there.steps[wanted.total_steps :])
 
 
 def _raw(node: Node, row: Entry, value: Value) -> int:

@@ -24,6 +24,7 @@ from motorbus.families.stepper.program.course import Course, Picture, Stretch, c
 from motorbus.families.stepper.program.fit import Fit, Run, fit
 from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, Finding, Rule, lint, net_units
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
+from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.program.schema import schema
 from motorbus.families.stepper.table import BLANK, Order, Project, encode_image
 
@@ -149,6 +150,7 @@ __all__ = [
     "Fit",
     "Picture",
     "Plan",
+    "Profile",
     "Program",
     "Rule",
     "Run",

@@ -94,8 +94,10 @@ def picture(
 ) -> Picture:
     """What one draws of a course: position in turns (mm where a `lead` is given), speed in RPM, outputs and inputs.
 
-    Outputs and inputs are called by their names; those that never change and have none are left out.
+    Outputs and inputs are called by their names. There is a lane for each that has one, that a step mentions, or that
+    changes; switching all of them off mentions none.
     """
+    mentioned = _mentioned(project)
     columns = course.samples(count)
     turn = float(project.pulses_per_turn or 1)
     scale, label = (float(lead) / turn, "position (mm)") if lead else (1 / turn, "position (turns)")
@@ -106,12 +108,12 @@ def picture(
     lanes: dict[str, list[bool]] = {}
     for port in range(1, OUTPUTS + 1):
         levels = [bool(bits >> port - 1 & 1) for bits in columns["outputs"]]
-        _lane(
-            lanes, _called(port, "output", outputs), levels, named=bool(outputs and port in outputs.values())
-        )
+        wanted = port in (outputs or {}).values() or ("output", port) in mentioned
+        _lane(lanes, _called(port, "output", outputs), levels, wanted=wanted)
     for port in range(1, INPUTS + 1):
         levels = [port in active for active in columns["inputs"]]
-        _lane(lanes, _called(port, "input", inputs), levels, named=bool(inputs and port in inputs.values()))
+        wanted = port in (inputs or {}).values() or ("input", port) in mentioned
+        _lane(lanes, _called(port, "input", inputs), levels, wanted=wanted)
     return Picture(columns["time"], curves, lanes, _spans(course))
 
 
@@ -119,8 +121,18 @@ def _called(port: int, kind: str, names: Mapping[str, int] | None) -> str:
     return next((name for name, other in (names or {}).items() if other == port), f"{kind} {port}")
 
 
-def _lane(lanes: dict[str, list[bool]], name: str, levels: list[bool], *, named: bool) -> None:
-    if named or any(levels):
+def _mentioned(project: Project) -> set[tuple[str, int]]:
+    """The outputs and inputs of which a step that is carried out says something."""
+    found: set[tuple[str, int]] = set()
+    for number in range(1, execution.last_step(project) + 1):
+        step = project.step(number)
+        found |= {("output", port) for port in range(1, OUTPUTS + 1) if step.output in (port, port + 4)}
+        found |= {("input", port) for port in (step.start_input, step.stop_input) if port}
+    return found
+
+
+def _lane(lanes: dict[str, list[bool]], name: str, levels: list[bool], *, wanted: bool) -> None:
+    if wanted or any(levels):
         lanes[name] = levels
 
 

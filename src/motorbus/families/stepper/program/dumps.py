@@ -1,9 +1,10 @@
 """Raw dumps as files hold them, and lists of command frames, taken in and given out.
 
 A dump file is the 226 bytes that a controller sent, or the 220 of the image alone, as they are or in hexadecimal. There
-is no checksum, so what can be checked is: that the project is said twice alike, that a range is one, that no number is
-outside what its field may hold. What fails is told with field and range, for a bit that has turned over in a file is
-not to be sent to a motor.
+is no checksum, so what can be checked is: that the project is said twice alike, and that no number is one that no
+command puts there. What fails is told with field and range, for a bit that has turned over in a file is not to be sent
+to a motor. What a controller may well hold is taken, if it makes sense or not: a loop that a shorter project has left
+behind, no geometry after clearing. The lint tells that.
 """
 
 from __future__ import annotations
@@ -14,9 +15,24 @@ from typing import Final, NamedTuple
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
-from motorbus.families.stepper.table import Order, Project, decode_image, edited, edits, refusals
+from motorbus.families.stepper.program.words import HELD
+from motorbus.families.stepper.table import (
+    BASE_NAMES,
+    STEP_NAMES,
+    STEPS,
+    Order,
+    Project,
+    check,
+    decode_image,
+    edited,
+    edits,
+    refusal,
+    refusals,
+)
 
 _HEX: Final = re.compile(rb"[\s0-9A-Fa-f]+")
+_HELD: Final = {**HELD, "total_steps": range(STEPS + 1)}
+"""0 steps: it was cleared, and has not been selected since."""
 _AFTER: Final = frozenset({"save_project"})
 
 
@@ -31,7 +47,7 @@ class Raw(NamedTuple):
 def from_dump(data: bytes, *, order: Order = "little", strict: bool = True, expert: bool = True) -> Raw:
     """A dump of 226 bytes, or an image of 220, or either of them in hexadecimal.
 
-    With `strict` every named field must hold what it may. Raises RequestError, naming the field and its range.
+    With `strict` no field may hold what no command puts there. Raises RequestError, naming the field and its range.
     """
     image, asked = _image(_binary(data))
     project = decode_image(image, order)
@@ -47,26 +63,26 @@ def from_dump(data: bytes, *, order: Order = "little", strict: bool = True, expe
 
 
 def faults(project: Project, asked: int = 0, *, expert: bool = True) -> Iterator[tuple[str, str]]:
-    """What in a dump cannot be: what is wrong, and what may be. A project that has been cleared is right."""
-    if project == Project() or project == Project(number=project.number):
-        return
-    if asked and project.number != asked:
+    """What in a dump cannot be, for no commands that are taken lead there: what is wrong, and what may be.
+
+    Steps behind the last one are not judged, nor is what the lint is for. A project that was cleared has the number 0.
+    """
+    if asked and project.number != asked and (project.number or project.total_steps):
         yield f"number: the reply says project {asked} and its image {project.number}", f"{asked} twice"
-    for error in refusals(project, expert=expert):
-        yield error.summary, error.expected
-    first, last, total = project.loop_first, project.loop_last, project.total_steps
-    if (first or last) and not 1 <= first <= last <= total:
-        yield (
-            f"loop_first, loop_last: {first} to {last} of {total} steps",
-            f"1 <= first <= last <= {total}, or 0 0",
-        )
+    carried_out = range(1, min(project.total_steps, STEPS) + 1)
+    numbers = [(name, 0, getattr(project, name)) for name in BASE_NAMES]
+    numbers += [(name, n, getattr(project.step(n), name)) for n in carried_out for name in STEP_NAMES]
+    for name, step, raw in numbers:
+        error = refusal(name, raw, step=step, expert=expert)
+        if error is not None and raw not in _HELD.get(name, ()):
+            yield error.summary, error.expected
 
 
 def frames(project: Project, *, motor: int = wire.MOTOR, save: bool = True) -> list[bytes]:
     """The requests that write a project and, with `save`, keep it: 9 + 7n of them for n steps.
 
     Raises RequestError for a project that has been cleared, and for a number that a controller would ignore: it would
-    then write the rest into whichever project is selected.
+    then write the rest into whichever project is selected. A loop from a step to an earlier one is refused too.
     """
     if project == Project(number=project.number):
         raise RequestError(
@@ -76,6 +92,8 @@ def frames(project: Project, *, motor: int = wire.MOTOR, save: bool = True) -> l
         )
     for error in refusals(project, expert=True):
         raise error
+    for edit in edits(project):
+        check(edit.command, edit.values, expert=True)
     found = [edit.frame(motor) for edit in edits(project)]
     return [*found, wire.encode("save_project", project=project.number)] if save else found
 

@@ -168,6 +168,8 @@ def _geometry(project: Project, _: Conditions) -> Iterator[Finding]:
     if project == Project(number=project.number):
         yield Finding("L1", 0, "the project has been cleared: it has no steps either")
         return
+    if project.is_cleared:
+        yield Finding("L8", 0, "the project has no steps: it has been cleared, and not selected since")
     for name in ("step_angle", "microsteps", "turn_distance"):
         if not getattr(project, name):
             yield Finding("L1", 0, f"{name} is 0")

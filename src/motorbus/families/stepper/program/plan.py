@@ -68,6 +68,7 @@ class Estimate:
     `waits`    how often it waits for an input, in the same time, at least `seconds` being without them
     `cuts`     how often a stop input may end a motion early, so that it takes less
     `low`, `high`  the same in the readings of the acceleration, `readings` says each
+    `stuck`    the first step that never ends by itself, 0 when each does
     """
 
     seconds: float
@@ -75,6 +76,7 @@ class Estimate:
     cuts: int
     endless: bool
     readings: Mapping[str, float]
+    stuck: int = 0
 
     @property
     def low(self) -> float:
@@ -87,6 +89,8 @@ class Estimate:
         return max(self.seconds, *self.readings.values())
 
     def __str__(self) -> str:
+        if self.stuck:
+            return f"never ends: step {self.stuck}" + (", unless a stop input ends it" if self.cuts else "")
         waits = f" + {self.waits} wait{'s' if self.waits > 1 else ''}" if self.waits else ""
         text = f"at least {duration(self.seconds)}{waits}" + (
             " for each pass, without an end" if self.endless else ""
@@ -108,6 +112,7 @@ class Estimate:
             "low": finite(self.low),
             "high": finite(self.high),
             "readings": {name: finite(seconds) for name, seconds in self.readings.items()},
+            "never_ends_at_step": self.stuck or None,
         }
 
 
@@ -208,6 +213,7 @@ def _estimate(project: Project, how: Behaviour, steps: tuple[StepPlan, ...]) -> 
             text: _in_all(_steps(project, replace(how, **changes), runs)) * times
             for text, changes in READINGS.items()
         },
+        stuck=next((step.number for step in steps if step.motion == inf), 0),
     )
 
 

@@ -38,6 +38,7 @@ LENGTH: Final[Mapping[str, Fraction]] = {
     "m": Fraction(1000),
 }
 """mm of each unit of length."""
+NEEDS_LEAD: Final = "millimetres need `lead` in [motor]"
 DISTANCES: Final = ("units", "pulses", "turns", "deg", *LENGTH)
 SPEEDS: Final = ("rpm", "Hz", "deg/s", "mm/s")
 _SAME: Final = {
@@ -51,7 +52,7 @@ _SAME: Final = {
 
 
 class Geometry(NamedTuple):
-    """What one turn of the motor is: in pulses, in user units, and in mm where a lead is given."""
+    """What one turn of the motor is: in pulses, in user units, and in mm where a lead is given; 0: it is not known."""
 
     pulses: Fraction
     units: int
@@ -59,20 +60,30 @@ class Geometry(NamedTuple):
 
     @classmethod
     def of(cls, project: Project, lead: Fraction | None = None) -> Geometry:
-        """That of a project whose geometry makes sense."""
+        """That of a project."""
         return cls(project.pulses_per_turn or Fraction(0), project.turn_distance, lead)
 
     def turns(self, unit: str) -> Fraction | None:
         """Turns of the motor in one of this unit of distance; None when it is unknown, or mm without a lead."""
         if unit == "units":
-            return Fraction(1, self.units)
+            return Fraction(1, self.units) if self.units else None
         if unit == "pulses":
-            return 1 / self.pulses
+            return 1 / self.pulses if self.pulses else None
         if unit in ("turns", "deg"):
             return Fraction(1, 1 if unit == "turns" else 360)
         if unit in LENGTH and self.lead:
             return LENGTH[unit] / self.lead
         return None
+
+    def each(self, unit: str) -> Fraction | None:
+        """User units in one of this unit of distance, also of a motor of which nothing else is known; or None."""
+        turns = self.turns(unit)
+        return Fraction(1) if unit == "units" else turns * self.units if turns is not None else None
+
+    def said(self, units: tuple[str, ...]) -> str:
+        """These units as one may say them here: those of length only with a lead."""
+        usable = [unit for unit in units if self.lead or unit.partition("/")[0] not in LENGTH]
+        return f"a number with one of {', '.join(usable)}"
 
 
 class Amount(NamedTuple):
@@ -142,13 +153,12 @@ def clock(ms: int) -> str:
 
 def distance(text: object, where: str, geometry: Geometry) -> tuple[int, bool]:
     """A signed distance -> user units, and whether it is in reverse (also for -0)."""
-    expected = f"a number with one of {', '.join(DISTANCES)}"
+    expected = geometry.said(DISTANCES)
     said = amount(text, where, expected)
-    turns = geometry.turns(said.unit)
-    if turns is None:
-        why = "millimetres need `lead` in [motor]" if said.unit in LENGTH else ""
+    each = geometry.each(said.unit)
+    if not each:
+        why = NEEDS_LEAD if said.unit in LENGTH and not geometry.lead else ""
         raise refuse(f"{where}: {shown(text)} has no unit of distance that is known here", expected, why)
-    each = turns * geometry.units
     count = abs(said.number) * each
     if count > PARAMETERS["distance"].high:
         most = PARAMETERS["distance"].high
@@ -161,14 +171,14 @@ def distance(text: object, where: str, geometry: Geometry) -> tuple[int, bool]:
 
 def speed(text: object, where: str, geometry: Geometry) -> int:
     """A speed -> RPM."""
-    expected = f"a number with one of {', '.join(SPEEDS)}"
+    expected = geometry.said(SPEEDS)
     said = amount(text, where, expected)
     each = Fraction(1)
     if said.unit != "rpm":
         per, _, time = said.unit.rpartition("/")
         turns = geometry.turns("pulses" if said.unit == "Hz" else per)
         if turns is None or (said.unit != "Hz" and time != "s"):
-            why = "mm/s needs `lead` in [motor]" if per in LENGTH else ""
+            why = "mm/s needs `lead` in [motor]" if per in LENGTH and not geometry.lead else ""
             raise refuse(f"{where}: {shown(text)} has no unit of speed that is known here", expected, why)
         each = turns * 60
     if said.number < 0:
@@ -207,11 +217,13 @@ def milliseconds(text: object, where: str) -> int:
     return whole(total, where, text, "ms", "delay", clock)
 
 
-def hundredths(text: object, where: str) -> int:
-    """A step angle, such as `1.8 deg`, -> hundredths of a degree."""
+def hundredths(text: object, where: str, *, expert: bool = False) -> int:
+    """A step angle, such as `1.8 deg`, -> hundredths of a degree; an `expert` may say that there is none, 0."""
     said = amount(text, where, "an angle such as 1.8 deg")
     if said.unit != "deg" or said.number < 0:
         raise refuse(f"{where}: {shown(text)} is no angle", "an angle such as 1.8 deg")
+    if expert and not said.number:
+        return 0
     return whole(
         said.number * 100, where, text, "hundredths", "step_angle", lambda count: f"{count / 100:g} deg"
     )

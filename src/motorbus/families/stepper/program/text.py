@@ -17,7 +17,7 @@ from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper.program import names, quantities
 from motorbus.families.stepper.program.quantities import Geometry, refuse
-from motorbus.families.stepper.program.words import range_of, within
+from motorbus.families.stepper.program.words import HELD, range_of, within
 from motorbus.families.stepper.table import (
     BASE_NAMES,
     ENDLESS,
@@ -25,6 +25,7 @@ from motorbus.families.stepper.table import (
     STEPS,
     Project,
     Step,
+    is_allowed,
     with_steps,
 )
 
@@ -64,7 +65,7 @@ def parse(text: str) -> Source:
     _known(data, TOP, "the file")
     expert = _boolean(data, "expert", "expert")
     inputs, outputs = (names.named(data.get(f"{kind}s", {}), kind) for kind in ("input", "output"))
-    base, lead, motor = _motor(_table(data, "motor"))
+    base, lead, motor = _motor(_table(data, "motor"), expert)
     first, last, count = _loop(_table(data, "loop"))
     base = replace(
         base, number=_integer(data, "project", "project", 1), project_loop=_repeat(data.get("repeat", 1))
@@ -81,7 +82,11 @@ def parse(text: str) -> Source:
         )
     _refuse(replace(made, total_steps=len(steps)), expert)
     _refuse(made, expert)
-    _check_loop(made)
+    if not expert and not _loop_is_range(made):
+        raise refuse(
+            f"[loop]: {first} to {last} is no range of the {made.total_steps} steps",
+            f"1 <= first <= last <= {made.total_steps}",
+        )
     name = data.get("name", "")
     if not isinstance(name, str):
         raise refuse(f"name: {shown(name)} is no text", "text in quotes")
@@ -89,20 +94,16 @@ def parse(text: str) -> Source:
 
 
 def write(source: Source) -> str:
-    """The file for a project: what `parse` makes the same project of.
+    """The file for a project: what `parse` makes the same project of, with `expert = true` where only that takes it.
 
     Raises RequestError for a project that no file may say, as one with an output action of 9.
     """
     project, expert = source.project, source.expert or _needs_expert(source.project)
-    if project == Project(number=project.number):
-        raise refuse(
-            f"project {project.number} has been cleared: there is nothing for a file to say",
-            "at least one step",
-        )
+    if project.is_cleared:
+        raise _unsaid(project)
     steps = _filled(project)
     _refuse(project, expert)
     _refuse(replace(project, total_steps=steps), expert)
-    _check_loop(project)
     lines = [f"format = {FORMAT}"]
     lines += [f"name = {_quoted(source.name)}"] if source.name else []
     lines += [f"project = {project.number}"]
@@ -142,11 +143,11 @@ def _toml(text: str) -> dict[str, Any]:
 def _format(data: Mapping[str, Any]) -> None:
     found = data.get("format")
     if type(found) is not int or found != FORMAT:
-        what = "is missing" if found is None else f"{shown(found)} is not known"
+        missing = found is None
         raise RequestError(
-            f"format: {what}",
+            f"format: {'is missing' if missing else f'{shown(found)} is not known'}",
             expected=f"format = {FORMAT}",
-            advice="a newer motorbus may read it; nothing was sent",
+            advice=f"{'write that first' if missing else 'a newer motorbus may read it'}; nothing was sent",
         )
 
 
@@ -179,9 +180,9 @@ def _boolean(table: Mapping[str, Any], key: str, where: str) -> bool:
     return value
 
 
-def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None, str]:
+def _motor(table: Mapping[str, Any], expert: bool) -> tuple[Project, Fraction | None, str]:
     _known(table, MOTOR, "[motor]")
-    angle, microsteps, told = _geometry(table)
+    angle, microsteps, told = _geometry(table, expert)
     lead = quantities.millimetres(table["lead"], "lead") if "lead" in table else None
     stop = table.get("stop", STOPS[0])
     if stop not in STOPS:
@@ -196,18 +197,18 @@ def _motor(table: Mapping[str, Any]) -> tuple[Project, Fraction | None, str]:
     return replace(base, turn_distance=_turn_distance(table, base, lead)), lead, told
 
 
-def _geometry(table: Mapping[str, Any]) -> tuple[int, int, str]:
+def _geometry(table: Mapping[str, Any], expert: bool) -> tuple[int, int, str]:
     """Step angle (hundredths of a degree), microsteps, and in words what is told where the file says it otherwise."""
     if "microsteps" not in table:
         raise refuse("microsteps: they are missing in [motor]", range_of("microsteps"))
     microsteps = _integer(table, "microsteps", "microsteps", 0)
-    within("microsteps", microsteps)
+    within("microsteps", microsteps, expert=expert)
     if ("step_angle" in table) == ("full_steps" in table):
         raise refuse(
             "step_angle: [motor] needs step_angle or full_steps, one of them", 'step_angle = "1.8 deg"'
         )
     if "step_angle" in table:
-        return quantities.hundredths(table["step_angle"], "step_angle"), microsteps, ""
+        return quantities.hundredths(table["step_angle"], "step_angle", expert=expert), microsteps, ""
     full = _integer(table, "full_steps", "full_steps", 0)
     angle, found = quantities.motor_of(full, microsteps, "full_steps")
     if found == microsteps:
@@ -225,19 +226,13 @@ def _turn_distance(table: Mapping[str, Any], base: Project, lead: Fraction | Non
         return _integer(table, "turn_distance", "turn_distance", 0)
     said = str(table["unit"]).strip()
     text = f"1 {said}" if said in ("pulse", "turn") else table["unit"]
-    unit = quantities.amount(text, "unit", "pulse, turn, or an amount such as 0.001 mm or 0.01 deg")
-    turns = (
-        Geometry(base.pulses_per_turn or Fraction(1), 1, lead).turns(unit.unit)
-        if unit.unit != "units"
-        else None
-    )
+    known = "pulse, turn, 0.01 deg" + (", 0.001 mm" if lead else "")
+    unit = quantities.amount(text, "unit", known)
+    turn = Geometry(base.pulses_per_turn or Fraction(0), 0, lead)  # of the units in it nothing is known yet
+    turns = turn.turns(unit.unit)
     if turns is None or unit.number <= 0:
-        why = "millimetres need `lead` in [motor]" if unit.unit in quantities.LENGTH else ""
-        raise refuse(
-            f"unit: {shown(table['unit'])} is no unit of distance here",
-            "pulse, turn, 0.001 mm, 0.01 deg",
-            why,
-        )
+        why = quantities.NEEDS_LEAD if unit.unit in quantities.LENGTH and not lead else ""
+        raise refuse(f"unit: {shown(table['unit'])} is no unit of distance here", known, why)
     each = 1 / (unit.number * turns)
     return quantities.whole(
         each,
@@ -314,13 +309,9 @@ def _refuse(project: Project, expert: bool, *, steps: bool = True) -> None:
             within(name, getattr(project.step(number), name), number, expert=expert)
 
 
-def _check_loop(project: Project) -> None:
+def _loop_is_range(project: Project) -> bool:
     first, last = project.loop_first, project.loop_last
-    if (first or last) and not 1 <= first <= last <= project.total_steps:
-        raise refuse(
-            f"[loop]: {first} to {last} is no range of the {project.total_steps} steps",
-            f"1 <= first <= last <= {project.total_steps}",
-        )
+    return 1 <= first <= last <= project.total_steps or not (first or last)
 
 
 # --- writing --------------------------------------------------------------------------------------------------------
@@ -328,7 +319,22 @@ def _check_loop(project: Project) -> None:
 
 def _needs_expert(project: Project) -> bool:
     used = {number for step in project.steps for number in (step.start_input, step.stop_input)}
-    return bool(used & {3, 4})
+    held = any(not is_allowed(name, getattr(project, name)) for name in HELD)
+    return bool(used & {3, 4}) or held or not _loop_is_range(project)
+
+
+def _unsaid(project: Project) -> RequestError:
+    """The error for a project without steps, with whatever was written into it since it was cleared."""
+    number, blank = project.number, Project()
+    since = [name for name in BASE_NAMES if name != "number" and getattr(project, name)]
+    since += [f"step {n}" for n in range(1, STEPS + 1) if project.step(n) != blank.step(n)]
+    told = f"; {', '.join(since)} were written since" if since else ""
+    return RequestError(
+        f"project {number} has been cleared: there is nothing for a file to say{told}",
+        expected="at least one step",
+        cause="only selecting it again, which says how many steps it has, gives it steps" if since else "",
+        advice="keep it as a dump; nothing was sent" if since else "nothing was sent",
+    )
 
 
 def _filled(project: Project) -> int:

@@ -1,0 +1,55 @@
+"""Finding the reference: agreed to, bounded, and never left running."""
+
+from __future__ import annotations
+
+import pytest
+
+import motorbus
+from motorbus.core.operation import Pause
+from tests.cli.conftest import Run
+from tests.cli.stepper.conftest import line_of
+
+pytestmark = pytest.mark.usefixtures("state_folder")
+
+
+def homed(
+    run: Run, monkeypatch: pytest.MonkeyPatch, switch: str, *words: str
+) -> tuple[int, str, list[str], object]:
+    """Exit code, what was said, what was ordered, and how fast the motor turns 2 s later."""
+    with motorbus.simulate("stepper", home_switch=switch) as simulation:
+        line = line_of(simulation, monkeypatch)
+        ran = run("home", f"{line.url}#1", *words)
+        orders = line.orders()
+        with motorbus.open(line.url) as bus:
+            bus.run(iter(Pause(2.0)))  # a slow stop takes its time
+        return ran.code, ran.out + ran.err, orders, simulation[1].status()["frequency"]
+
+
+def test_it_ends_at_its_switch(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    code, said, orders, turning = homed(run, monkeypatch, "wired", "--yes")
+    assert (code, orders, turning) == (0, ["home", "stop_project", "stop_motor"], 0)
+    assert "input 5 was active" in said
+
+
+@pytest.mark.parametrize(("switch", "moved"), [("never", True), ("stuck", False)])
+def test_a_bad_switch_ends_with_8_and_at_rest(
+    switch: str, moved: bool, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, _, orders, turning = homed(run, monkeypatch, switch, "--deadline", "3s", "--yes")
+    assert (code, "home" in orders) == (8, moved)
+    assert turning == 0
+
+
+def test_it_asks_first(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    code, said, orders, _ = homed(run, monkeypatch, "wired")
+    assert (code, orders) == (8, [])
+    assert "until its switch is met" in said
+
+
+@pytest.mark.parametrize(
+    "words", ["stepper:sim", "feetech:sim#1", "stepper:sim#1 --deadline never", "stepper:sim#1 --deadline 0"]
+)
+def test_bad_input_ends_with_2(words: str, run: Run) -> None:
+    ran = run("home", *words.split(), "--yes")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.count("error: ") == 1

@@ -1,0 +1,70 @@
+"""Turning by hand: bounded, asked for when far, put back afterwards, and refused where it cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import pytest
+
+import motorbus
+from tests.cli.conftest import Run
+from tests.cli.stepper.conftest import Line, line_of
+
+pytestmark = pytest.mark.usefixtures("state_folder")
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
+    """A stepper controller as it is shipped."""
+    with motorbus.simulate("stepper") as simulation:
+        yield line_of(simulation, monkeypatch)
+
+
+def pulses(line: Line) -> object:
+    return line.simulation[1].status()["position"]
+
+
+@pytest.mark.parametrize(("speed", "turned"), [("60rpm", 400), ("-60rpm", -400), ("6.283185", 400)])
+def test_it_turns_as_far_as_speed_and_time_say(speed: str, turned: int, run: Run, line: Line) -> None:
+    ran = run("jog", f"{line.url}#1={speed}", "--seconds", "250ms")
+    assert (ran.code, ran.err) == (0, "")
+    assert "estimated" in ran.out
+    assert pulses(line) == turned
+    assert "save_project" not in line.orders(), "what was borrowed is put back, and nothing is saved"
+
+
+def test_a_long_way_needs_agreement(run: Run, line: Line) -> None:
+    assert run("jog", f"{line.url}#1=60rpm", "--seconds", "2").code == 8
+    assert (pulses(line), line.orders()) == (0, [])
+    ran = run("jog", f"{line.url}#1=60rpm", "--seconds", "2", "--yes", "--json")
+    assert ran.document["result"]["angle"] == pytest.approx(4 * math.pi)
+
+
+def test_a_dry_run_moves_nothing(run: Run, line: Line) -> None:
+    ran = run("jog", f"{line.url}#1=60rpm", "--seconds", "2", "--dry-run")
+    assert "FF AA 03 0C 00" in ran.out
+    assert line.orders() == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "BUS#1 --seconds 1",
+        "BUS#1=fast --seconds 1",
+        "BUS#1=nan --seconds 1",
+        "BUS#1=60rpm --seconds 0",
+        "BUS#1=60rpm --seconds 61",
+        "BUS#1=0 --seconds 1",
+        "BUS#1=60rpm",
+        "BUS=60rpm --seconds 1",
+        "BUS#2=60rpm --seconds 1",
+        "feetech:sim#1=60rpm --seconds 1",
+        "=60rpm --seconds 1",
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_nothing_moves(words: str, run: Run, line: Line) -> None:
+    ran = run("jog", *words.replace("BUS", line.url).split(), "--yes")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.count("error: ") == 1
+    assert line.orders() == []
