@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from itertools import accumulate, pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -119,6 +122,44 @@ def test_one_sample_of_a_sequence_is_enough(tmp_path: Path) -> None:
     assert (tmp_path / "one.png").stat().st_size > 1000
 
 
+def drawn(monkeypatch: pytest.MonkeyPatch, draw: Callable[[], None]) -> Any:
+    """The figure that this saves."""
+    from matplotlib.figure import Figure
+
+    figures: list[Any] = []
+    save = Figure.savefig
+
+    def kept(figure: Figure, *arguments: Any, **more: Any) -> None:
+        save(figure, *arguments, **more)
+        figures.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    draw()
+    return figures[0]
+
+
+@pytest.mark.parametrize(
+    "lengths", [(1.0, 1.0, 1.0, 1.0, 50.0), (50.0, 2.0, 0.1, 2.0, 3.0), (1.0,), (1.0,) * 90]
+)
+def test_names_of_spans_never_run_into_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lengths: tuple[float, ...]
+) -> None:
+    ends = list(accumulate(lengths))
+    names = ("9", "wait", "10", "a long name")
+    spans = [
+        plot.Span(end - long, end, names[n % 4], n % 4 == 1)
+        for n, (end, long) in enumerate(zip(ends, lengths, strict=True))
+    ]
+    figure = drawn(
+        monkeypatch,
+        lambda: plot.sequence(tmp_path / "p.png", [0.0, ends[-1]], {"x": [0.0, 1.0]}, {}, spans),
+    )
+    boxes = [label.get_window_extent() for label in figure.axes[0].texts]
+    assert all(one.x1 + 2 < other.x0 for one, other in pairwise(boxes))
+    assert all(figure.axes[0].bbox.x0 <= box.x0 and box.x1 <= figure.axes[0].bbox.x1 for box in boxes)
+    assert "9" in [label.get_text() for label in figure.axes[0].texts] or len(lengths) > 50
+
+
 @pytest.mark.parametrize(("curves", "lanes"), [({}, LANES), ({"x": [1.0]}, {}), (CURVES, {"on": [True]})])
 def test_a_sequence_that_does_not_fit_together_is_refused(
     tmp_path: Path, curves: dict[str, list[float]], lanes: dict[str, list[bool]]
@@ -139,5 +180,5 @@ def test_a_program_is_drawn_as_its_file_names_things(tmp_path: Path, monkeypatch
     spans = [plot.Span(*span) for span in picture.spans]
     plot.sequence(tmp_path / "p.svg", picture.times, picture.curves, picture.lanes, spans, title=program.name)
     text = (tmp_path / "p.svg").read_text(encoding="utf-8")
-    for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "wait", "Pick and place"):
+    for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "Pick and place"):
         assert word in text

@@ -18,6 +18,8 @@ _FAINT: Final = "#8c959f"
 _GRID: Final = "#e6e9ec"
 # Told apart by readers with any colour vision, and on a dark or a light page.
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+_ROOM: Final = 1.3
+"""Of the width of a label: so wide is the span that it stands above."""
 _MISSING: Final = "matplotlib is not installed, so no picture can be drawn"
 
 
@@ -113,6 +115,7 @@ def sequence(
     if len(times) > 1:
         axes[-1].set_xlim(times[0], times[-1])
     figure.align_ylabels()
+    _name_spans(figure, axes[0], spans)
     _saved(figure, path)
 
 
@@ -130,18 +133,25 @@ def _draw_lanes(axes: Any, times: Sequence[float], lanes: Mapping[str, Sequence[
 
 
 def _draw_spans(axes: Sequence[Any], spans: Sequence[Span]) -> None:
-    whole = max((span.end for span in spans), default=0.0)
     for number, span in enumerate(spans):
         for axis in axes:
             if span.waiting:
                 axis.axvspan(span.begin, span.end, facecolor="#fff3d6", edgecolor="none", zorder=0)
             elif number % 2:
                 axis.axvspan(span.begin, span.end, facecolor="#f3f5f7", edgecolor="none", zorder=0)
-        if span.end - span.begin > whole / 60:  # else its name would lie upon the next one
-            axes[0].text(
-                (span.begin + span.end) / 2, 1.0, span.name, transform=axes[0].get_xaxis_transform(),
-                ha="center", va="bottom", fontsize=7.5, color=_FAINT,
-            )  # fmt: skip
+
+
+def _name_spans(figure: Any, axes: Any, spans: Sequence[Span]) -> None:
+    """Write the name of each span above it where there is room, for else it would run into the next one."""
+    figure.draw_without_rendering()  # only then is it known how wide things are
+    for span in spans:
+        label = axes.text(
+            (span.begin + span.end) / 2, 1.0, span.name, transform=axes.get_xaxis_transform(),
+            ha="center", va="bottom", fontsize=7.5, color=_FAINT,
+        )  # fmt: skip
+        (begin, _), (end, _) = axes.transData.transform([(span.begin, 0.0), (span.end, 0.0)])
+        if end - begin < _ROOM * label.get_window_extent().width:
+            label.remove()
 
 
 def _sheet(title: str, simulated: bool) -> tuple[Any, Any]:

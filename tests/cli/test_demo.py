@@ -51,6 +51,12 @@ def test_what_is_no_order_ends_with_2(words: list[str], run: Run) -> None:
     assert run("demo", *words).code == 2
 
 
+def test_a_family_with_nothing_to_show_is_refused(run: Run) -> None:
+    ran = run("demo", "--family", "kst")
+    assert (ran.code, ran.out) == (2, "")
+    assert "feetech, stepper" in ran.err
+
+
 def test_the_wave_starts_and_ends_at_rest_and_is_smooth() -> None:
     step = 0.001
     wave = [demo.wave(number * step, 6.0, 0.3) for number in range(6001)]

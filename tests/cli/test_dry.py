@@ -11,7 +11,19 @@ from motorbus.cli import dry
 from motorbus.cli.dry import DryBus
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
-from motorbus.core.operation import Alone, Exchange, Operation, Pause, Report, Together, Tune
+from motorbus.core.operation import (
+    INTENT,
+    Alone,
+    Exchange,
+    Journal,
+    Listen,
+    Operation,
+    Pause,
+    Progress,
+    Report,
+    Together,
+    Tune,
+)
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import FAMILY, Servo
 from motorbus.families.feetech.driver import action_all
@@ -41,6 +53,30 @@ def test_the_gate_stands_in_a_dry_run_too(arm: Simulation) -> None:
         with pytest.raises(LimitExceeded):
             Servo(rehearsal, 1).move(9.0)
         assert rehearsal.frames == []
+
+
+def test_nobody_waits_in_a_rehearsal_but_its_time_passes(arm: Simulation) -> None:
+    def waiting() -> Operation[float]:
+        began = yield from Pause(0)
+        heard = yield from Listen(lambda _: True, 100.0)
+        assert heard is None
+        return (yield from Pause(1000.0)) - began
+
+    with motorbus.open(arm.url) as bus:
+        before = bus.link.now()
+        assert DryBus(bus).run(waiting()) == pytest.approx(1100.0, abs=0.1)
+        assert bus.link.now() - before < 0.1
+
+
+def test_events_are_heard_and_no_journal_is_kept(arm: Simulation) -> None:
+    def told() -> Operation[None]:
+        yield from Report(Journal("set_id", INTENT, {"node": 1}))
+        yield from Report(Progress(1, 2))
+
+    heard: list[object] = []
+    with motorbus.open(arm.url) as bus:
+        DryBus(bus).run(told(), report=heard.append)
+    assert heard == [Progress(1, 2)]
 
 
 def test_what_cannot_be_foreseen_says_so(arm: Simulation) -> None:

@@ -68,6 +68,16 @@ def test_what_cannot_be_done_is_refused_and_nothing_moves(
     assert stands(run, arm, 1) == pytest.approx(math.pi)
 
 
+@pytest.mark.parametrize("form", ["+=", "-="])
+def test_by_an_angle_go_those_only_that_do_not_know_where_they_are(
+    form: str, run: Run, arm: Simulation
+) -> None:
+    ran = run("move", f"{arm.url}#1{form}1", "--yes")
+    assert (ran.code, ran.out) == (2, "")
+    assert f"a position: {arm.url}#1=POSITION" in ran.err
+    assert stands(run, arm, 1) == pytest.approx(math.pi)
+
+
 def test_one_of_several_outside_its_limits_holds_back_all(run: Run, arm: Simulation) -> None:
     assert run("move", f"{arm.url}#1=2", f"{arm.url}#2=-1", "--yes").code == 8
     assert stands(run, arm, 1) == pytest.approx(math.pi)

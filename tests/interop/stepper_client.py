@@ -54,17 +54,19 @@ def ask(port: int, request: bytes, count: int, patience: float = 10.0) -> bytes:
 def main(name: str, manual: str, dumps: str) -> None:
     """Write, read, save, start, wait."""
     with open(manual, encoding="utf-8") as one, open(dumps, encoding="utf-8") as other:
-        examples = {row["expected"]["command"]: bytes.fromhex(row["hex"]) for row in json.load(one)[::-1]}
+        rows = [(row["expected"]["command"], bytes.fromhex(row["hex"])) for row in json.load(one)]
+        examples = {name: data for name, data in rows if len(data) == 11}
+        replies = {name: data for name, data in rows if len(data) == 6}
         wanted = bytes.fromhex(json.load(other)[0]["hex"])  # a project of one step
-    port = os.open(name, os.O_RDWR | os.O_NOCTTY)
-    tty.setraw(port)
-    requests = []
+    tty.setraw(port := os.open(name, os.O_RDWR | os.O_NOCTTY))
+    acknowledged = 0
     for commands, start, last in ((BASE, 0, {}), (STEP, 26, {9: b"\1"})):
         for command, places in commands.items():
             values = {at: wanted[start + where :][:size] for at, (where, size) in places.items()}
             selected = {3: b"\2"} if command == "select_project" else {}
-            requests.append(frame(examples[command], values | last | selected))
-    acknowledged = sum(ask(port, request, 6)[:3] == request[:3] for request in requests)
+            due = bytearray(replies[command])
+            due[3] *= 2 if due[2] > 3 else 1  # of project 2, the manual has 1
+            acknowledged += ask(port, frame(examples[command], values | last | selected), 6) == due
     dump = ask(port, frame(examples["read_project"], {3: b"\2"}), 226)
     said = [
         ask(port, frame(examples[f"{verb}_project"], {3: b"\2"}), n).hex()

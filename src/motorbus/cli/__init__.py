@@ -99,6 +99,7 @@ _COMMON: Final = re.compile(r"--json|--verbose|-v+")
 _MINUS: Final = "\N{MINUS SIGN}"
 _NEGATIVE: Final = re.compile(r"-[.]?[0-9].*")
 """A negative number, with a unit or without: no flag begins with a digit."""
+_BARE: Final = (int, float, "int", "float")
 
 _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#ID:
 
@@ -218,10 +219,10 @@ def parse(app: App, words: Sequence[str]) -> tuple[Any, BoundArguments, Mapping[
 
 
 def _numbers(app: App, words: Sequence[str]) -> set[str]:
-    """The options of the command meant that take a whole number."""
+    """The options of the command meant that take a number without a unit."""
     command = app.parse_commands(words)[1][-1].default_command
     named = signature(command).parameters.values() if command is not None else ()
-    return {f"--{one.name.replace('_', '-')}" for one in named if one.annotation in (int, "int")}
+    return {f"--{one.name.replace('_', '-')}" for one in named if one.annotation in _BARE}
 
 
 def _told(words: Sequence[str], numbers: set[str]) -> list[str]:

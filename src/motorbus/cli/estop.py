@@ -26,7 +26,8 @@ app = App(
     help_epilogue="""THE ARM WILL SAG: an emergency stop cuts the torque of FEETECH servos, and
 nothing holds them up then. `motorbus stop` decelerates and holds instead. KST
 servos have no torque switch: their target becomes the place where they were
-last seen, or asked for now, and they hold there.
+last seen, or asked for now, and they hold there. A stepper controller is told
+to end its project and to stop its motor, as fast as its stop mode says.
 
 A bus that another motorbus process holds is stopped by that process, even if
 its event loop hangs, and stays stopped until that process says reset(). A bus

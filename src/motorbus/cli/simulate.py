@@ -144,7 +144,8 @@ def simulate(
         nodes = sorted(simulator.nodes)
         facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
         output.document("motorbus.simulate/1", facts)
-        output.text(f"ready: {' and '.join(buses)}  (simulated: {len(nodes)} {family} devices, ids {ids})")
+        count = f"{len(nodes)} {family} device{'' if len(nodes) == 1 else 's'}"
+        output.text(f"ready: {' and '.join(buses)}  (simulated: {count}, ids {ids})")
         _serve(mount, stop, None if quiet else output)
     return Exit.OK
 

@@ -14,12 +14,15 @@ app = App(
     name="stop",
     usage="Usage: motorbus stop BUS[#ID]... [OPTIONS]",
     help_epilogue="""The devices keep their torque and hold where they come to rest. When it must
-stop whatever happens, and may sag, say `motorbus estop`.
+stop whatever happens, and may sag, say `motorbus estop`. A stepper controller
+is told to end its project and to stop its motor; that both were accepted is
+all that is ever known of it.
 
 Examples:
 
     motorbus stop feetech:/dev/ttyACM0#3
-    motorbus stop feetech:/dev/ttyACM0""",
+    motorbus stop feetech:/dev/ttyACM0
+    motorbus stop stepper:/dev/ttyUSB0#1""",
 )
 
 

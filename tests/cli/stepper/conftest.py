@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -58,6 +58,12 @@ def line_of(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> Line:
 
     monkeypatch.setattr(simulation.simulator, "receive", overheard)
     return Line(simulation, heard)
+
+
+def press(simulation: Simulation, script: str) -> None:
+    """What happens at the inputs of this controller, as `0.5 1 on` in lines."""
+    controller: Any = simulation.simulator
+    controller.script(script)
 
 
 @pytest.fixture

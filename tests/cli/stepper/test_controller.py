@@ -7,7 +7,7 @@ import pytest
 import motorbus
 from motorbus.cli.dry import DryBus
 from motorbus.cli.output import Output
-from motorbus.cli.stepper.controller import carried_out, ours, verb
+from motorbus.cli.stepper.controller import carried_out, numbers_in, ours, verb
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import commands
@@ -21,6 +21,13 @@ def test_the_controller_may_be_named_or_not() -> None:
             ours(other)
 
 
+def test_numbers_are_listed_or_a_range() -> None:
+    assert numbers_in("1,3") == (1, 3)
+    assert numbers_in("2-4") == (2, 3, 4)
+    with pytest.raises(RequestError):
+        numbers_in("some")
+
+
 def test_what_is_refused_before_the_first_step_opens_no_port() -> None:
     with pytest.raises(RequestError, match="there is no project 9"):
         carried_out("stepper:/dev/not-there", {}, Output(), verb("run", 9))
@@ -29,7 +36,7 @@ def test_what_is_refused_before_the_first_step_opens_no_port() -> None:
 def test_a_rehearsal_leaves_no_memory(line: Line) -> None:
     with motorbus.open(line.url) as bus:
         rehearsal = DryBus(bus)
-        one = Controller(rehearsal)  # type: ignore[arg-type]
+        one = Controller(rehearsal)
         one.start_project(1)
         one.set_output(1, True)
         assert one.memory.owed

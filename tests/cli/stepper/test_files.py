@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from motorbus.cli.stepper.files import loaded, reading
+from motorbus.cli.stepper.files import CONCERNED, loaded, reading
 from motorbus.errors import RequestError
-from motorbus.families.stepper import Program
+from motorbus.families.stepper import Behaviour, Program
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
 from tests.families.stepper.vectors import DUMP_B
@@ -42,9 +43,42 @@ def test_what_is_none_is_refused_with_its_name(tmp_path: Path, name: str, data: 
 
 
 def test_readings_are_switches_by_their_names() -> None:
-    assert reading({"seg-loop": "extra", "ramp_tick_ms": "10"}).ramp_tick_ms == 10
-    with pytest.raises(RequestError, match="there is no --turnaround"):
-        reading({"turnaround": "1"})  # of the line, and not of a run
+    assert reading({"seg-loop": "extra", "ramp_tick_ms": "10"}, "check").ramp_tick_ms == 10
+    with pytest.raises(RequestError, match="estimate: there is no --turnaround"):
+        reading({"turnaround": "1"}, "estimate")  # of the line, and not of a run
+
+
+@pytest.mark.parametrize(
+    ("command", "flag", "says", "hides"),
+    [
+        (
+            "show",
+            "o",
+            "perhaps --output or --output-zero or --outputs-on-stop; one of --output, --wait, --passes,",
+            "--busy",
+        ),
+        ("check", "unatended", "perhaps --unattended; one of --highest, --longest,", "--zero-distance"),
+        ("order", "colour", "one of --dump-order; or a switch: --seg-loop, --proj-loop", "--ramp"),
+        (
+            "estimate",
+            "seg_lop",
+            "perhaps --seg-loop or --proj-loop; one of --dump-order; or a switch: --ramp,",
+            "--output-zero",
+        ),
+    ],
+)
+def test_a_flag_that_there_is_not_is_told_with_those_there_are(
+    command: str, flag: str, says: str, hides: str
+) -> None:
+    with pytest.raises(RequestError, match=f"^{command}: there is no --{flag.replace('_', '-')}\n") as caught:
+        reading({flag: "1"}, command)
+    assert caught.value.expected.startswith(says)
+    assert hides not in caught.value.expected
+
+
+def test_the_switches_that_concern_a_command_are_switches() -> None:
+    for names in CONCERNED.values():
+        assert {*names} <= {one.name for one in fields(Behaviour)}
 
 
 def test_a_dump_with_the_highest_byte_first_is_read_as_such(tmp_path: Path) -> None:

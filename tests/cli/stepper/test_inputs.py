@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from tests.cli.conftest import Run
-from tests.cli.stepper.conftest import Line
+from tests.cli.stepper.conftest import Line, press
 
 
 def test_the_levels_of_all_inputs(run: Run, line: Line) -> None:
@@ -25,7 +25,7 @@ def test_one_input_is_one_frame(run: Run, line: Line) -> None:
 
 def test_changes_are_told_and_the_rate_that_was_reached(run: Run) -> None:
     with motorbus.simulate("stepper") as simulation:
-        simulation.simulator.script("0.5 1 on\n1.0 1 off\n")
+        press(simulation, "0.5 1 on\n1.0 1 off\n")
         ran = run("stepper", "inputs", simulation.url, "--ports", "1", "--seconds", "2", "--json")
     *changes, last = ran.records
     assert [(one["port"], one["active"]) for one in changes] == [(1, True), (1, False)]

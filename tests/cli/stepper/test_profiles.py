@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from motorbus.cli.stepper.profiles import how_of
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour
+from tests.cli.conftest import Run
+from tests.cli.stepper.conftest import EXAMPLE
 
 
 def test_without_one_it_is_as_assumed() -> None:
@@ -29,3 +32,19 @@ def test_what_is_none_is_refused_with_its_name(text: str | None, tmp_path: Path)
     with pytest.raises(RequestError) as caught:
         how_of(path)
     assert "ours.toml" in caught.value.summary
+
+
+def test_estimates_take_it_and_a_switch_goes_before_it(tmp_path: Path, run: Run) -> None:
+    path = tmp_path / "ours.toml"
+    path.write_text('format = 1\n[settled]\nseg_loop = "extra"\nramp = "pulse"\n', encoding="utf-8")
+
+    def said(command: str, *flags: str) -> Any:
+        return run("stepper", command, EXAMPLE, *flags, "--json").document
+
+    profile = ("--profile", str(path))
+    flags = ("--ramp", "pulse", "--seg-loop", "extra")
+    for command in ("order", "estimate", "show"):
+        assert said(command, *profile) == said(command, *flags) != said(command)
+    assert said("order", *profile, "--seg-loop", "total") == said("order")
+    assert run("stepper", "check", EXAMPLE, *profile).code == 0
+    assert run("stepper", "check", EXAMPLE, "--profile", "not-there.toml").code == 2

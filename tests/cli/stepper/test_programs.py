@@ -97,6 +97,10 @@ def test_how_often_is_said(run: Run, tmp_path: Path) -> None:
         (("order", "--colour", "red", EXAMPLE), "there is no --colour"),
         (("check", "--highest", "nan", EXAMPLE), "--highest nan is not possible"),
         (("check", "--longest", "0", EXAMPLE), "--longest 0 is not possible"),
+        (
+            ("check", "--longest", "-5", EXAMPLE),
+            "error: --longest -5 is not possible\n  expected: a number above 0\n",
+        ),
         (("check", "--longest-total", "0", EXAMPLE), "--longest-total 0 is not possible"),
         (("check", "--before", EXAMPLE, EXAMPLE), "--before holds project 2"),
         (("check", "--before", "nowhere.bin", EXAMPLE), "nowhere.bin cannot be read"),

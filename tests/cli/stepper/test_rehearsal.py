@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.cli.stepper.rehearsal import as_written
+from motorbus.core.operation import Data
 from motorbus.families.stepper import FAMILY, wire
 from motorbus.families.stepper.table import decode_image
 from tests.cli.conftest import Run
@@ -12,7 +13,7 @@ from tests.cli.stepper.conftest import EXAMPLE, Line
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
 
 READ = {1: wire.encode("read_project", project=1), 2: wire.encode("read_project", project=2)}
-KNOWN = {READ[1]: DUMP_A, READ[2]: DUMP_B}
+KNOWN: dict[Data, bytes] = {READ[1]: DUMP_A, READ[2]: DUMP_B}
 SELECT = wire.encode("select_project", project=2, total_steps=3)
 DELAY = wire.encode("set_step_delay", step=1, delay=7)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import motorbus
 from motorbus.core.operation import Data
 from tests.cli.conftest import Run
-from tests.cli.stepper.conftest import Line, line_of
+from tests.cli.stepper.conftest import Line, line_of, press
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 
@@ -30,7 +31,7 @@ def test_it_ends_with_0_when_the_notice_came(run: Run, line: Line) -> None:
     ],
 )
 def test_every_other_end_has_its_own_code(
-    options: dict[str, object], more: list[str], code: int, outcome: str, run: Run
+    options: dict[str, Any], more: list[str], code: int, outcome: str, run: Run
 ) -> None:
     with motorbus.simulate("stepper", **options) as simulation:
         ran = run("stepper", "run", simulation.url, "--project", "1", "--yes", "--json", *more)
@@ -55,7 +56,7 @@ def test_what_cannot_be_known_ends_with_1(run: Run, line: Line, monkeypatch: pyt
 
 def test_a_button_that_is_watched_stops_it(run: Run) -> None:
     with motorbus.simulate("stepper") as simulation:
-        simulation.simulator.script("1.0 4 on\n")
+        press(simulation, "1.0 4 on\n")
         words = ("stepper", "run", simulation.url, "--project", "1", "--yes", "--watch", "4", "--progress")
         ran = run(*words)
     assert ran.code == 10

@@ -73,10 +73,35 @@ def test_where_a_pass_ends_is_said(run: Run, tmp_path: Path) -> None:
     assert "a pass ends +10000 units from where it began" in run("stepper", "show", str(path)).out
 
 
-@pytest.mark.parametrize("words", [("--wait", "-1"), ("--passes", "0"), ("--output", "/nowhere/at/all.png")])
-def test_what_cannot_be_ends_with_2(run: Run, words: tuple[str, ...]) -> None:
+def test_of_an_endless_program_it_says_how_much_is_drawn(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    path, picture = tmp_path / "on.toml", tmp_path / "on.svg"
+    path.write_text(file(top='repeat = "endless"'), encoding="utf-8")
+    for passes, says in (("1", "1 pass of an endless program"), ("3", "3 passes of an endless program")):
+        ran = run("stepper", "show", str(path), "--output", str(picture), "--passes", passes)
+        assert ran.out.endswith(f"drawn: {picture}: {says}\n")
+        assert f"predicted: {says}" in picture.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--wait", "-1"), "error: --wait -1 is not possible\n  expected: 0 to 1000000 s\n"),
+        (("--wait", "nan"), "error: --wait nan is not possible"),
+        (("--passes", "0"), "error: --passes 0 is not possible\n  expected: 1 or more\n"),
+        (("--passes", "-2"), "error: --passes -2 is not possible\n  expected: 1 or more\n"),
+        (("--output", "/nowhere/at/all.png"), "/nowhere/at/all.png cannot be written"),
+        (("--o", "p.png"), "show: there is no --o\n  expected: perhaps --output"),
+    ],
+)
+def test_what_cannot_be_ends_with_2(run: Run, words: tuple[str, ...], says: str) -> None:
     ran = run("stepper", "show", EXAMPLE, *words)
     assert (ran.code, ran.out) == (2, "")
+    assert says in ran.err
 
 
 @pytest.mark.parametrize("command", ["show", "estimate"])
@@ -90,6 +115,7 @@ def test_a_step_that_never_ends_is_a_document_too(run: Run, tmp_path: Path, comm
     assert ran.code == 0, ran.err
     told = ran.document["estimate"] if command == "show" else ran.document["estimates"][0]
     assert told["seconds"] is None
+    assert "never ends: step 1" in run("stepper", command, str(endless), "--zero-distance", "endless").out
 
 
 def test_a_kind_of_picture_that_nobody_draws_is_refused(run: Run, tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ import motorbus
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 
+pytestmark = pytest.mark.usefixtures("state_folder")
+
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"
 WORKS = [
     "scan BUS",
@@ -103,7 +105,8 @@ def test_ports_are_listed_and_not_asked(run: Run, line: Line) -> None:
 
 
 def test_an_input_is_watched_at_the_rate_that_the_line_allows(run: Run) -> None:
-    with motorbus.simulate("stepper", pace=True) as simulation:
+    with motorbus.simulate("stepper") as simulation:
+        simulation.pace = True
         ran = run("monitor", f"{simulation.url}#1", "--rate", "20", "--count", "5")
     assert ran.code == 0
     assert "which is all that the line and the devices allow" in ran.err

@@ -83,6 +83,7 @@ class Line1:
         self.now = 0.0
         self.line: Line | None = None
         self.settings: dict[str, Any] = {}
+        self.pace = False
         self.sent: list[str] = []
         self.count = 0
         self.react: Callable[[object, Bus], None] = lambda event, bus: None
@@ -97,7 +98,7 @@ class Line1:
 
     def run(self, work: Callable[[Controller], T], cut: Cut | None = None) -> T | MotorbusError:
         """A host does this until it dies; its value, or the error that it ended with."""
-        link = Doomed(cut, self.simulator, start=self.now, line=self.line)
+        link = Doomed(cut, self.simulator, start=self.now, line=self.line, pace=self.pace)
 
         def record(event: object) -> None:
             link.alive()

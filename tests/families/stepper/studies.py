@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 from motorbus.families.stepper.driver import Node
+from motorbus.families.stepper.driver.findings import Case
 from motorbus.families.stepper.execution import Behaviour, Phase
 from motorbus.families.stepper.program import Profile
 from motorbus.families.stepper.program.profile import MEMORY
@@ -99,3 +100,9 @@ def without_flags(image: bytes) -> bytes:
 def node(order: Order = "little") -> Node:
     """The controller of a line that was opened with this order of bytes."""
     return Node(order=order)
+
+
+def case_of(there: Bench) -> Case:
+    """The case of this controller as it is now, project 4 being lent and project 1 telling of the motor."""
+    stored = {number: bytes(there.device.dump(number)[6:]) for number in range(1, 5)}
+    return Case(there.device, 4, 1.0, stored, 1)

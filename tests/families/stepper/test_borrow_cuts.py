@@ -44,6 +44,10 @@ OTHERS: tuple[Work, ...] = (
     lambda device: device.run_once(),
     lambda device: device.jog_forward(0.1),
     lambda device: device.run(1),
+    lambda device: device.write(step_1_delay=0.5),
+    lambda device: device.select(2),
+    lambda device: device.save(1, expert=True),
+    lambda device: device.clear(2),
 )
 
 
@@ -75,6 +79,7 @@ def refused(line: Line1, cut: Cut) -> None:
         assert line.sent == []
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("options", READINGS)
 @pytest.mark.parametrize("verb", WORKS)
 def test_at_every_request(verb: str, options: dict[str, Any], rounds: Callable[[int], int]) -> None:
@@ -106,6 +111,7 @@ def mended(line: Line1, verb: str, cut: Cut) -> bool:
     return True
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("options", READINGS)
 def test_at_every_request_of_the_recovery(options: dict[str, Any], rounds: Callable[[int], int]) -> None:
     most = 1_000_000 if rounds(1_000_000) == 1_000_000 else 30

@@ -133,6 +133,7 @@ def test_kill_9(request_: int, served: Simulated, watched: Watched) -> None:
     assert stored(served.bus) == before
 
 
+@pytest.mark.timeout(1800)
 def test_kill_9_at_every_request(served: Simulated, watched: Watched, rounds: Callable[[int], int]) -> None:
     """All of them in the long runs only: each takes a process."""
     before = stored(served.bus)

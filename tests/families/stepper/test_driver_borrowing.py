@@ -122,6 +122,15 @@ def test_what_cannot_be_read_back_does_not_move(read_view: str) -> None:
     assert line.journal.unfinished() is None
 
 
+@pytest.mark.parametrize(
+    "options", [{"flags_scope": "device"}, {"save_cross": "refuse"}, {"rounding": "carry"}]
+)
+def test_other_readings_of_the_controller_do_no_harm(options: dict[str, Any]) -> None:
+    line = Line1(replace(MINE, stop_mode=1), **options)
+    line.run(lambda device: device.jog(tau, 0.5))
+    assert (line.simulated.position, line.as_before, line.journal.unfinished()) == (800, True, None)
+
+
 def test_an_expert_may_move_without_that() -> None:
     line = Line1(read_view="stored")
     working = line.simulated.store.working

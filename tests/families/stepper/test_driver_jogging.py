@@ -109,7 +109,13 @@ def test_less_than_a_pulse_never_leaves_for_it_may_have_no_end() -> None:
         assert SELECT not in starts(line.sent)
     line = Line1(MINE.with_step(1, distance=0), zero_distance="endless")
     failed(line.run(lambda device: device.run_once()), RequestError, "less than one pulse")
-    assert MOVE not in starts(line.sent)
+    assert set(starts(line.sent)) == {"FF AA 3E 01"}, "nor a stop, for nothing was moved"
+
+
+def test_one_that_is_deaf_while_it_moves_hears_the_stop_when_it_has_come_to_its_end() -> None:
+    line = Line1(deaf_while_moving=True)
+    assert isinstance(line.run(lambda device: device.jog(tau, 2.0)), Moved)
+    assert (line.simulated.position, line.as_before, line.journal.unfinished()) == (3200, True, None)
 
 
 @pytest.mark.parametrize(

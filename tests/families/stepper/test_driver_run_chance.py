@@ -63,12 +63,11 @@ def faults() -> st.SearchStrategy[dict[str, Any]]:
 
 def meddled(there: Running, what: list[Meddling], least: float) -> Operation[None]:
     """A notice out of nothing comes only when it cannot be true; all else at any time."""
-    passed = 0.0
+    began = yield from Pause(0)
     for pause, action in what:
-        passed += pause
-        yield from Pause(pause)
+        now = yield from Pause(pause)
         try:
-            yield from _done(there, action, passed < least)
+            yield from _done(there, action, now - began < least)
         except MotorbusError:
             continue
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from motorbus.core.operation import outcome
+from motorbus.core.operation import ASKED, Journal, outcome
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
-from motorbus.families.stepper import Program
+from motorbus.families.stepper import Backup, Controller, Program
 from motorbus.families.stepper.driver.selecting import clear, is_blank
 from motorbus.families.stepper.driver.writing import Proof
 from motorbus.families.stepper.table import Project
@@ -250,3 +251,28 @@ def test_a_controller_that_is_gone_is_an_error() -> None:
         for verb in (there.device.select, there.device.clear):
             with pytest.raises(NoReply):
                 verb(2)
+
+
+WRITES: list[Callable[[Controller], object]] = [
+    lambda device: device.write_project(program(PICK)),
+    lambda device: device.write(step_1_delay=0.5),
+    lambda device: device.select(2),
+    lambda device: device.save(1, expert=True),
+    lambda device: device.clear(2),
+    lambda device: device.restore(Backup(dumps={2: program(PICK).dump()})),
+]
+
+
+@pytest.mark.parametrize("write", WRITES)
+def test_nothing_is_written_while_project_1_is_lent(write: Callable[[Controller], object]) -> None:
+    with bench() as there:
+        there.simulated.put(2, LONGER)
+
+        def unfinished(event: object) -> None:
+            if isinstance(event, Journal) and event.state == ASKED:
+                raise RequestError("a change is unfinished on this bus")
+
+        there.bus.report = unfinished
+        with pytest.raises(RequestError, match="is unfinished"):
+            write(there.device)
+        assert there.sent() == []

@@ -50,6 +50,12 @@ def test_one_field_is_three_words_with_the_save() -> None:
     assert [order.command for order in edits_between(B, replace(B, total_steps=2))] == ["select_project"]
 
 
+def test_rows_that_nobody_carries_out_are_compared_when_that_is_wanted() -> None:
+    beyond = B.with_step(9, delay=7)
+    assert edits_between(B, beyond) == []
+    assert [order.values.get("step") for order in edits_between(B, beyond, rows=10)] == [None, 9]
+
+
 def test_an_edit_is_a_frame() -> None:
     assert Edit("set_step_delay", {"delay": 1000, "step": 1}).frame().hex() == "ffaa0307e803000000019f"
     assert Edit("set_stop_mode", {"stop_mode": 1}).frame(motor=5)[2] == 5

@@ -27,10 +27,11 @@ Where = Annotated[Path | None, Parameter(name="FILE", help="Where the profile go
 
 @app.command(
     usage="Usage: motorbus stepper characterise BUS FILE [OPTIONS]",
-    help_epilogue="""TAKE THE LOAD OFF THE MOTOR FIRST. It turns now and then for about two minutes,
-by up to 240 RPM and --travel turns each way, and is timed by the notices of its
-runs. Nothing is saved: in the end every project reads as before, and a power
-cycle brings the same. If this is cut off, `motorbus recover` puts it back.
+    help_epilogue="""TAKE THE LOAD OFF THE MOTOR FIRST. It turns now and then for about two
+minutes, by up to 240 RPM and --travel turns each way, and is timed by the
+notices of its runs. Nothing is saved: in the end every project reads as
+before, and a power cycle brings the same. If this is cut off, `motorbus
+recover` puts it back.
 
 A question that no experiment separates stays open, and the file says why.
 `run`, `check`, `estimate`, `order` and `show` take the file as --profile.

@@ -41,6 +41,13 @@ def ours(text: str) -> str:
     return found.bus
 
 
+def numbers_in(text: str) -> tuple[int, ...]:
+    """1,3 or 1-4 -> those numbers. Raises RequestError for text that names none."""
+    from motorbus import session
+
+    return session.parse_ids(text)
+
+
 def verb(name: str, *args: Any, **values: Any) -> Callable[[Controller], Runnable[Any]]:
     """A verb of the controller with what it gets, to be carried out on one."""
     function = getattr(Controller, name).function

@@ -15,7 +15,7 @@ from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
+from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, numbers_in, verb
 from motorbus.cli.stepper.files import LONGEST, app
 from motorbus.cli.stepper.writing import result
 from motorbus.cli.target import face
@@ -60,7 +60,7 @@ def backup(
     yes
         Do not ask before a file is replaced.
     """
-    do = verb("backup", _ids(projects))
+    do = verb("backup", numbers_in(projects))
     consent_to(f"replace {file}", output, yes=yes or dry_run or not file.exists())
     found: Backup | None = carried_out(bus, options, output, do, what="reading", dry_run=dry_run)
     if found is None:
@@ -107,7 +107,7 @@ def restore(
         Do not ask before.
     """
     kept = loaded(file)
-    numbers = _ids(projects) if projects else kept.projects
+    numbers = numbers_in(projects) if projects else kept.projects
     for number in numbers:
         kept.image(number)  # raises when it is not in it
     told: tuple[writing.Written, ...] | None = carried_out(
@@ -166,9 +166,3 @@ def _planned(output: Output, event: object, bar: Bar, *, yes: bool) -> None:
 def _unwritten(one: writing.Written) -> str:
     places = ", ".join(map(str, one.reserved))
     return f"\n  bytes that nobody can write differ at {places} of its 220" if places else ""
-
-
-def _ids(text: str) -> tuple[int, ...]:
-    from motorbus import session
-
-    return session.parse_ids(text)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.output import Output
+from motorbus.cli.stepper.profiles import how_of
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
@@ -18,6 +22,16 @@ from motorbus.families.stepper.table import checked_order
 NAME: Final = "stepper"
 LONGEST: Final = 1 << 20
 CLEARED: Final = "no steps: the project has been cleared"
+_ORDER: Final = ("seg_loop", "proj_loop")
+_TIME: Final = ("ramp", "ramp_tick_ms", "rounding", "zero_distance", *_ORDER)
+_OUTPUTS: Final = ("output_zero", "outputs_on_stop")
+CONCERNED: Final[Mapping[str, tuple[str, ...]]] = {
+    "check": ("ramp", "ramp_tick_ms", "rounding", *_ORDER, *_OUTPUTS),
+    "estimate": _TIME,
+    "order": _ORDER,
+    "show": (*_TIME, *_OUTPUTS, "start_input", "stop_input", "stop_input_scope"),
+}
+"""The switches that what a command says depends on. The others are taken too, and change nothing in it."""
 
 app = App(name=NAME, help="What only stepper controllers can do.", help_epilogue="")
 
@@ -34,7 +48,7 @@ Readings = Annotated[
     str,
     Parameter(
         help="How a question that the manual leaves open is taken: --ramp pulse, --rounding carry, --seg-loop extra "
-        "and the other switches of the simulator that concern a run."
+        "and the other switches of the simulator that concern a run. --profile FILE takes what `characterise` found."
     ),
 ]
 
@@ -83,10 +97,39 @@ def each(files: tuple[Path, ...], order: str, output: Output) -> tuple[list[tupl
     return found, Exit.USAGE if errors else Exit.OK
 
 
-def reading(said: dict[str, str]) -> Behaviour:
-    """How a controller is taken to be. Raises RequestError for a switch or a value that there is not."""
+def reading(said: dict[str, str], command: str) -> Behaviour:
+    """How a controller is taken to be, by the switches given to this command, and for the rest by a profile.
+
+    Raises RequestError, with what the command has, for a flag that there is not, and for an impossible value.
+    """
     known = {option.name for option in options(Behaviour)}
     given = {name.replace("-", "_"): value for name, value in said.items()}
+    profile = given.pop("profile", "")
     if unknown := sorted(given.keys() - known):
-        raise RequestError(f"there is no --{unknown[0]}", expected=f"one of {', '.join(sorted(known))}")
-    return switched(Behaviour, NAME, given)
+        raise _unknown(_flag(unknown[0]), command)
+    told = switched(Behaviour, NAME, given)
+    settled: dict[str, Any] = {name: getattr(told, name) for name in given}
+    return replace(how_of(Path(profile)), **settled) if profile else told
+
+
+def _unknown(flag: str, command: str) -> RequestError:
+    """The error for a flag that a command has not: flags as it are told first."""
+    own = [
+        name
+        for argument in app[command].assemble_argument_collection()
+        for name in argument.names
+        if argument.parse and name.startswith("--") and "[" not in name
+    ]
+    switches = [_flag(name) for name in CONCERNED[command]]
+    near = [name for name in own + switches if name.startswith(flag)] or get_close_matches(
+        flag, own + switches, n=2
+    )
+    perhaps = f"perhaps {' or '.join(near)}; " if near else ""
+    return RequestError(
+        f"{command}: there is no {flag}",
+        expected=f"{perhaps}one of {', '.join(own)}; or a switch: {', '.join(switches)}",
+    )
+
+
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.parameters import DryRun, Silent
-from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
+from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, numbers_in, verb
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.numbers import number
 from motorbus.core import units
@@ -60,7 +60,7 @@ def inputs(
     seconds
         Watch for so long, in s or as 2min.
     """
-    chosen = _ids(ports)
+    chosen = numbers_in(ports)
     if seconds:
         return _watched(bus, chosen, units.parse(seconds, "time"), options, output)
     levels: Mapping[int, bool] = carried_out(bus, options, output, verb("inputs", chosen)) or {}
@@ -194,12 +194,6 @@ def _level(text: str) -> tuple[int, int]:
     wanted = _PORTS.get(port.casefold()) or number("port", port), number("level", level)
     check("set_output", dict(zip(("port", "level"), wanted, strict=True)))
     return wanted
-
-
-def _ids(text: str) -> tuple[int, ...]:
-    from motorbus import session
-
-    return session.parse_ids(text)
 
 
 def _show(levels: Mapping[int, bool | None], output: Output, schema: str, name: str) -> None:

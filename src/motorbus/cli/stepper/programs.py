@@ -63,7 +63,7 @@ def check(
         homing=homing,
         unattended=unattended,
         before=_before(before, dump_order),
-        how=reading(readings),
+        how=reading(readings, "check"),
     )
     programs, worst = each(files, dump_order, output)
     found = [(file, finding) for file, program in programs for finding in program.lint(conditions)]
@@ -126,7 +126,7 @@ Examples:
 )
 def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say how long a program takes."""
-    how = reading(readings)
+    how = reading(readings, "estimate")
     programs, worst = each(files, dump_order, output)
     found = [(file, program, program.estimate(how)) for file, program in programs]
     facts = [
@@ -148,7 +148,7 @@ def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **r
 )
 def order(*files: File, dump_order: DumpOrder = "little", output: Silent, **readings: Readings) -> Exit:
     """Say in which order the steps of a program come, and how often."""
-    how = reading(readings)
+    how = reading(readings, "order")
     programs, worst = each(files, dump_order, output)
     plans = [(file, program.plan(how)) for file, program in programs]
     facts = [{"file": str(file), "order": list(one.order), "passes": one.passes} for file, one in plans]

@@ -9,7 +9,7 @@ from motorbus.cli.consent import FAR
 from motorbus.cli.exits import Exit
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
-from motorbus.cli.stepper.controller import BusName, BusOption, ProjectNumber, carried_out, verb
+from motorbus.cli.stepper.controller import BusName, BusOption, ProjectNumber, carried_out, numbers_in, verb
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.profiles import ProfileFile, how_of
 from motorbus.cli.target import face
@@ -90,26 +90,20 @@ def run(
     yes
         Do not ask before a way of more than 180 degrees.
     """
-    how = how_of(profile)
-    chosen = {"how": how, "endless": endless, "stop_first": stop_first, "expert": expert}
-    waits: dict[str, Any] = {
-        "timeout": units.parse(timeout, "time") if timeout else None,
-        "watch": _ids(watch) if watch else (),
+    chosen: dict[str, Any] = {
+        "how": how_of(profile),
+        "endless": endless,
+        "stop_first": stop_first,
+        "expert": expert,
     }
+    seconds, ports = units.parse(timeout, "time") if timeout else None, numbers_in(watch) if watch else ()
+    agreed = "" if yes else partial(_question, project, chosen["how"])
     told: Ran | None = carried_out(
-        bus,
-        options,
-        output,
-        verb("run", project, **chosen, **waits),
-        what=f"project {project}",
-        consent="" if yes else partial(_question, project, how),
-        dry_run=dry_run,
-        rehearse=verb("start_project", project, **chosen),
-        hear=partial(heard, progress, output),
-    )
-    if told is not None:
-        _ended(project, told, output)
-    return Exit.OK
+        bus, options, output, verb("run", project, **chosen, timeout=seconds, watch=ports),
+        what=f"project {project}", consent=agreed, dry_run=dry_run,
+        rehearse=verb("start_project", project, **chosen), hear=partial(heard, progress, output),
+    )  # fmt: skip
+    return Exit.OK if told is None else _ended(project, told, output)
 
 
 @app.command(
@@ -165,12 +159,6 @@ def start_project(
     return Exit.OK
 
 
-def _ids(text: str) -> tuple[int, ...]:
-    from motorbus import session
-
-    return session.parse_ids(text)
-
-
 def _question(project: int, how: Behaviour, bus: Bus) -> str:
     one = face(bus, 1)
     (goal,) = of_project(one, one.read_project(project).project, how)
@@ -202,7 +190,7 @@ def _where(event: Estimated) -> str:
     return f"estimated:{through} pass {event.round}{passes}, {step}{waits}, {place} from the start"
 
 
-def _ended(project: int, told: Ran, output: Output) -> None:
+def _ended(project: int, told: Ran, output: Output) -> Exit:
     """Print what came of it. Raises Interrupted, NoReply or OutcomeUnknown for what is not `completed`."""
     facts = {"project": project, "outcome": told.outcome.value, "seconds": told.seconds, "why": told.why}
     output.document("motorbus.stepper.run/1", {**facts, "predicted": plain(told.predicted.data())})
@@ -213,3 +201,4 @@ def _ended(project: int, told: Ran, output: Output) -> None:
             f"project {project}: {told.outcome.value}: {told.why}",
             advice="" if told.outcome is Outcome.STOPPED else "it may still run: `motorbus stop` ends it",
         )
+    return Exit.OK

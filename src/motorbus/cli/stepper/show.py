@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ _COLUMNS = (
     *(">step", ">times", ">units", ">pulses", ">Hz", "shape", ">motion s", ">pause s", "output", "waits for"),
     "ends at",
 )
+_LONGEST_WAIT = 1_000_000
 
 
 @app.command(
@@ -56,20 +58,32 @@ def show(
     passes
         How many passes of an endless program are drawn.
     """
-    if not 0 <= wait <= 1e6 or passes < 1:
-        raise RequestError("--wait and --passes: that is not possible", expected="0 s or more, 1 or more")
+    if not 0 <= wait <= _LONGEST_WAIT:
+        raise RequestError(f"--wait {wait:g} is not possible", expected=f"0 to {_LONGEST_WAIT} s")
+    if passes < 1:
+        raise RequestError(f"--passes {passes} is not possible", expected="1 or more")
     if output_ is not None and len(files) > 1:
         raise RequestError(f"one picture of {len(files)} programs", expected="--output with one program")
-    how = reading(readings)
+    how = reading(readings, "show")
     programs, worst = each(files, dump_order, output)
     for file, program in programs:
         if output_ is not None:
             _draw(program, how, output_, wait, passes)
-        _show(file, program, how, output_, output)
+        drawn = f"{output_}{_part(program, passes)}" if output_ else ""
+        _show(file, program, how, output_, drawn, output)
     return worst
 
 
-def _show(file: Path, program: Program, how: Behaviour, picture: Path | None, output: Output) -> None:
+def _part(program: Program, passes: int) -> str:
+    """How much of an endless program is drawn; "" of one that is drawn whole."""
+    if not program.project.is_endless:
+        return ""
+    return f": {passes} pass{'es' if passes > 1 else ''} of an endless program"
+
+
+def _show(
+    file: Path, program: Program, how: Behaviour, picture: Path | None, drawn: str, output: Output
+) -> None:
     plan = program.plan(how)
     facts = {"file": str(file), **{name: value for name, value in plan.data().items() if name != "schema"}}
     output.document("motorbus.stepper.plan/1", {**facts, "picture": str(picture) if picture else None})
@@ -82,7 +96,7 @@ def _show(file: Path, program: Program, how: Behaviour, picture: Path | None, ou
         if plan.net_units
         else "a pass ends where it began"
     )
-    output.text(f"{plan.estimate}\n{net}" + (f"\ndrawn: {picture}" if picture else ""))
+    output.text(f"{plan.estimate}\n{net}" + (f"\ndrawn: {drawn}" if drawn else ""))
 
 
 def _rows(plan: Plan, program: Program) -> Iterator[tuple[object, ...]]:
@@ -95,7 +109,13 @@ def _rows(plan: Plan, program: Program) -> Iterator[tuple[object, ...]]:
         )
         yield (
             *(step.number, step.times, step.units, _pulses(step), f"{step.frequency:.6g}", step.shape),
-            *(f"{step.motion:.3f}", f"{step.delay:g}", output, waits, ends),
+            *(
+                f"{step.motion:.3f}" if step.motion < inf else "no end",
+                f"{step.delay:g}",
+                output,
+                waits,
+                ends,
+            ),
         )
 
 
@@ -117,5 +137,5 @@ def _draw(program: Program, how: Behaviour, path: Path, wait: float, passes: int
             picture.lanes,
             spans,
             title=program.name or path.stem,
-            remark="predicted",
+            remark=f"predicted{_part(program, passes)}",
         )

@@ -279,6 +279,16 @@ def test_a_slow_stop_ramps_down_and_the_project_is_over_then() -> None:
 
 
 @pytest.mark.parametrize("order", ["stop_project", "stop_motor"])
+def test_neither_another_stop_nor_another_mode_makes_a_ramp_shorter(order: str) -> None:
+    course = Course()("start", project(RAMPED, stop_mode=0)).wait(5.0)("stop_project").wait(0.5)
+    course.state = execution.set_stop_mode(course.state, 1).state
+    course(order)
+    assert course.state.phase is Phase.RAMPDOWN
+    course.to_the_end()
+    assert course.at("stopped") == [pytest.approx(6.5)]
+
+
+@pytest.mark.parametrize("order", ["stop_project", "stop_motor"])
 @pytest.mark.parametrize("seconds", [0.5, 1.2])
 def test_an_immediate_stop_ends_the_project_wherever_it_is(order: str, seconds: float) -> None:
     course = Course()("start", project(step(delay=1000), step())).wait(seconds)(order)

@@ -104,9 +104,14 @@ def test_a_picture_has_units_people_read() -> None:
     assert in_mm.curves["position (mm)"][-1] == pytest.approx(-61734 / 6400 * 5)
 
 
-def test_lanes_have_the_names_of_the_file_and_those_that_never_change_are_left_out() -> None:
+def test_there_is_a_lane_for_all_that_a_step_mentions() -> None:
+    said = project(step(output=6, stop_input=5), step(output=8), step(output=3, start_input=2), total_steps=2)
+    assert list(picture(course(said), said).lanes) == ["output 2", "input 5"]
+
+
+def test_lanes_have_the_names_of_the_file_and_others_that_nothing_mentions_are_left_out() -> None:
     run = course(B, wait=1.0)
-    assert list(picture(run, B).lanes) == ["output 1", "input 1"]
+    assert list(picture(run, B).lanes) == ["output 1", "input 1", "input 2"]
     named = picture(run, B, inputs={"tray": 1, "part": 2}, outputs={"gripper": 1, "lamp": 3})
     assert list(named.lanes) == ["gripper", "lamp", "tray", "part"]
     assert any(named.lanes["gripper"])

@@ -54,11 +54,9 @@ def test_half_a_byte_is_refused() -> None:
         (6, 1, "the reply says project 2 and its image 1", "2 twice"),
         (6, 200, "number: the reply says", ""),
         (7, 11, "total_steps: 11", "1 to 10"),
-        (8, 4, "loop_first, loop_last: 4 to 3 of 3 steps", "first <= last"),
-        (9, 4, "2 to 4 of 3 steps", "last <= 3"),
+        (6, 0, "the reply says project 2 and its image 0", "2 twice"),
+        (8, 11, "loop_first: 11", "0 to 10"),
         (9, 200, "loop_last: 200", "0 to 10"),
-        (10, 255, "loop_count: 255", "0 to 254"),
-        (14, 0, "step_angle: 0", "1 to 255"),
         (20, 2, "stop_mode: 2", "0 to 1"),
         (21, 3, "mode4: 3", "0 to 2"),
         (22, 9, "power_on_home: 9", "0 to 1"),
@@ -89,6 +87,42 @@ def test_a_cleared_project_is_right(project: Project) -> None:
     data = wire.encode_dump(3, encode_image(project))
     assert dumps.from_dump(data).project == project
     assert list(dumps.faults(project, 3)) == []
+
+
+@pytest.mark.parametrize(
+    ("offset", "value"),
+    [
+        (7, 2),  # fewer steps, and the loop is behind them
+        (8, 4),  # a loop from 4 to 3
+        (9, 10),
+        (10, 255),
+        (14, 0),  # no angle
+        (36, 0),
+    ],
+)
+def test_what_commands_may_lead_to_is_taken_whatever_it_means(offset: int, value: int) -> None:
+    held = DUMP_B[:offset] + bytes((value,)) + DUMP_B[offset + 1 :]
+    assert dumps.from_dump(held).image == held[6:]
+
+
+CLEARED = [
+    Project(turn_distance=5000),
+    Project(number=3, loop_first=2, loop_last=1),
+    Project(power_on_home=1).with_step(1, speed=9),
+]
+
+
+@pytest.mark.parametrize("project", CLEARED)
+def test_what_was_written_into_a_cleared_project_is_right_too(project: Project) -> None:
+    assert dumps.from_dump(wire.encode_dump(3, encode_image(project))).project == project
+    with pytest.raises(RequestError, match="total_steps: 0 is not possible"):
+        dumps.frames(project)
+
+
+def test_a_loop_that_ends_before_it_begins_is_no_frame() -> None:
+    project = replace(decode_image(DUMP_B[6:]), loop_first=3, loop_last=2)
+    with pytest.raises(RequestError, match="loop_first, loop_last: 3 to 2 is no range"):
+        dumps.frames(project)
 
 
 def test_another_order_of_bytes_can_be_said() -> None:

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Estimate, duration, estimate, plan
-from motorbus.families.stepper.table import Project, Step, decode_image
+from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
 from tests.families.stepper.program.projects import projects
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
 
@@ -74,7 +74,11 @@ def test_an_endless_project_is_estimated_by_the_pass() -> None:
 def test_a_step_that_never_ends_is_for_ever() -> None:
     still = A.with_step(1, distance=0)
     how = Behaviour(zero_distance="endless")
-    assert str(estimate(still, how)) == "at least for ever"
+    assert str(estimate(still, how)) == "never ends: step 1"
+    assert estimate(still, how).data()["never_ends_at_step"] == 1
+    assert estimate(still).data()["never_ends_at_step"] is None
+    second = with_steps(A, (A.step(1), replace(still.step(1), stop_input=2)))
+    assert str(estimate(second, how)) == "never ends: step 2, unless a stop input ends it"
     assert json.loads(plan(still, how).json())["steps"][0]["motion_seconds"] is None
     assert estimate(still).seconds == 1.0
 

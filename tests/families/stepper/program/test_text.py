@@ -76,7 +76,7 @@ def test_a_motor_may_be_said_by_its_full_steps() -> None:
         ("x" * ((1 << 20) + 1), "1048577 characters", "at most"),
         ("a = " + "[" * 5000, "the file is no TOML", "TOML"),
         ("a = " + "9" * 5000, "the file is no TOML: a number has thousands of digits\n", "TOML"),
-        ("", "format: is missing", "format = 1"),
+        ("", "^format: is missing.*\n.*\n.*write that first; nothing was sent", "format = 1"),
         ("format = 2", "format: 2 is not known", "format = 1"),
         ("format = true", "format: True is not known", "format = 1"),
         (file(top="colour = 3"), "the file: there is no field 'colour'", "one of format"),
@@ -190,7 +190,10 @@ def test_what_is_written_is_read_as_the_same(project: Project, lead: Fraction | 
         (Project(), "project 0 has been cleared"),
         (Project(number=1), "project 1 has been cleared"),
         (Project(number=5, total_steps=1), "project: 5"),
-        (Project(number=1, microsteps=8), "total_steps: 0"),
+        (
+            Project(number=1, microsteps=8).with_step(4, output=9),
+            "project 1 has been cleared: .* to say; microsteps, step 4 were written since\n(.*\n)*.*keep it as a dump",
+        ),
         (
             Project(number=1, total_steps=1, microsteps=8, step_angle=180, turn_distance=1).with_step(
                 1, output=9
@@ -203,16 +206,72 @@ def test_what_is_written_is_read_as_the_same(project: Project, lead: Fraction | 
             ),
             "step 4, output: 9",
         ),
-        (
-            Project(number=1, total_steps=1, microsteps=8, step_angle=180, turn_distance=1, loop_last=1),
-            "0 to 1 is no range",
-        ),
         (Project(number=1, total_steps=11, microsteps=8, step_angle=180, turn_distance=1), "total_steps: 11"),
     ],
 )
 def test_what_no_file_may_say_is_refused(project: Project, says: str) -> None:
     with pytest.raises(RequestError, match=says):
         text.write(Source(project))
+
+
+LOOP = "[loop]\nfirst = 2\nlast = 5\ncount = 2"
+NO_TURN = MOTOR.replace("= 5000", "= 0")
+
+
+@pytest.mark.parametrize(
+    ("source", "says"),
+    [
+        (file(LOOP, top="#", steps=4), "2 to 5 is no range of the 4 steps"),
+        (file(LOOP.replace("5", "1"), top="#", steps=4), "2 to 1 is no range of the 4 steps"),
+        (file(LOOP.replace("count = 2", "count = 255"), top="#", steps=5), r"\[loop\], count: 255"),
+        (
+            file(top="#", motor=MOTOR.replace("1.8 deg", "0.00 deg")).replace("10 mm", "9 units"),
+            "step_angle: '0.00 deg'",
+        ),
+        (file(top="#", motor=MOTOR.replace("= 8", "= 0")).replace("10 mm", "9 units"), "microsteps: 0"),
+        (file(top="#", motor=NO_TURN).replace("10 mm", "9 units"), "turn_distance: 0"),
+    ],
+)
+def test_what_a_controller_may_hold_only_an_expert_says(source: str, says: str) -> None:
+    """A person who writes it has made a slip; a file that is made of a dump must say what the dump says."""
+    with pytest.raises(RequestError, match=says):
+        text.parse(source)
+    found = text.parse(source.replace("#", "expert = true"))
+    assert text.parse(text.write(found)) == found
+    assert text.write(found._replace(expert=False)) == text.write(found)
+
+
+@pytest.mark.parametrize(
+    ("source", "says"),
+    [
+        (file(LOOP.replace("5", "11"), top="expert = true", steps=4), r"\[loop\], last: 11"),
+        (file(LOOP.replace("count = 2", "count = 256"), top="expert = true", steps=5), "0 to 255"),
+        (file(top="expert = true", motor=NO_TURN), "'10 mm' has no unit of distance that is known here"),
+        (
+            file(
+                top="expert = true",
+                motor=MOTOR.replace("1.8", "0").replace("turn_distance = 5000", "unit = 'pulse'"),
+            ),
+            "unit: 'pulse' is no unit of distance here",
+        ),
+        (
+            file(top="expert = true", motor=MOTOR.replace("= 8", "= 0")).replace("60 rpm", "9 Hz"),
+            "speed: '9 Hz'",
+        ),
+    ],
+)
+def test_what_no_controller_holds_an_expert_does_not_say_either(source: str, says: str) -> None:
+    with pytest.raises(RequestError, match=says):
+        text.parse(source)
+
+
+def test_units_that_need_a_lead_are_offered_only_with_one() -> None:
+    lead = 'lead = "5 mm"\n'
+    for old, new in (("10 mm", "1 inch"), ("60 rpm", "1 mph"), ("turn_distance = 5000", 'unit = "1 inch"')):
+        for source, offered in ((file(), True), (file().replace(lead, "").replace("10 mm", "1 turn"), False)):
+            with pytest.raises(RequestError) as caught:
+                text.parse(source.replace(old if offered or old != "10 mm" else "1 turn", new))
+            assert ("mm" in caught.value.expected) is offered, caught.value.expected
 
 
 def test_a_step_is_written_as_short_as_it_is() -> None:

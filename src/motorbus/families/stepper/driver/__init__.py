@@ -1,8 +1,7 @@
 """What to say to a stepper controller to get a thing done: one function for each, none of which sends anything itself.
 
-Here is what looks and what stops: who is there, what it has stored, the level of an input, and an end to whatever it
-does. Each takes a `Node` (a `Controller` is one) and returns an `Exchange`, or an operation that yields steps; a bus
-carries it out.
+Here is what looks, what writes, what moves and what stops. Each takes a `Node` (a `Controller` is one) and
+returns an `Exchange`, or an operation that yields steps; a bus carries it out.
 """
 
 from __future__ import annotations

@@ -323,6 +323,6 @@ def _unseen(node: Node) -> VerificationFailed:
         expected="project 1 as it is wanted for the motion",
         cause="this controller shows what is stored while something else is being edited, or heeds no edit before it "
         "is saved",
-        advice="write step 1 of project 1, save it, and run_once(); or say expert=True",
+        advice="write step 1 of project 1, save it, and run_once()",
         node=node.node,
     )

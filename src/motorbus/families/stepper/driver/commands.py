@@ -24,7 +24,7 @@ def nothing(reply: bytes) -> None:
 
 
 def motion(
-    node: Node, name: str, goals: tuple[Goal, ...], refusal: Refusal | None = None, **values: int
+    node: Node, name: str, goals: tuple[Goal, ...], refusal: Refusal | None = None, /, **values: int
 ) -> Exchange[None]:
     """A command that moves the motor, with what it orders: the gate lets nothing through that does not say.
 

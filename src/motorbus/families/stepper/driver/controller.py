@@ -1,7 +1,8 @@
 """The controller as a user holds it: one list of verbs, blocking on `Controller`, awaitable on `AsyncController`.
 
-It looks and it stops. Verbs that write, run or jog are not here, and absent rather than refused: what a controller
-without status, position and checksum can honestly do of them is another work.
+A controller without status, position and checksum makes each of them promise less than its name: what is written is
+read back, what runs is waited for, what is stopped was heard. What it cannot do at all, as telling where it is or going
+to a position, is absent rather than refused.
 """
 
 from __future__ import annotations

@@ -14,7 +14,14 @@ from motorbus.core.operation import Alone, Operation, Pause, Progress, Report
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.costs import Taken, taken
-from motorbus.families.stepper.driver.editing import FLAGS, changes, differs, held, read_back
+from motorbus.families.stepper.driver.editing import (
+    FLAGS,
+    changes,
+    differs,
+    held,
+    read_back,
+    refuse_while_lent,
+)
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.selecting import cleared, is_blank
 from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
@@ -67,6 +74,7 @@ def restore(
 
 
 def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> Operation[tuple[Written, ...]]:
+    yield from refuse_while_lent(node, "restore")
     done: list[Written] = []
     try:
         for number, project in meant.items():

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Exchange, Operation, Progress, Rank, Report, Runnable
+from motorbus.core.operation import ASKED, Exchange, Journal, Operation, Progress, Rank, Report, Runnable
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.commands import nothing
@@ -126,6 +126,14 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
         node, image, after, f"project {after.number} is being edited and does not read as it was written",
         f"write it again; {_unsaved(after.number)}",
     )  # fmt: skip
+
+
+def refuse_while_lent(node: Node, verb: str) -> Operation[None]:
+    """Raise RequestError while project 1 is lent to a motion that was cut off: saving would keep what was lent.
+
+    Call it inside `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
+    """
+    yield from Report(Journal(verb, ASKED, {"node": node.node}))
 
 
 def held(node: Node, image: bytes, number: int) -> Project:

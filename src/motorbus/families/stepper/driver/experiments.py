@@ -37,13 +37,13 @@ WAYS: Final[Mapping[str, tuple[Setting, ...]]] = {
 """The questions that experiments with the clock can answer, and the readings of each."""
 FIFTHS: Final = 5
 """Parts into which one pulse is divided, so that pulses that are not whole can be asked for."""
-SLOW_TURNS: Final = 0.25
+SLOW_TURNS: Final = 0.3
 """Turns that all slow experiments together take at most, each way."""
 SLACK: Final = 0.03
 """s by which an answer may be early or late: an adapter hands on what came every 16 ms."""
 SLACK_PART: Final = 0.01
 """The same as a part of the time that passes."""
-_LEAST_PULSES: Final = 40
+_LEAST_PULSES: Final = 200
 _MOST_FREQUENCY: Final = 65535
 
 
@@ -93,6 +93,10 @@ class Motor(NamedTuple):
             speed=rpm,
             delay=delay,
         )
+
+    def turns(self, pulses: int) -> float:
+        """How far so many pulses turn it."""
+        return float(pulses / self.per_turn)
 
     @property
     def quick(self) -> int:

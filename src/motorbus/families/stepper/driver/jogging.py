@@ -4,6 +4,9 @@ The controller has no command for that. It has a single move, with the distance 
 which is borrowed for it (`borrowing`). A jog is such a move too, of exactly velocity times time: so a host that dies in
 the middle of it leaves a motor that comes to its end, and none that turns for ever. The unit is made one pulse for it.
 
+Nobody can ask whether a project runs. One that this host has started refuses a motion by hand; one that a button or
+another host has started may ignore the order, and the stop at its end stops it.
+
 No position comes back, and no notice of the end. What is told of such a motion is what was ordered and how long that
 should take; it is reckoning, and is called *estimated*.
 """
@@ -138,6 +141,7 @@ def run_once(node: Node) -> Operation[Moved]:
     def wanted(project: Project) -> Operation[Project]:
         yield from ()
         refuse_unless_turning(node, project, "run_once")
+        _pulses(project)
         return project
 
     def motion(project: Project) -> Operation[Moved]:
@@ -147,16 +151,16 @@ def run_once(node: Node) -> Operation[Moved]:
 
 
 def jog_forward(node: Node, seconds: float) -> Operation[Moved]:
-    """Turn forward at the speed of step 1 of project 1 for a while (s, at most 60), then stop.
+    """Turn forward for a while (s, at most 60), then stop; a host that dies meanwhile leaves the motor turning.
 
-    It is the manual's jog, which has no end of its own: **a host that dies leaves the motor turning**. `jog` does not.
-    Raises RequestError when project 1 has no speed, and as `move_by`.
+    It is the manual's jog, which has the speed of step 1 of project 1 and no end of its own; `jog` has both. Raises
+    RequestError when project 1 has no speed, and as `move_by`.
     """
     return (yield from _endless(node, "jog_forward", 1, seconds))
 
 
 def jog_reverse(node: Node, seconds: float) -> Operation[Moved]:
-    """The same in reverse."""
+    """The same in reverse; a host that dies meanwhile leaves the motor turning."""
     return (yield from _endless(node, "jog_reverse", -1, seconds))
 
 
@@ -184,10 +188,7 @@ def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> 
 
     Raises RequestError for a move of less than a pulse: a controller may take a distance of 0 for one without an end.
     """
-    step = project.step(1)
-    count, _ = execution.pulses(project, step)
-    if not count:
-        raise less_than_a_pulse(project)
+    step, count = project.step(1), _pulses(project)
     yield from commands.motion(node, "run_once", goals.of_move(node, project), watch.refusal)
     seconds = longest(project, count)
     if wait:
@@ -195,6 +196,13 @@ def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> 
     angle = step.sign * step.distance * tau / project.turn_distance
     promise = Promise.STOP_ACCEPTED if wait else None
     return Moved(node.node, angle, step.sign * _velocity(project), seconds, promise)
+
+
+def _pulses(project: Project) -> int:
+    count, _ = execution.pulses(project, project.step(1))
+    if not count:
+        raise less_than_a_pulse(project)
+    return count
 
 
 def _velocity(project: Project) -> float:

@@ -81,6 +81,8 @@ def listened(
         notices.append(notice.at)
         return len(notices) >= wanted
 
+    yield from outcome(read_input(node, 1))
+    yield from Pause(QUIET)
     wanted_stops = node.memory.stops - node.memory.ends
     node.memory.owed = True
     said, _ = yield from Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
@@ -107,8 +109,7 @@ def _listening(heard: Callable[[Notice], bool], seconds: float) -> Operation[Not
 def _said(
     node: Node, watch: Watch, project: Project, acts: Sequence[Act]
 ) -> Generator[Step, Any, tuple[tuple[float, ...], tuple[float | None, ...]]]:
-    yield from outcome(read_input(node, 1))
-    began = now = yield from Pause(QUIET)
+    began = now = yield from Pause(0.0)
     sent: list[float] = []
     answered: list[float | None] = []
     for act in acts:

@@ -119,7 +119,10 @@ def read_raw(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str
 
 
 def read_input(node: Node, port: int) -> Exchange[bool]:
-    """Whether an input, 1 to 5, is active. Raises RequestError for another."""
+    """Whether an input, 1 to 5, is active. Raises RequestError for another.
+
+    One reading, and nothing vouches for its one bit; `inputs` reads until two agree.
+    """
     if port not in range(1, INPUTS + 1):
         raise RequestError(f"there is no input {port}", expected=f"1 to {INPUTS}", advice="nothing was sent")
     return command(node, "read_input", lambda reply: bool(reply[5]), port=port)

@@ -24,7 +24,7 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     """Give project 1 back that was borrowed when the host was cut off: `change` its verb, `facts` as the journal says.
 
     Stops the motor first. Gives "old" when project 1 reads as it was. May be called again at any point. `alone` makes
-    no difference: there is one controller on a line.
+    no difference: there is one controller on a line. A `characterise` that was cut off is ended likewise.
 
     Raises RequestError, with nothing sent, for facts of something else, or of a bus that was opened with another order
     of bytes; OutcomeUnknown when the stop is not accepted, for nothing is edited while the motor may turn; whatever

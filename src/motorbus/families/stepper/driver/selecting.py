@@ -14,7 +14,15 @@ from motorbus.core.operation import Alone, Operation, Pause, outcome
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken
-from motorbus.families.stepper.driver.editing import differs, held, noted, read_back, read_until, selected
+from motorbus.families.stepper.driver.editing import (
+    differs,
+    held,
+    noted,
+    read_back,
+    read_until,
+    refuse_while_lent,
+    selected,
+)
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
 from motorbus.families.stepper.table import Project, decode_image
@@ -35,6 +43,7 @@ def select(node: Node, project: int) -> Operation[int]:
 
 
 def _selected(node: Node, project: int) -> Operation[int]:
+    yield from refuse_while_lent(node, "select")
     before = held(node, (yield from taken(node, project)).image, project)
     if before.is_cleared:
         raise RequestError(
@@ -78,12 +87,14 @@ def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written
 
 
 def _kept(node: Node, meant: Project) -> Operation[Written]:
+    yield from refuse_while_lent(node, "save")
     began = yield from Pause(0)
     found = yield from taken(node, meant.number)
     return (yield from written(node, found, meant, found.image, save=True, began=began))
 
 
 def _saved_as_is(node: Node, project: int) -> Operation[Written]:
+    yield from refuse_while_lent(node, "save")
     began = yield from Pause(0)
     found = yield from taken(node, project)
     before = held(node, found.image, project)
@@ -122,6 +133,7 @@ def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]
 
 
 def _emptied(node: Node, project: int) -> Operation[bytes]:
+    yield from refuse_while_lent(node, "clear")
     found = yield from taken(node, project)
     if not is_blank(decode_image(found.image, node.order)):
         yield from cleared(node, project)

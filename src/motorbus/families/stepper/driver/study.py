@@ -138,15 +138,24 @@ def _leave(case: Case, trial: Trial, why: str) -> None:
 def _repeated(case: Case, timing: Timing, trial: Trial) -> Operation[Verdict | None]:
     """Twice, or three times where the answer rests on silence; None when one of them was not acknowledged in time."""
     found = case.found
-    seconds = trial.longest(found.known) * timing.clock + MARGIN
+    seconds, most = trial.longest(found.known) * timing.clock + MARGIN, trial.most(found.known)
     seen: list[tuple[tuple[float, ...], Seen]] = []
     verdict: Verdict | None = None
     while len(seen) < REPETITIONS or (verdict and verdict.silent and verdict.fits and len(seen) < IN_SILENCE):
-        heard = yield from once(case, trial, seconds, trial.most(found.known), timing.latency)
+        heard = yield from once(case, trial, seconds, most, timing.latency)
         if heard is None:
             return None
         seen.append(timing.seen(heard))
-        verdict = judged(trial, found.known, seen, timing.turnaround)
-        firm = judged(trial, found.firm, seen, timing.turnaround)
-        verdict = verdict._replace(silent=verdict.silent or firm.answers != verdict.answers)
+        if len(seen) >= REPETITIONS:
+            verdict = _judged(case, timing, trial, seen)
     return verdict
+
+
+def _judged(case: Case, timing: Timing, trial: Trial, seen: list[tuple[tuple[float, ...], Seen]]) -> Verdict:
+    """What they say; it rests on silence also where it needs an answer that does."""
+    found = case.found
+    verdict = judged(trial, found.known, seen, timing.turnaround)
+    if set(trial.depends) <= found.firm.keys():
+        return verdict
+    firm = judged(trial, found.firm, seen, timing.turnaround)
+    return verdict._replace(silent=verdict.silent or firm.answers != verdict.answers)

@@ -16,10 +16,14 @@ from motorbus.families.stepper.driver.listening import Heard, listened, timed, w
 from motorbus.families.stepper.driver.reading import dump_once, read_input
 from motorbus.families.stepper.driver.trials import controls
 
-MARGIN: Final = 0.6
-"""s that are waited beyond the latest moment at which any reading says anything."""
+MARGIN: Final = 1.0
+"""s that are waited beyond the latest moment at which any reading says anything: commands may leave late, for a bus may
+have something to ask first.
+"""
 STEADY: Final = 0.03
 """s by which two runs of the same, or two answers, may differ."""
+QUESTION: Final = 0.35
+"""s that a bus may take to read a project, when it makes sure that the next answer is no old one."""
 CLOCK: Final = 0.1
 """Part by which the clock of a controller may be off."""
 
@@ -102,7 +106,7 @@ def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) 
     heard = yield from listened(case.node, case.watch, trial.project, trial.acts, seconds, wanted)
     if heard.answered[0] is None:
         case.found.doubt("a start was not acknowledged")
-    elif _slowest(trial, heard) > latency + STEADY:
+    elif _is_late(trial, heard, latency):
         case.found.doubt("an acknowledgement came late")
     elif any(end < heard.answered[0] - STEADY for end in heard.notices):
         case.found.doubt("a notice came before the project was started")
@@ -111,14 +115,15 @@ def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) 
     return None
 
 
-def _slowest(trial: Trial, heard: Heard) -> float:
-    """How late the latest answer was; not of a command behind a stop, before which a bus may have something to ask."""
+def _is_late(trial: Trial, heard: Heard, latency: float) -> bool:
+    """Whether a command left or was answered late; behind a stop a bus may have a question first."""
     behind = [False, *(act.command.startswith("stop") for act in trial.acts)]
-    return max(
-        came - sent
-        for sent, came, other in zip(heard.sent, heard.answered, behind, strict=False)
-        if came is not None and not other
-    )
+    for act, sent, came, asks in zip(trial.acts, heard.sent, heard.answered, behind, strict=False):
+        if sent - heard.sent[0] > act.at + STEADY + QUESTION:
+            return True
+        if came is not None and came - sent > latency + STEADY + QUESTION * asks:
+            return True
+    return False
 
 
 def _answer(heard: Heard) -> float:

@@ -29,6 +29,7 @@ def controls(motor: Motor, scratch: int) -> tuple[Trial, Trial]:
             (),
             motor.project(scratch, motor.step(1, delay)),
             (_START,),
+            motor.turns(1),
         )
         for delay in (300, 1300)
     )
@@ -54,7 +55,7 @@ def trials(motor: Motor, scratch: int, empty: int | None) -> tuple[Trial, ...]:
 
 
 def _loops(motor: Motor, scratch: int) -> Trial:
-    steps = motor.step(1, 300), motor.step(1, 100)
+    steps = motor.step(1, 300), motor.step(1, 100, reverse=True)
     return Trial(
         "loops",
         "two steps, the second looped twice, the project twice",
@@ -62,6 +63,7 @@ def _loops(motor: Motor, scratch: int) -> Trial:
         (),
         motor.project(scratch, *steps, loop_first=2, loop_last=2, loop_count=2, project_loop=2),
         (_START,),
+        motor.turns(6),
     )
 
 
@@ -79,7 +81,7 @@ def _rounding(motor: Motor, scratch: int) -> Trial:
         ("proj_loop",) if looped else (),
         motor.project(scratch, *steps, last, project_loop=passes if looped else 0),
         (_START,),
-        float(count * (passes + 1) / motor.per_turn),
+        motor.turns(count * (passes + looped)),
     )
 
 
@@ -91,6 +93,7 @@ def _notice_on_stop(motor: Motor, scratch: int) -> Trial:
         (),
         motor.project(scratch, motor.step(1, 1500)),
         (_START, Act(0.4, "stop_project")),
+        motor.turns(1),
     )
 
 
@@ -102,6 +105,7 @@ def _busy(motor: Motor, scratch: int) -> Trial:
         (),
         motor.project(scratch, motor.step(1, 1000)),
         (_START, Act(0.5, "start_project")),
+        motor.turns(2),
     )
 
 
@@ -115,7 +119,7 @@ def _motor_stop(motor: Motor, scratch: int) -> Trial:
         ("notice_on_stop",),
         motor.project(scratch, *steps),
         (_START, Act(0.4, "stop_motor")),
-        float(pulses / motor.per_turn),
+        motor.turns(pulses + 1),
     )
 
 
@@ -141,7 +145,7 @@ def _notice_on_once(motor: Motor) -> Trial:
         (),
         motor.project(1, motor.step(pulses, 0, rpm=1, reverse=True)),
         (Act(0.0, "run_once"),),
-        float(pulses / motor.per_turn),
+        motor.turns(pulses),
     )
 
 
@@ -154,7 +158,7 @@ def _stop_scope(motor: Motor) -> Trial:
         ("notice_on_once", "busy", "notice_on_stop"),
         motor.project(1, motor.step(pulses, 100, rpm=1, reverse=True)),
         (Act(0.0, "run_once"), Act(0.3, "stop_project"), Act(0.6, "start_project")),
-        float(2 * pulses / motor.per_turn),
+        motor.turns(2 * pulses),
     )
 
 
@@ -168,7 +172,7 @@ def _stop_scope_by_notice(motor: Motor) -> Trial:
         ("notice_on_once",),
         motor.project(1, motor.step(pulses, 100, rpm=1, reverse=True)),
         (Act(0.0, "run_once"), Act(0.3, "stop_project")),
-        float(pulses / motor.per_turn),
+        motor.turns(pulses),
         needs=(("notice_on_once", True),),
     )
 

@@ -69,7 +69,9 @@ def waited(watch: Watch, seconds: float, what: str) -> Operation[None]:
     Raises Interrupted when somebody has stopped it.
     """
     began = now = yield from Pause(0)
-    end = began + seconds  # a moment to compare with: what is left of a time may be rounded to nothing, again and again
+    end = (
+        began + seconds
+    )  # a moment to compare with: what is left of a time may be rounded to nothing, again and again
     while now < end:
         yield from Report(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
         now = yield from Pause(min(LOOK, end - now))

@@ -32,6 +32,8 @@ from motorbus.families.stepper.table import (
 ORDERS: Final[tuple[Order, Order]] = ("little", "big")
 _STOP_MODE: Final = TABLE["stop_mode"].address
 _FLAG_PLACES: Final = tuple(TABLE[name].address for name in ("stop_mode", "mode4", "power_on_home"))
+MARGIN: Final = 1.0
+"""s that are waited beyond the longest of them."""
 _LONGEST: Final = 5.0
 """s of a stored pause that are waited for."""
 
@@ -154,7 +156,7 @@ def select_unseen(case: Case, offset: float, clock: float) -> Operation[None]:
     agreed = set(ways)
     for _ in range(2):
         heard = yield from listened(
-            case.node, case.watch, project, (Act(0.0, "start_project"),), max(ways.values()) + 0.6
+            case.node, case.watch, project, (Act(0.0, "start_project"),), max(ways.values()) + MARGIN
         )
         start = heard.answered[0]
         ends = [(one - start - offset) / clock for one in heard.notices] if start is not None else []

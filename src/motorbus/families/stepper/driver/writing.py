@@ -32,6 +32,7 @@ from motorbus.families.stepper.driver.editing import (
     held,
     noted,
     read_back,
+    refuse_while_lent,
 )
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.program import Conditions, Program
@@ -166,10 +167,10 @@ def write_project(
     it is written once more and saved once more, which does no harm, whereas saving alone would store another project
     here if the controller had lost its supply.
 
-    Reports `Planned` before the first command, then `Progress`. Raises RequestError before anything is sent;
-    VerificationFailed, with what the controller holds, when it does not read as it is meant; OutcomeUnknown when a
-    command was never acknowledged. An error has a note that says what may be half written, and whether it was saved.
-    Writing it again mends whatever an error has left.
+    Reports `Planned` before the first command, then `Progress`. Raises RequestError before anything is written, also
+    while project 1 is lent to a motion that was cut off; VerificationFailed, with what the controller holds, when it
+    does not read as it is meant; OutcomeUnknown when a command was never acknowledged. An error has a note that says
+    what may be half written, and whether it was saved. Writing it again mends whatever an error has left.
     """
     number, wanted = _wanted(program, project)
     _linted(program, wanted, expert)
@@ -258,12 +259,14 @@ def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
 
 
 def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -> Operation[Written]:
+    yield from refuse_while_lent(node, "write_project")
     began = yield from Pause(0)
     found = yield from taken(node, number)
     return (yield from written(node, found, _meant(node, found, wanted), raw, save=save, began=began))
 
 
 def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Operation[Written]:
+    yield from refuse_while_lent(node, "write")
     began = yield from Pause(0)
     found = yield from taken(node, number)
     before = held(node, found.image, number)

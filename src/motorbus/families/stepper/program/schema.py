@@ -22,6 +22,10 @@ _SPELLINGS: Final = {
 """What else a unit may be called."""
 _NAMED: Final = rf"(?!input |output ){names.NAME.pattern}"
 """A name of the file; which words it may not be besides, only reading tells."""
+_EXPERT: Final = (
+    "steps may use inputs 3 and 4, and a number may be one that a controller holds and nobody should write, beyond the "
+    "ranges here: a loop count of 255, 0 for what makes the geometry"
+)
 
 
 def schema() -> dict[str, Any]:
@@ -44,7 +48,7 @@ def schema() -> dict[str, Any]:
                 ],
             },
             "total_steps": _integer(PARAMETERS["total_steps"]),
-            "expert": {"type": "boolean", "description": "steps may use inputs 3 and 4"},
+            "expert": {"type": "boolean", "description": _EXPERT},
             "motor": _motor(),
             "loop": _loop(),
             "inputs": _names(INPUTS, "an input"),

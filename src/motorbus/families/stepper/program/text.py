@@ -303,7 +303,7 @@ def _refuse(project: Project, expert: bool, *, steps: bool = True) -> None:
     within("project", project.number)
     for name in BASE_NAMES:
         if steps or name != "total_steps":
-            within(name, getattr(project, name))
+            within(name, getattr(project, name), expert=expert)
     for number in range(1, min(project.total_steps, STEPS) + 1 if steps else 1):
         for name in STEP_NAMES:
             within(name, getattr(project.step(number), name), number, expert=expert)
