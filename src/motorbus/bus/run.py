@@ -206,7 +206,7 @@ class Run(Generic[T]):
         errors = [child.error for child in children if child.error is not None]
         if errors:
             for other in errors[1:]:
-                errors[0].add_note(f"also: {other}")
+                errors[0].add_note(f"also: {str(other) or type(other).__name__}")
             self._step(branch, error=errors[0])
         elif len(children) == 1 and children[0].alone:
             self._step(branch, children[0].value)

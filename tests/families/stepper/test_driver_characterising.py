@@ -11,7 +11,7 @@ import pytest
 from motorbus.core.operation import INTENT, OUTCOME, Journal, Operation, Report
 from motorbus.errors import Interrupted, LinkLost, RequestError
 from motorbus.families.stepper.driver import Experiment, characterise, experiments, recover
-from motorbus.families.stepper.driver.characterising import VERB, likely_order
+from motorbus.families.stepper.driver.characterising import NOTE, VERB, likely_order
 from motorbus.families.stepper.table import Project, Step, encode_image, with_steps
 from tests.families.stepper.bench import Bench, bench
 from tests.families.stepper.studies import STORES, as_before, furnished, hidden, made_up, node, wrong
@@ -189,8 +189,9 @@ def test_a_stop_of_somebody_else_ends_it_and_all_is_put_back() -> None:
         def stop() -> None:
             there.device.memory.stops += 1
 
-        with pytest.raises(Interrupted):
+        with pytest.raises(Interrupted) as ended:
             study(there, "started twice", stop)
+        assert NOTE not in getattr(ended.value, "__notes__", ())
         assert as_before(there, stored)
         assert [one.state for one in there.events if isinstance(one, Journal)][-1] == OUTCOME
 
@@ -229,10 +230,11 @@ def test_what_a_crash_leaves_is_put_back_from_the_journal(name: str) -> None:
     with bench(**options) as there:
         there.simulated.put(1, made_up(chance, 1))
         stored = dict(there.simulated.store.stored)
-        with pytest.raises(LinkLost):
+        with pytest.raises(LinkLost) as lost:
             study(there, name, lambda: there.link.unplug(there.link.now() + 1.0))
         records = [one for one in there.events if isinstance(one, Journal)]
         assert [one.state for one in records][-1] == INTENT
+        assert NOTE in lost.value.__notes__
         there.link.plug()
         there.run(recover(there.device, VERB, records[-1].facts))
         assert as_before(there, stored)

@@ -56,6 +56,7 @@ MOST_TRAVEL: Final = 100.0
 VERB: Final = "characterise"
 GIVEN_BACK: Final = "old"
 """How every characterisation ends, in the journal and for `recover`."""
+NOTE: Final = "what was edited for the experiments may be there still: recover() puts it back, and so does a power cycle"
 TRIES: Final = 3
 """How often it is tried to edit the stored project again; after an emergency stop the bus itself repeats nothing."""
 _CLEARLY: Final = 8
@@ -140,9 +141,19 @@ def _characterised(node: Node, scratch: int, travel: float) -> Operation[Profile
     facts = _facts(node, stored, home)
     node.memory.commanded(tuple(range(1, OUTPUTS + 1)), None)
     yield from Report(Journal(VERB, INTENT, facts))
-    found = yield from afterwards(studied(case), lambda: put_back(case.node, stored[home], facts, case.seen))
+    try:
+        found = yield from afterwards(studied(case), lambda: _returned(case, stored[home], facts))
+    except BaseException as error:
+        if not case.returned:
+            error.add_note(NOTE)
+        raise
     yield from _compared(case.node, stored)
     return found
+
+
+def _returned(case: Case, image: bytes, facts: Mapping[str, Any]) -> Operation[None]:
+    yield from put_back(case.node, image, facts, case.seen)
+    case.returned = True
 
 
 def _facts(node: Node, stored: Mapping[int, bytes], home: int) -> dict[str, object]:

@@ -89,7 +89,8 @@ class Findings:
 class Case:
     """The controller that is studied: what it has stored, which project is lent, and what is known of it.
 
-    `motor_of` is the project that tells of its motor, `travel` how many turns each way it may turn.
+    `motor_of` is the project that tells of its motor, `travel` how many turns each way it may turn, and `returned` says
+    that what is edited is a stored project again.
     """
 
     def __init__(
@@ -103,6 +104,7 @@ class Case:
         self.node = node
         self.motor = self._motor()
         self.watch: Final = Watch(node)
+        self.returned = False
 
     def _motor(self) -> Motor:
         return Motor.of(decode_image(self.stored[self._motor_of], self.node.order))
