@@ -223,7 +223,8 @@ def test_a_timer_ends_at_its_moment_and_a_listener_at_its_notice() -> None:
     script.wait(0.49)
     assert not timer.done
     script.wait(0.01)
-    assert timer.done and timer.value == script.now
+    assert timer.done
+    assert timer.value == script.now
     script.turns._take(Notice(1, "other", b""), script.now)
     assert not listener.done
     script.turns._take(Notice(1, "end", b""), script.now)

@@ -32,7 +32,8 @@ def test_a_bus_without_settings_speaks_as_the_manual_says() -> None:
 def test_each_bus_has_a_memory_of_its_own() -> None:
     with motorbus.open("stepper:sim") as bus, motorbus.open("stepper:sim") as other:
         Controller(bus).memory.owed = True
-        assert Controller(bus).memory.owed and not Controller(other).memory.owed
+        assert Controller(bus).memory.owed
+        assert not Controller(other).memory.owed
 
 
 def test_it_is_an_axis_that_moves_by_and_has_no_position() -> None:
