@@ -9,8 +9,11 @@ before a motor turns, and `simulator` makes it a device.
     Conditions   what a project is judged against
     Behaviour    how a controller carries a project out where nobody knows
     Profile      how one controller was found to carry them out
-    Controller   what a real one has stored, the level of an input, and an end to whatever it does
-    Written      what was written to it, and as `Proof` how far that is known
+    Controller   a real one: read, write, run, jog, home, switch, watch, stop
+    Difference   what writing a program would change and `Cost`, `Written` what came of it and, as `Proof`, how far
+                 that is known
+    Ran          what came of a run, as one `Outcome` of four; `Estimated` is its progress, which nobody tells
+    Moved        what came of a jog or a move, `Homed` of homing, `Watched` of watching inputs
     Backup       what it had stored, as a file
 
 `FAMILY` is what the rest of motorbus knows of it.
@@ -41,9 +44,20 @@ from motorbus.families.stepper import driver, wire
 from motorbus.families.stepper.driver import (
     AsyncController,
     Controller,
+    Cost,
+    Difference,
+    Estimated,
+    Experiment,
+    Homed,
+    InputChanged,
+    Moved,
+    Outcome,
+    Planned,
     Promise,
     Proof,
+    Ran,
     Sends,
+    Watched,
     Written,
     line,
     presence,
@@ -61,15 +75,26 @@ __all__ = [
     "Behaviour",
     "Conditions",
     "Controller",
+    "Cost",
+    "Difference",
     "Estimate",
+    "Estimated",
+    "Experiment",
     "Finding",
+    "Homed",
+    "InputChanged",
+    "Moved",
+    "Outcome",
     "Plan",
+    "Planned",
     "Profile",
     "Program",
     "Promise",
     "Proof",
+    "Ran",
     "Sends",
     "Stepper",
+    "Watched",
     "Written",
 ]
 

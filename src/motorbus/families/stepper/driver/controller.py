@@ -11,6 +11,7 @@ from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner,
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import (
     characterising,
+    commands,
     copying,
     homing,
     inputs,
@@ -64,6 +65,26 @@ class ControllerVerbs(Node):
     home = verb(homing.home)
     characterise = verb(characterising.characterise)
     recover = verb(recovery.recover)
+
+    # -- commands of the manual, one frame each: what they set goes to the selected project and is not read back
+
+    select_project = verb(commands.select_project)
+    set_microstep_and_angle = verb(commands.set_microstep_and_angle)
+    set_turn_distance = verb(commands.set_turn_distance)
+    set_step_distance = verb(commands.set_step_distance)
+    set_step_direction_start = verb(commands.set_step_direction_start)
+    set_step_accel_speed = verb(commands.set_step_accel_speed)
+    set_step_output = verb(commands.set_step_output)
+    set_step_delay = verb(commands.set_step_delay)
+    set_step_start_input = verb(commands.set_step_start_input)
+    set_step_stop_input = verb(commands.set_step_stop_input)
+    set_segment_loop = verb(commands.set_segment_loop)
+    set_project_loop = verb(commands.set_project_loop)
+    stop_project = verb(commands.stop_project)
+    stop_motor = verb(commands.stop_motor)
+    set_stop_mode = verb(commands.set_stop_mode)
+    set_mode4 = verb(commands.set_mode4)
+    set_power_on_home = verb(commands.set_power_on_home)
 
     @property
     def last_commanded(self) -> dict[int, bool | None]:
