@@ -56,7 +56,9 @@ MOST_TRAVEL: Final = 100.0
 VERB: Final = "characterise"
 GIVEN_BACK: Final = "old"
 """How every characterisation ends, in the journal and for `recover`."""
-NOTE: Final = "what was edited for the experiments may be there still: recover() puts it back; so does a power cycle"
+NOTE: Final = (
+    "what was edited for the experiments may be there still: recover() puts it back; so does a power cycle"
+)
 TRIES: Final = 3
 """How often it is tried to edit the stored project again; after an emergency stop the bus itself repeats nothing."""
 _CLEARLY: Final = 8
