@@ -16,7 +16,7 @@ from motorbus.cli.plain import plain
 from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
 from motorbus.cli.stepper.files import app
 from motorbus.families.stepper.driver.characterising import experiments
-from motorbus.families.stepper.driver.study import Experiment
+from motorbus.families.stepper.driver.characterising.study import Experiment
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Bar, Output

@@ -7,6 +7,7 @@ returns an `Exchange`, or an operation that yields steps; a bus carries it out.
 from __future__ import annotations
 
 from motorbus.families.stepper.driver.characterising import characterise, experiments
+from motorbus.families.stepper.driver.characterising.study import Experiment
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
 from motorbus.families.stepper.driver.copying import backup, restore
 from motorbus.families.stepper.driver.costs import Cost
@@ -40,7 +41,6 @@ from motorbus.families.stepper.driver.running import run, start_project
 from motorbus.families.stepper.driver.scanning import Sends, scan
 from motorbus.families.stepper.driver.selecting import clear, save, select
 from motorbus.families.stepper.driver.stopping import Promise, stop
-from motorbus.families.stepper.driver.study import Experiment
 from motorbus.families.stepper.driver.waiting import Outcome, Ran
 from motorbus.families.stepper.driver.writing import (
     Difference,

@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from motorbus.families.stepper.driver import Node
-from motorbus.families.stepper.driver.findings import Case
+from motorbus.families.stepper.driver.characterising.findings import Case
 from motorbus.families.stepper.execution import Behaviour, Phase
 from motorbus.families.stepper.program import Profile
 from motorbus.families.stepper.program.profile import MEMORY

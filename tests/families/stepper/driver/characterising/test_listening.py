@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import Interrupted, NoReply
-from motorbus.families.stepper.driver.experiments import Act, Motor
-from motorbus.families.stepper.driver.listening import FLAGS, listened, timed, write
+from motorbus.families.stepper.driver.characterising.experiments import Act, Motor
+from motorbus.families.stepper.driver.characterising.listening import FLAGS, listened, timed, write
 from motorbus.families.stepper.driver.reading import read_input
 from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.execution import Phase

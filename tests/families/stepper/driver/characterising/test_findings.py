@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from motorbus.families.stepper.driver.findings import UNTRIED, Case, Findings
+from motorbus.families.stepper.driver.characterising.findings import UNTRIED, Case, Findings
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.program.profile import KNOWN
 from motorbus.families.stepper.table import BLANK, Project, Step, encode_image, with_steps

@@ -10,9 +10,17 @@ import pytest
 from hypothesis import given
 
 from motorbus.families.stepper import execution
-from motorbus.families.stepper.driver.experiments import SLACK, SLOW_TURNS, WAYS, Act, Motor, Seen, Trial
-from motorbus.families.stepper.driver.study import IN_SILENCE
-from motorbus.families.stepper.driver.trials import controls, ramp, ramp_speeds, trials
+from motorbus.families.stepper.driver.characterising.experiments import (
+    SLACK,
+    SLOW_TURNS,
+    WAYS,
+    Act,
+    Motor,
+    Seen,
+    Trial,
+)
+from motorbus.families.stepper.driver.characterising.study import IN_SILENCE
+from motorbus.families.stepper.driver.characterising.trials import controls, ramp, ramp_speeds, trials
 from motorbus.families.stepper.execution import USUAL, Behaviour, State
 from motorbus.families.stepper.table import Project
 from tests.families.stepper.behaviours import switches

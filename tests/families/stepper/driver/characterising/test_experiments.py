@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.stepper.driver.experiments import Act, Motor, Seen, Trial, judged
-from motorbus.families.stepper.driver.trials import trials
+from motorbus.families.stepper.driver.characterising.experiments import Act, Motor, Seen, Trial, judged
+from motorbus.families.stepper.driver.characterising.trials import trials
 from motorbus.families.stepper.table import Project
 
 MOTOR = Motor.of(Project(microsteps=8, step_angle=180))

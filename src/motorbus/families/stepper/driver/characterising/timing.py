@@ -10,11 +10,11 @@ from typing import Final, NamedTuple
 
 from motorbus.core.operation import Operation, Pause
 from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver.experiments import Seen, Trial
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.listening import Heard, listened, timed, write
+from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.listening import Heard, listened, timed, write
+from motorbus.families.stepper.driver.characterising.trials import controls
 from motorbus.families.stepper.driver.reading import dump_once, read_input
-from motorbus.families.stepper.driver.trials import controls
 
 MARGIN: Final = 1.0
 """s that are waited beyond the latest moment at which any reading says anything: commands may leave late, for a bus may

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import pytest
 
-from motorbus.families.stepper.driver.study import (
+from motorbus.families.stepper.driver.characterising.study import (
     IN_SILENCE,
     RAMP,
     REPETITIONS,
@@ -17,7 +17,7 @@ from motorbus.families.stepper.driver.study import (
 from motorbus.families.stepper.program import Profile
 from motorbus.families.stepper.simulator import Switches
 from tests.families.stepper.bench import Bench, bench
-from tests.families.stepper.studies import case_of
+from tests.families.stepper.driver.characterising.studies import case_of
 
 TIMED = {"ramp", "rounding", "zero_distance", "seg_loop", "proj_loop", "busy", "notice_on_stop"}
 

@@ -13,11 +13,11 @@ from typing import Any, Final
 from motorbus.core.operation import Operation
 from motorbus.errors import VerificationFailed
 from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver.experiments import SLACK, SLACK_PART, Act
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.listening import FLAGS, listened, told, write
+from motorbus.families.stepper.driver.characterising.experiments import SLACK, SLACK_PART, Act
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.listening import FLAGS, listened, told, write
+from motorbus.families.stepper.driver.characterising.trials import controls
 from motorbus.families.stepper.driver.reading import dump
-from motorbus.families.stepper.driver.trials import controls
 from motorbus.families.stepper.table import (
     STEPS,
     TABLE,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.families.stepper.driver.experiments import Motor
+from motorbus.families.stepper.driver.characterising.experiments import Motor
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.program.profile import KNOWN, Profile, Setting

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.ramping import ramped
-from motorbus.families.stepper.driver.timing import controlled
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.ramping import ramped
+from motorbus.families.stepper.driver.characterising.timing import controlled
 from motorbus.families.stepper.table import Project, Step, with_steps
 from tests.families.stepper.bench import Bench, bench
-from tests.families.stepper.studies import case_of
+from tests.families.stepper.driver.characterising.studies import case_of
 
 MOTOR = with_steps(Project(microsteps=8, step_angle=180, turn_distance=1600), (Step(distance=1, speed=60),))
 

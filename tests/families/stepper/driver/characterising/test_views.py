@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import VerificationFailed
-from motorbus.families.stepper.driver import views
-from motorbus.families.stepper.driver.timing import controlled
-from motorbus.families.stepper.driver.trials import controls
+from motorbus.families.stepper.driver.characterising import views
+from motorbus.families.stepper.driver.characterising.timing import controlled
+from motorbus.families.stepper.driver.characterising.trials import controls
 from motorbus.families.stepper.table import BLANK, Project, Step, encode_image, with_steps
 from tests.families.stepper.bench import Bench, Tampering, bench
-from tests.families.stepper.studies import case_of
+from tests.families.stepper.driver.characterising.studies import case_of
 
 EACH_SELECT = pytest.mark.parametrize("select", ["load", "relabel"])
 EACH_ORDER = pytest.mark.parametrize("order", ["little", "big"])

@@ -11,7 +11,7 @@ from fractions import Fraction
 from math import ceil
 from typing import Final
 
-from motorbus.families.stepper.driver.experiments import SLOW_TURNS, Act, Motor, Trial
+from motorbus.families.stepper.driver.characterising.experiments import SLOW_TURNS, Act, Motor, Trial
 from motorbus.families.stepper.table import STEPS, Project, Step
 
 PART: Final = Fraction(3, 5)

@@ -14,7 +14,15 @@ from motorbus.families.stepper.driver import Experiment, characterise, experimen
 from motorbus.families.stepper.driver.characterising import NOTE, VERB, likely_order
 from motorbus.families.stepper.table import Project, Step, encode_image, with_steps
 from tests.families.stepper.bench import Bench, bench
-from tests.families.stepper.studies import STORES, as_before, furnished, hidden, made_up, node, wrong
+from tests.families.stepper.driver.characterising.studies import (
+    STORES,
+    as_before,
+    furnished,
+    hidden,
+    made_up,
+    node,
+    wrong,
+)
 
 PARTS = 4
 NOTICE = bytes.fromhex("EE DD")

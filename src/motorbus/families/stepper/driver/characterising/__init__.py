@@ -29,14 +29,20 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import LinkError, RequestError, VerificationFailed
 from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver.characterising.experiments import Motor
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.listening import rested
+from motorbus.families.stepper.driver.characterising.study import (
+    SELECTION,
+    VIEWS,
+    Experiment,
+    ramp_experiment,
+    studied,
+)
+from motorbus.families.stepper.driver.characterising.trials import controls, trials
 from motorbus.families.stepper.driver.editing import brought
-from motorbus.families.stepper.driver.experiments import Motor
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.listening import rested
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import dump
-from motorbus.families.stepper.driver.study import SELECTION, VIEWS, Experiment, ramp_experiment, studied
-from motorbus.families.stepper.driver.trials import controls, trials
 from motorbus.families.stepper.driver.turning import refuse_unless_idle
 from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.table import (

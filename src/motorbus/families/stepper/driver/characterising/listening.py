@@ -24,9 +24,9 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper.driver import goals
+from motorbus.families.stepper.driver.characterising.experiments import Act
 from motorbus.families.stepper.driver.commands import motion, nothing
 from motorbus.families.stepper.driver.exchanges import command
-from motorbus.families.stepper.driver.experiments import Act
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import read_input
 from motorbus.families.stepper.driver.stopping import stop

@@ -12,11 +12,11 @@ from typing import Final
 
 from motorbus.core.operation import Operation
 from motorbus.families.stepper import execution
-from motorbus.families.stepper.driver.experiments import Act, Trial
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.listening import write
-from motorbus.families.stepper.driver.timing import STEADY, Timing, once
-from motorbus.families.stepper.driver.trials import ramp, ramp_speeds
+from motorbus.families.stepper.driver.characterising.experiments import Act, Trial
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.listening import write
+from motorbus.families.stepper.driver.characterising.timing import STEADY, Timing, once
+from motorbus.families.stepper.driver.characterising.trials import ramp, ramp_speeds
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Fit, Run, fit
 from motorbus.families.stepper.program.plan import seconds_of

@@ -11,13 +11,13 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.operation import Operation, Report
 from motorbus.errors import NoReply, WireError
-from motorbus.families.stepper.driver import views
-from motorbus.families.stepper.driver.experiments import Seen, Trial, Verdict, judged
-from motorbus.families.stepper.driver.findings import UNTRIED, Case
-from motorbus.families.stepper.driver.listening import write
-from motorbus.families.stepper.driver.ramping import ramped
-from motorbus.families.stepper.driver.timing import MARGIN, Timing, controlled, once
-from motorbus.families.stepper.driver.trials import RAMP_SECONDS, RAMP_STEPS, controls, trials
+from motorbus.families.stepper.driver.characterising import views
+from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial, Verdict, judged
+from motorbus.families.stepper.driver.characterising.findings import UNTRIED, Case
+from motorbus.families.stepper.driver.characterising.listening import write
+from motorbus.families.stepper.driver.characterising.ramping import ramped
+from motorbus.families.stepper.driver.characterising.timing import MARGIN, Timing, controlled, once
+from motorbus.families.stepper.driver.characterising.trials import RAMP_SECONDS, RAMP_STEPS, controls, trials
 from motorbus.families.stepper.program.profile import KNOWN, Profile
 
 T = TypeVar("T")

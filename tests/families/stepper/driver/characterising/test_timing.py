@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from motorbus.families.stepper.driver.experiments import Seen
-from motorbus.families.stepper.driver.findings import Case
-from motorbus.families.stepper.driver.listening import Heard
-from motorbus.families.stepper.driver.timing import Timing, controlled, once
-from motorbus.families.stepper.driver.trials import controls
+from motorbus.families.stepper.driver.characterising.experiments import Seen
+from motorbus.families.stepper.driver.characterising.findings import Case
+from motorbus.families.stepper.driver.characterising.listening import Heard
+from motorbus.families.stepper.driver.characterising.timing import Timing, controlled, once
+from motorbus.families.stepper.driver.characterising.trials import controls
 from motorbus.families.stepper.table import encode_image
 from tests.families.stepper.bench import Bench, bench
-from tests.families.stepper.studies import case_of
+from tests.families.stepper.driver.characterising.studies import case_of
 
 
 @pytest.mark.parametrize("turnaround", [0.0, 0.005, 0.02])
