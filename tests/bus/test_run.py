@@ -227,6 +227,25 @@ def test_children_are_cancelled_in_order_and_all_clean_up(after: int) -> None:
     assert bus.run(positions(1, 2)).missing == ()
 
 
+def test_what_a_clean_up_failed_with_goes_with_the_interruption() -> None:
+    bus, _ = memory_bus()
+
+    def turning() -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            error = RequestError("the motor may be turning")
+            error.add_note("project 1 is as it was lent")
+            raise error
+
+    with pytest.raises(KeyboardInterrupt) as cut:
+        interrupted(bus, turning(), 2)
+    assert cut.value.__notes__ == ["the motor may be turning", "project 1 is as it was lent"]
+    with pytest.raises(KeyboardInterrupt) as plain:
+        interrupted(bus, guarded(1, 9), 2)
+    assert not hasattr(plain.value, "__notes__")
+
+
 def test_a_clean_up_that_cannot_end_is_given_up() -> None:
     bus, responder = memory_bus()
 

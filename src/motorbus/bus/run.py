@@ -256,13 +256,25 @@ class Run(Generic[T]):
                     self.turns.abandon(branch.ticket)
 
     def result(self) -> T:
-        """What the operation returned; raises what it raised, or the interruption it was cut by."""
+        """What the operation returned; raises what it raised, or the interruption it was cut by.
+
+        What the cleaning up failed with goes along as a note, for it may be that a motor still turns.
+        """
         if self.interruption is not None:
+            _note(self.interruption, self.root.error)
             raise self.interruption
         if self.root.error is not None:
             raise self.root.error
         value: T = self.root.value
         return value
+
+
+def _note(interruption: BaseException, error: BaseException | None) -> None:
+    if error is None or error is interruption:
+        return
+    notes = getattr(error, "__notes__", ())
+    for text in (getattr(error, "summary", "") or str(error) or type(error).__name__, *notes):
+        interruption.add_note(text)
 
 
 def _alive(generator: Operation[Any]) -> bool:

@@ -371,9 +371,9 @@ class Turns(Air):
             flight.deadline = min(flight.deadline, now + rest)
             flight.abandoned = True
             self._settle(flight, error=verdict.latched())
-        for timer in list(self._timers):
-            self._timers.remove(timer)
-            self._settle(timer, error=verdict.latched())
+        for idle in (*self._timers, *(one for one in self._claims if one.owner is not self._holder)):
+            self._settle(idle, error=verdict.latched())
+            self.abandon(idle)
         return self.known.frames
 
     def stopped(self) -> None:

@@ -18,7 +18,6 @@ from motorbus.errors import MotorbusError
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
-
 ERROR_FLAG: Final = 1 << 29
 """Set in the identifier of what is no data frame but the adapter's report of a bus error, as SocketCAN does it."""
 REMOTE_FLAG: Final = 1 << 30
@@ -93,10 +92,8 @@ ANY: Final = Any_.ANY
 
 
 EVERY_LANE: Final = -1
-"""The lane of an exchange that addresses everyone on a bus where each node has a lane of its own.
-
-Its replies are `ANY`; it takes each reply that nobody else awaits, whatever lane that comes on.
-"""
+"""The lane of an exchange that addresses everyone on a bus where each node has a lane of its own; its replies are
+`ANY`: it takes each that nobody else awaits, on whatever lane it comes."""
 
 
 class Goal(NamedTuple):
@@ -124,7 +121,7 @@ class Reply(NamedTuple):
 class Notice(NamedTuple):
     """A frame the device sent on its own account: a report, an alarm, the end of a program.
 
-    `at` is when it arrived, s on the link's clock; the bus fills it in, for who makes a notice has no clock.
+    `at` is when it arrived, s on the link's clock; the bus fills it in.
     """
 
     node: int
@@ -177,11 +174,10 @@ class Exchange(Generic[T_co]):
     `repeatable`  sending it twice does no more than sending it once
     `tells_position`  the replies begin with the present position, so stop can hold it
     `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
-                  must not, None when it may. It is told how to ask how many stops have left for a node by now. So an
-                  order that was made under other settings, or that carries out what was asked for before a stop, does
-                  not leave the queue
-    `other`       makes an exchange that says the same and has replies of another length. Where replies carry no
-                  number, sending the two in turn keeps a second copy of the last reply from being taken for the next
+                  must not, None when it may. It can ask how many stops have left for a node by now. So an order that
+                  was made under other settings, or before a stop, does not leave the queue
+    `other`       makes an exchange that says the same and has replies of another length: where replies carry no
+                  number, taking turns keeps a second copy of the last one from being taken for the next
     """
 
     __slots__ = (
@@ -227,6 +223,11 @@ class Exchange(Generic[T_co]):
         self.tells_position: Final = tells_position
         self.refusal: Final = refusal
         self.other: Final = other
+
+    def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:
+        """The same request, whose answer is read in another way."""
+        rest = [name for name in self.__slots__ if name not in ("request", "replies", "read", "other")]
+        return Exchange(self.request, self.replies, read, **{name: getattr(self, name) for name in rest})
 
     def __iter__(self) -> Generator[Step, Any, T_co]:
         value: T_co = yield self
