@@ -7,6 +7,7 @@ import pytest
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import (
     Alone,
+    Effect,
     Exchange,
     Journal,
     Listen,
@@ -20,7 +21,7 @@ from motorbus.core.operation import (
     Tune,
     outcome,
 )
-from motorbus.errors import MotorbusError, NoReply, RequestError
+from motorbus.errors import Interrupted, MotorbusError, NoReply, RequestError
 from tests.bus.responder import LOCK, guarded, memory_bus, position, positions, write
 
 
@@ -244,6 +245,42 @@ def test_what_a_clean_up_failed_with_goes_with_the_interruption() -> None:
     with pytest.raises(KeyboardInterrupt) as plain:
         interrupted(bus, guarded(1, 9), 2)
     assert not hasattr(plain.value, "__notes__")
+
+
+def test_of_several_that_were_cut_off_each_thing_is_said_once() -> None:
+    bus, _ = memory_bus()
+
+    def waiting(error: RequestError | None = None) -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            if error is not None:
+                raise error
+
+    def together(*errors: RequestError | None) -> Operation[None]:
+        yield from Together([waiting(error) for error in errors])
+
+    with pytest.raises(KeyboardInterrupt) as plain:
+        interrupted(bus, together(None, None), 2)
+    assert not hasattr(plain.value, "__notes__")
+    with pytest.raises(KeyboardInterrupt) as cut:
+        interrupted(bus, together(None, RequestError("it may turn"), RequestError("it may turn")), 2)
+    assert cut.value.__notes__ == ["also: it may turn"]
+    with pytest.raises(KeyboardInterrupt) as first:
+        interrupted(bus, together(RequestError("it may turn"), None, RequestError("so may this")), 2)
+    assert first.value.__notes__ == ["it may turn", "also: so may this"]
+
+
+def test_of_several_that_an_emergency_stop_ended_it_is_said_once() -> None:
+    bus, _ = memory_bus()
+    bus.estop()
+
+    def together() -> Operation[None]:
+        yield from Together([write(node, 0, 9, Effect.MOTION) for node in (1, 2)])
+
+    with pytest.raises(Interrupted) as stopped:
+        bus.run(together())
+    assert not hasattr(stopped.value, "__notes__")
 
 
 def test_a_clean_up_that_cannot_end_is_given_up() -> None:

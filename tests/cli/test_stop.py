@@ -6,6 +6,8 @@ import math
 
 import pytest
 
+import motorbus
+from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -28,3 +30,10 @@ def test_somebody_silent_is_told(run: Run, arm: Simulation) -> None:
     ran = run("stop", f"{arm.url}#1+9")
     assert ran.code == 6
     assert run("stop").code == 2
+
+
+def test_on_a_bus_that_is_held_the_other_stop_is_named(run: Run, served: Simulated) -> None:
+    with motorbus.open(served.bus):
+        ran = run("stop", served.bus)
+    assert ran.code == 4
+    assert "`motorbus estop BUS` reaches it" in ran.err

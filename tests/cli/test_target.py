@@ -34,6 +34,14 @@ def test_what_is_no_target_is_refused_without_a_port(text: str) -> None:
         target.target(text)
 
 
+def test_the_only_device_of_a_line_needs_no_name() -> None:
+    assert target.target("stepper:COM7").nodes == (1,)
+    assert target.device("stepper:COM7,motor=5") == target.device("stepper:COM7,motor=5#1")
+    assert target.gathered(["stepper:COM7", "stepper:COM8#1"]) == {"stepper:COM7": (1,), "stepper:COM8": (1,)}
+    with pytest.raises(RequestError, match="is not the id of a stepper controller"):
+        target.target("stepper:COM7#2")
+
+
 def test_targets_are_gathered_by_bus_each_node_once() -> None:
     found = target.gathered(["feetech:COM7#1+2", "feetech:COM8", "feetech:COM7#2+3"])
     assert found == {"feetech:COM7": (1, 2, 3), "feetech:COM8": ()}

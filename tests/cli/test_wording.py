@@ -7,6 +7,7 @@ import re
 import pytest
 
 from motorbus import families
+from motorbus.bus import verdict
 from motorbus.cli import faces, wording
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.simulation.named import Simulation
@@ -76,6 +77,12 @@ def test_what_is_said_of_one_of_several_is_worded_too(run: Run, arm: Simulation)
     ran = run("stop", f"{arm.url}#1")
     assert ran.code == 2
     assert "use `motorbus torque off`, after which it is limp" in ran.err
+
+
+def test_after_an_emergency_stop_a_shell_is_told_to_begin_again() -> None:
+    error = verdict.latched()
+    wording.in_words_of_the_shell(error, families.load("stepper"))
+    assert error.advice == "when it is safe, give the command again, for the stop has ended this one"
 
 
 def test_notes_are_worded_too_those_of_an_interruption_as_well() -> None:

@@ -24,7 +24,7 @@ from motorbus.core.operation import (
     Timeout,
     Together,
 )
-from motorbus.errors import MotorbusError
+from motorbus.errors import MotorbusError, RequestError
 from tests.conformance.subjects import FAMILIES, PACKAGES, line_of, possible
 from tests.conformance.world import IDS, World, world
 
@@ -79,6 +79,15 @@ def test_what_a_link_needs_is_said(family: Family) -> None:
     assert len(set(needs.rates)) == len(needs.rates)
     assert {option.name for option in needs.options if not option.help} == set()
     assert {option.name for option in needs.options if not isinstance(option.default, option.kind)} == set()
+
+
+def test_the_only_device_of_a_line_is_the_one_that_there_can_be(family: Family) -> None:
+    only = family.link.only
+    assert (only is not None) == (line_of(family).devices == 1)
+    if only is not None:
+        assert family.devices.blocking(None, only).node == only
+        with pytest.raises(RequestError):
+            family.devices.blocking(None, only + 1)
 
 
 # --- figures of the wire ------------------------------------------------------------------------------------

@@ -205,8 +205,11 @@ class Run(Generic[T]):
         children, branch.children = branch.children, []
         errors = [child.error for child in children if child.error is not None]
         if errors:
+            said = {str(errors[0])}  # several that were cut off by one thing say the same
             for other in errors[1:]:
-                errors[0].add_note(f"also: {str(other) or type(other).__name__}")
+                if other is not self.interruption and str(other) not in said:
+                    said.add(str(other))
+                    errors[0].add_note(f"also: {str(other) or type(other).__name__}")
             self._step(branch, error=errors[0])
         elif len(children) == 1 and children[0].alone:
             self._step(branch, children[0].value)

@@ -16,6 +16,11 @@ A family's face is the module (or package) of its name in this folder. Apart fro
     as_written(family, read, withheld, request)                the reply to a request after frames that a dry run has
                                                                withheld, b"" if they make no difference; None: unknown
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
+    KEPT                                                       where registers are that survive power-off: "EEPROM" if
+                                                               it does not say another word
+    planned(event)                                             what an event of `write` says of what is about to be
+                                                               written and what that takes, "" if nothing
+    written(told)                                              what `write` returned, as plain data
     bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
     CUT_OFF                                                    what to do about a change that was cut off, where no
                                                                journal is kept

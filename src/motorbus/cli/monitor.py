@@ -11,12 +11,12 @@ from motorbus.cli import alarms, faces, traffic
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.read import Told, sampled, state_facts
-from motorbus.cli.target import able, everyone, face, gathered, opened
+from motorbus.cli.target import able, everyone, face, gathered, opened, target
 from motorbus.core.operation import Pause
 from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.core.family import State
@@ -76,8 +76,9 @@ def monitor(
         raise RequestError("--rate must be above 0, --count and --duration not below 0")
     if listen:
         return traffic.listen(devices, count, duration, options, output)
-    with ExitStack() as stack, _shown(output) as show:
-        watched = _watched(gathered(devices), stack, options, output)
+    wanted = gathered(devices)
+    with ExitStack() as stack, _shown(output, _usual(wanted)) as show:
+        watched = _watched(wanted, stack, options, output)
         told = alarms.Told(output)
 
         def tell(sample: Sample) -> None:
@@ -87,6 +88,12 @@ def monitor(
                     told.look(name, watched[name, node], state)
 
         return _watch(watched, 1 / rate, count, duration, tell, output)
+
+
+def _usual(wanted: Iterable[str]) -> tuple[str, ...]:
+    """The columns while nothing has been told: of devices with telemetry those, of others none."""
+    families = {target(bus).family.name for bus in wanted}
+    return tuple(COLUMNS) if any(faces.offer(name, "sample") is None for name in families) else ()
 
 
 def _watched(
@@ -163,10 +170,10 @@ def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit
 
 
 @contextmanager
-def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
-    told: set[str] = set()
+def _shown(output: Output, usual: Sequence[str]) -> Iterator[Callable[[Sample], None]]:
+    columns = _Columns(usual)
     if not output.live:
-        yield lambda sample: _lines(sample, output, told)
+        yield lambda sample: _lines(sample, output, columns)
         return
     from rich.live import Live
 
@@ -174,12 +181,12 @@ def _shown(output: Output) -> Iterator[Callable[[Sample], None]]:
 
         def redraw(sample: Sample) -> None:
             output.mark()  # the bus is open by now
-            screen.update(_grid(sample, output, told), refresh=True)
+            screen.update(_grid(sample, output, columns), refresh=True)
 
         yield redraw
 
 
-def _lines(sample: Sample, output: Output, told: set[str]) -> None:
+def _lines(sample: Sample, output: Output, columns: _Columns) -> None:
     for (bus, node), state in sample.items():
         named: dict[str, object] = {"bus": bus, "id": node}
         if isinstance(state, MotorbusError):
@@ -188,7 +195,7 @@ def _lines(sample: Sample, output: Output, told: set[str]) -> None:
             facts = state if isinstance(state, dict) else state_facts(state)
             output.document("motorbus.monitor/1", {**named, **facts})
     if not output.json:
-        output.draw(_grid(sample, output, told))
+        output.draw(_grid(sample, output, columns))
 
 
 COLUMNS: Final = {
@@ -205,20 +212,28 @@ _SLOW: Final = 0.9
 _DIGITS: Final = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltage": 1, "temperature": 0}
 
 
-def _grid(sample: Sample, output: Output, told: set[str]) -> Any:
-    """A column for each thing that a device has told so far; all of them while none has told anything."""
-    answers = [state for state in sample.values() if not isinstance(state, MotorbusError)]
-    others = list(dict.fromkeys(name for one in answers if isinstance(one, dict) for name in one))
-    states = [one for one in answers if not isinstance(one, dict)]
-    told |= {name for name in COLUMNS if any(getattr(state, name) is not None for state in states)}
-    names = [name for name in COLUMNS if name in told or not (told or others)]
-    columns = [
-        ">id",
-        *(COLUMNS[name] for name in names),
-        *(name.replace("_", " ") for name in others),
-        "alarm",
-    ]
-    return output.grid(columns, [_row(node, state, names, others) for (_, node), state in sample.items()])
+class _Columns:
+    """A column for each thing that a device has told so far; `usual` while none has told anything."""
+
+    def __init__(self, usual: Sequence[str]) -> None:
+        self._usual = usual
+        self._told: dict[str, None] = {}
+
+    def of(self, sample: Sample) -> tuple[list[str], list[str]]:
+        """The names of telemetry, and what else is told, this sample included."""
+        for state in sample.values():
+            if isinstance(state, dict):
+                self._told |= dict.fromkeys(state)
+            elif not isinstance(state, MotorbusError):
+                self._told |= {name: None for name in COLUMNS if getattr(state, name) is not None}
+        shown = self._told or self._usual
+        return [name for name in COLUMNS if name in shown], [name for name in self._told if name not in COLUMNS]
+
+
+def _grid(sample: Sample, output: Output, columns: _Columns) -> Any:
+    names, others = columns.of(sample)
+    titles = [">id", *(COLUMNS[name] for name in names), *(name.replace("_", " ") for name in others), "alarm"]
+    return output.grid(titles, [_row(node, state, names, others) for (_, node), state in sample.items()])
 
 
 def _row(

@@ -5,6 +5,7 @@ Of devices that do not know where they are, by an angle from where they stand.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +18,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.plain import plain
-from motorbus.cli.target import able, device, face, offers, opened, takes, target
+from motorbus.cli.target import Target, able, device, face, offers, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -114,7 +115,7 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
     found: dict[str, Goals] = {}
     for text in texts:
         devices, _, position = text.rpartition("=")
-        bus, family, nodes = target(devices) if "#" in devices else _nowhere(text)
+        bus, family, nodes = _named(devices, text)
         _knows_where_it_is(family, text)
         goals = found.setdefault(bus, {})
         if not goals.keys().isdisjoint(nodes):
@@ -180,7 +181,14 @@ def _moved_by(
     return Exit.OK
 
 
-def _nowhere(text: str) -> Any:
+def _named(devices: str, text: str) -> Target:
+    """The devices that a goal is for. Raises RequestError when it names none, or no position."""
+    if "#" in devices:
+        return target(devices)
+    with suppress(RequestError):  # what is before the last = may be a bus that was cut within its options
+        found = target(devices)
+        if found.nodes:
+            return found
     raise RequestError(
         f"{text!r} names no device and position", expected="BUS#ID=POSITION", advice="nothing was sent"
     )

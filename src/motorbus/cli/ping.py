@@ -74,7 +74,7 @@ def ping(
 
 def _wanted(devices: tuple[str, ...], broadcast: bool) -> dict[str, tuple[int, ...]]:
     found = gathered(devices)
-    if broadcast and any(found.values()):
+    if broadcast and any("#" in text for text in devices):
         raise RequestError("a broadcast asks everyone", expected="BUS without ids", advice="nothing was sent")
     if not broadcast and not all(found.values()):
         raise RequestError("which device?", expected="BUS#ID, as feetech:/dev/ttyACM0#3")

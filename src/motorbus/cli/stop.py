@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
+from motorbus.errors import PortBusy
 
 app = App(
     name="stop",
@@ -44,4 +45,9 @@ def stop(
     options
         Any option of the bus string, as a flag.
     """
-    return each("stop", "stop", devices, options, output, dry_run=dry_run)
+    try:
+        return each("stop", "stop", devices, options, output, dry_run=dry_run)
+    except PortBusy as error:
+        # a port that a foreign program holds is out of reach for that, too
+        error.advice += "; `motorbus estop BUS` reaches it where a motorbus process holds it"
+        raise

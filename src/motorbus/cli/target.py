@@ -31,7 +31,7 @@ LOG = logging.getLogger("motorbus.cli")
 
 
 class Target(NamedTuple):
-    """A bus by its address, its family, and the nodes named on it; () when none was named."""
+    """A bus by its address, its family, and the nodes named on it; () when none was named and there may be many."""
 
     bus: str
     family: Family
@@ -39,18 +39,22 @@ class Target(NamedTuple):
 
 
 def target(text: str) -> Target:
-    """BUS or BUS#ID or BUS#1-3+7. Raises RequestError for a bad address, an unknown family or an impossible id."""
+    """BUS or BUS#ID or BUS#1-3+7. Where a line has one device only, that is named by naming the bus.
+
+    Raises RequestError for a bad address, an unknown family or an impossible id.
+    """
     from motorbus import session
 
     address = session.parse_address(text)
     family = families.load(address.family)
     for node in address.nodes:
         family.devices.blocking(None, node)  # checks its id when it is made; needs no bus for that
-    return Target(address.bus, family, address.nodes)
+    only = family.link.only
+    return Target(address.bus, family, address.nodes or (() if only is None else (only,)))
 
 
 def device(text: str) -> Target:
-    """BUS#ID with exactly one id. Raises RequestError otherwise."""
+    """BUS#ID with exactly one id, or BUS where a line has one device only. Raises RequestError otherwise."""
     found = target(text)
     if len(found.nodes) != 1:
         raise RequestError(
@@ -190,11 +194,15 @@ def everyone(name: str, bus: Bus, nodes: tuple[int, ...], output: Output) -> tup
 
 def nobody(bus: str) -> NoReply:
     """The error for a bus on which nobody answered."""
-    return NoReply(
-        f"{bus}: no device answers",
-        cause="no power, a loose cable, or devices set to another rate",
-        advice=f"`motorbus scan {bus} --{rate_word(target(bus).family)} all` looks for every id at every rate",
+    family = target(bus).family
+    cause, advice = (
+        "no power, or a loose cable",
+        "see to the power and the cable, and that this is the right port",
     )
+    if len(family.link.rates) > 1:
+        cause = "no power, a loose cable, or devices set to another rate"
+        advice = f"`motorbus scan {bus} --{rate_word(family)} all` looks for every id at every rate"
+    return NoReply(f"{bus}: no device answers", cause=cause, advice=advice)
 
 
 def rate_word(family: Family) -> str:

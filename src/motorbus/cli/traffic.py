@@ -33,7 +33,7 @@ def listen(
 
     Raises RequestError for anything but one whole CAN bus, NoReply when the time is over and nothing was heard.
     """
-    if len(buses) != 1 or target(buses[0]).nodes:
+    if len(buses) != 1 or "#" in buses[0]:
         raise RequestError("--listen hears one whole bus", expected="BUS", advice="nothing was sent")
     (bus, family, _) = target(buses[0])
     if family.link.kind != "frames":

@@ -27,6 +27,10 @@ COMMANDS: Final[Mapping[str, str]] = {
     "recover(alone=True)": "`motorbus recover BUS --alone`",
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
+PHRASES: Final[Mapping[str, str]] = {
+    "call reset() on the bus, in the process that owns it": "give the command again, for the stop has ended this one",
+}
+"""What only a program that goes on can do -> what comes to the same where the program has ended."""
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
@@ -42,6 +46,8 @@ def in_words_of_the_shell(error: BaseException, family: Family) -> None:
 
 def shell_words(text: str, family: Family) -> str:
     """A text that names methods, with commands in their place."""
+    for phrase, instead in PHRASES.items():
+        text = text.replace(phrase, instead)
     words: dict[str, str] = {**COMMANDS, **(faces.offer(family.name, "COMMANDS") or {})}
 
     def said(call: re.Match[str]) -> str:

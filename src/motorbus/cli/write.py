@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import dry, quantity, registers
+from motorbus.cli import dry, faces, quantity, registers
 from motorbus.cli.consent import consent_to, consent_to_ways, goals_among, refused_anyway
 from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
@@ -20,6 +20,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from motorbus.bus.pump import Bus
     from motorbus.cli.quantity import Typed
     from motorbus.core.entry import Entry, Value
     from motorbus.core.family import Family
@@ -28,8 +29,8 @@ app = App(
     name="write",
     usage="Usage: motorbus write BUS#ID NAME=VALUE... [OPTIONS]",
     help_epilogue="""Values are in the unit of the register, or with one of their own: 90deg, 500ms,
-2048raw. Registers kept in EEPROM need --yes (the device may go limp while they
-are written), and so does a goal more than 180 degrees away. With --raw every
+2048raw. What survives power-off needs --yes (a servo may go limp while it is
+written), and so does a goal more than 180 degrees away. With --raw every
 number is what stands on the wire; raw numbers for a register that moves the
 device need --expert too. --dry-run reads, shows each frame that would change
 something, and sends none of those.
@@ -39,7 +40,8 @@ Examples:
     motorbus write feetech:/dev/ttyACM0#3 goal_position=90deg
     motorbus write feetech:/dev/ttyACM0#3 max_temperature=65 --yes
     motorbus write feetech:/dev/ttyACM0#3 acceleration=20 --raw
-    motorbus write feetech:/dev/ttyACM0#3 torque_limit=50% --dry-run""",
+    motorbus write feetech:/dev/ttyACM0#3 torque_limit=50% --dry-run
+    motorbus write stepper:/dev/ttyUSB0 step_1_delay=500ms --yes""",
 )
 
 
@@ -76,7 +78,7 @@ def write(
     expert
         Allow raw values in registers that move the device.
     yes
-        Do not ask before writing to EEPROM, or before a way of more than 180 degrees.
+        Do not ask before writing what survives power-off, or before a way of more than 180 degrees.
     options
         Any option of the bus string, as a flag.
     """
@@ -88,16 +90,41 @@ def write(
         one = face(rehearsal if dry_run else opening, node)
         orders = _orders(one, wanted, raw)
         values = {order.entry.name: order.value for order in orders}
-        rehearse = partial(face(rehearsal, node).write, **values)
-        _permit(orders, output, rehearse, expert=expert, yes=yes or dry_run)
+        tell = _Plan(opening, output)
+        rehearse = partial(_write, face(rehearsal, node), values, tell)
+        memory = faces.offer(family.name, "KEPT") or Storage.EEPROM.value
+        _permit(orders, output, rehearse, memory=memory, expert=expert, yes=yes or dry_run)
         ways = goals_among(one, [order.entry for order in orders], values)
         consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
-        one.write(**values)
+        told = _write(one, values, tell)
     if dry_run:
         dry.show(rehearsal, output)
     else:
-        _show(one, orders, output)
+        _show(one, orders, told, output)
     return Exit.OK
+
+
+class _Plan:
+    """Prints once what is about to be written and what that takes, where the family says it; other events go on."""
+
+    def __init__(self, bus: Bus, output: Output) -> None:
+        self._planned = faces.offer(bus.family.name, "planned")
+        self._report = bus.report
+        self._output = output
+        self._said = False
+
+    def __call__(self, event: object) -> None:
+        text = self._planned(event) if self._planned is not None else ""
+        if text and not self._said:
+            self._said = True
+            self._output.text(text)
+        elif not text and self._report is not None:
+            self._report(event)
+
+
+def _write(one: Any, values: Mapping[str, Value], tell: Callable[[object], None]) -> Any:
+    """What the verb returns, None of most families."""
+    return one.bus.run(type(one).write.function(one, **values), report=tell)
 
 
 def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, str]:
@@ -152,8 +179,15 @@ def _beyond(refusal: RequestError, node: int) -> LimitExceeded:
 
 
 def _permit(
-    orders: Sequence[Order], output: Output, rehearse: Callable[[], object], *, expert: bool, yes: bool
+    orders: Sequence[Order],
+    output: Output,
+    rehearse: Callable[[], object],
+    *,
+    memory: str,
+    expert: bool,
+    yes: bool,
 ) -> None:
+    """`memory` is what the family calls the place of what survives power-off."""
     moving = [order.entry.name for order in orders if order.raw and order.entry.effect is Effect.MOTION]
     if moving and not expert:
         refused_anyway(rehearse)
@@ -163,13 +197,17 @@ def _permit(
         )
     kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
     if kept:
-        what = f"write {', '.join(kept)} to EEPROM, where it survives power-off"
+        what = f"write {', '.join(kept)} to {memory}, where it survives power-off"
         consent_to(what, output, yes=yes, rehearse=rehearse)
 
 
-def _show(one: Any, orders: Sequence[Order], output: Output) -> None:
+def _show(one: Any, orders: Sequence[Order], told: Any, output: Output) -> None:
     rows = registers.facts(
         one, [order.entry for order in orders], {order.entry.name: order.value for order in orders}
     )
-    output.document("motorbus.write/1", {"id": one.node, "registers": rows})
+    written = faces.offer(one.bus.family.name, "written")
+    facts = {} if written is None else {"result": written(told)}
+    output.document("motorbus.write/1", {"id": one.node, "registers": rows, **facts})
     registers.show(f"Written to #{one.node}", rows, output)
+    if facts:
+        output.text(str(told))

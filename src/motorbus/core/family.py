@@ -38,6 +38,7 @@ class LinkNeeds(NamedTuple):
     `options`   of its simulator: what `sim,name=value` takes
     `settings`  of a bus, simulated or not: what `Family.configured` takes
     `window`    how many lanes may be in flight at once
+    `only`      the id of the only device that a line of this family can have; None: there may be many
     """
 
     kind: str
@@ -46,6 +47,7 @@ class LinkNeeds(NamedTuple):
     options: tuple[Option, ...] = ()
     settings: tuple[Option, ...] = ()
     window: int = 1
+    only: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 import motorbus
+from motorbus.cli import monitor
+from motorbus.core.operation import Operation
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 
@@ -91,17 +93,48 @@ def test_looking_sends_nothing_but_read_project(command: str, run: Run, line: Li
     assert {data[2] for data in line.heard} == {0x3E}
 
 
-@pytest.mark.parametrize("command", ["stop BUS", "monitor BUS --count 1"])
-def test_whoever_names_no_controller_is_told_what_is_sent_to_find_it(
-    command: str, run: Run, line: Line
-) -> None:
+@pytest.mark.parametrize(
+    "command",
+    [
+        "stop BUS",
+        "estop BUS",
+        "monitor BUS --count 1",
+        "info BUS",
+        "ping BUS",
+        "read BUS step_1_speed",
+        "write BUS step_1_delay=500ms --yes",
+        "move BUS+=90deg --yes",
+        "move BUS-=90deg --yes",
+        "jog BUS=60rpm --seconds 0.3",
+    ],
+)
+def test_nobody_looks_for_the_only_controller_of_a_line(command: str, run: Run, line: Line) -> None:
     ran = run(*command.replace("BUS", line.url).split())
-    assert (ran.code, ran.err.count(READ_1)) == (0, 1)
+    assert (ran.code, ran.err.count(READ_1)) == (0, 0), ran.err
+
+
+def test_a_stop_leaves_at_once(run: Run, line: Line) -> None:
+    assert run("stop", line.url).code == 0
+    assert line.commands() == ["read_project", "stop_project", "stop_motor"], "the first asks whether it echoes"
+
+
+def test_where_it_cannot_go_is_told_without_its_number_too(run: Run, line: Line) -> None:
+    ran = run("move", "stepper:COM7=90deg")
+    assert (ran.code, "by an angle from where it stands" in ran.err) == (2, True)
+    assert "have no broadcast ping" in run("ping", line.url, "--broadcast").err
 
 
 def test_ports_are_listed_and_not_asked(run: Run, line: Line) -> None:
     assert run("ports").code == 0
     assert line.heard == []
+
+
+def test_on_a_silent_line_of_one_rate_no_other_rate_is_advised(run: Run, line: Line) -> None:
+    line.simulation[1].unplug()
+    ran = run("scan", line.url)
+    assert ran.code == 5
+    assert "--baud" not in ran.err
+    assert "the right port" in ran.err
 
 
 def test_an_input_is_watched_at_the_rate_that_the_line_allows(run: Run) -> None:
@@ -120,6 +153,30 @@ def test_its_inputs_are_its_telemetry(run: Run, line: Line) -> None:
     head, row = run("monitor", f"{line.url}#1", "--count", "1").out.splitlines()[1:]
     assert head.split("  ")[-2:] == ["input 5", "alarm"]
     assert row.split() == ["1", "yes"]
+
+
+def test_a_silent_controller_has_no_columns_that_it_never_has(run: Run, line: Line) -> None:
+    line.simulation[1].unplug()
+    ran = run("monitor", line.url, "--count", "1")
+    assert ran.code == 5
+    head, row = ran.out.splitlines()[1:]
+    assert head.split() == ["id", "alarm"]
+    assert row.startswith(" 1  node 1 did not answer")
+
+
+def test_a_controller_that_falls_silent_keeps_its_columns(
+    run: Run, line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pause = monitor._pause
+
+    def unplugged(seconds: float) -> Operation[None]:
+        line.simulation[1].unplug()
+        return pause(seconds)
+
+    monkeypatch.setattr(monitor, "_pause", unplugged)
+    lines = run("monitor", line.url, "--count", "2").out.splitlines()
+    assert [one.count("input 5") for one in lines if one.startswith("id")] == [1, 1]
+    assert "did not answer" in lines[-1]
 
 
 def test_a_dump_is_explained_by_the_names_it_is_read_by(run: Run) -> None:

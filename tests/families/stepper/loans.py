@@ -44,11 +44,15 @@ class Cut(NamedTuple):
 
 
 class Doomed(MemoryLink):
-    """A link whose host dies as the cut says; `count` is how many requests there were."""
+    """A link whose host dies as the cut says; `count` is how many requests there were.
 
-    def __init__(self, cut: Cut | None, simulator: Any, **more: Any) -> None:
+    At each of the moments in `interrupts` (s) its user presses Ctrl-C.
+    """
+
+    def __init__(self, cut: Cut | None, simulator: Any, interrupts: list[float], **more: Any) -> None:
         super().__init__(simulator, rate=9600, **more)
         self.cut = cut
+        self.interrupts = interrupts
         self.count = 0
         self.dead = False
 
@@ -65,7 +69,10 @@ class Doomed(MemoryLink):
 
     def read(self, until: float) -> list[Data]:
         self.alive()
-        return super().read(until)
+        if self.interrupts and self.now() >= self.interrupts[0]:
+            self.interrupts.pop(0)
+            raise KeyboardInterrupt
+        return super().read(min([until, *self.interrupts[:1]]))
 
     def alive(self) -> None:
         """Raise LinkLost when it is not."""
@@ -84,6 +91,7 @@ class Line1:
         self.line: Line | None = None
         self.settings: dict[str, Any] = {}
         self.pace = False
+        self.interrupts: list[float] = []
         self.sent: list[str] = []
         self.count = 0
         self.react: Callable[[object, Bus], None] = lambda event, bus: None
@@ -98,7 +106,7 @@ class Line1:
 
     def run(self, work: Callable[[Controller], T], cut: Cut | None = None) -> T | MotorbusError:
         """A host does this until it dies; its value, or the error that it ended with."""
-        link = Doomed(cut, self.simulator, start=self.now, line=self.line, pace=self.pace)
+        link = Doomed(cut, self.simulator, self.interrupts, start=self.now, line=self.line, pace=self.pace)
 
         def record(event: object) -> None:
             link.alive()

@@ -13,7 +13,9 @@ from motorbus.core.operation import INTENT, OUTCOME, Journal, Operation, Pause, 
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import jog, stop
-from motorbus.families.stepper.driver.borrowing import NOTE
+from motorbus.families.stepper.driver.borrowing import LOST, NOTE
+from motorbus.families.stepper.driver.stopping import MAY_TURN
+from motorbus.families.stepper.execution import Phase
 from tests.families.stepper.loans import MINE, Line1
 from tests.families.stepper.test_driver_stopping import MOTOR, PROJECT, Losing
 
@@ -55,7 +57,7 @@ def test_it_reads_edits_reads_moves_stops_and_brings_back() -> None:
     edits = [SELECT, "FF AA 03 02", "FF AA 03 03", "FF AA 03 04", "FF AA 03 05"]
     move = sent.index(MOVE)
     assert sent[:move] == [READ, READ, *edits, READ]
-    assert line.sent[move + 1 : move + 3] == [PROJECT, MOTOR]
+    assert line.sent[move + 1 : move + 3] == [MOTOR, PROJECT]
     assert [one for one in sent[move + 3 :] if one != READ] == edits
     assert sent[-1] == READ
     assert line.as_before
@@ -90,18 +92,69 @@ def test_what_was_edited_and_not_saved_comes_back_too() -> None:
         assert line.journal.unfinished() is None
 
 
-def test_after_a_power_cycle_nothing_need_be_written() -> None:
-    line = Line1()
+@pytest.mark.parametrize("cleared", [False, True])
+def test_a_power_cycle_meanwhile_is_told_and_nothing_need_be_written(cleared: bool) -> None:
+    line = Line1(None, shipped="empty") if cleared else Line1()
+    line.simulated.put(2, replace(MINE, number=2))
 
     def cycle(event: object, bus: object) -> None:
         if isinstance(event, Progress) and event.what.startswith("moving"):
             line.simulated.power_cycle()
 
     line.react = cycle
-    line.run(turned)
+    told = line.run(turned)
+    assert (
+        failed(told, OutcomeUnknown, "lost its supply meanwhile: where the motor stands is not known") == []
+    )
     sent = starts(line.sent)
     assert set(sent[sent.index(MOVE) + 3 :]) == {READ}
-    assert line.as_before
+    assert (line.as_before, line.journal.unfinished()) == (True, None)
+
+
+def test_a_power_cycle_is_told_beside_a_stop_too() -> None:
+    line = Line1()
+    line.interrupts = [1.0]
+
+    def cycle(event: object, bus: object) -> None:
+        if isinstance(event, Progress) and event.what.startswith("moving"):
+            line.simulated.power_cycle()
+
+    line.react = cycle
+    with pytest.raises(KeyboardInterrupt) as caught:
+        line.run(lambda device: device.jog(tau, 30.0))
+    assert caught.value.__notes__ == [LOST]
+
+
+def test_what_slows_down_has_its_time_before_anything_is_edited() -> None:
+    """10 ms for each 5 Hz, from 4800 Hz down to 60 Hz: a stop that is slow takes its time."""
+    line = Line1(MINE.with_step(1, acceleration=5), ramp_tick_ms=10.0)
+    phases: list[Phase] = []
+
+    def look(event: object, bus: object) -> None:
+        if isinstance(event, Progress) and event.what == "writing project 1":
+            phases.append(line.simulated.state.phase)
+
+    def both(device: Controller) -> object:
+        return device.bus.run(iter(Together([jog(device, 3 * tau, 50.0), _stopped(device, 15.0)])))
+
+    line.react = look
+    failed(line.run(both), Interrupted)
+    assert set(phases) == {Phase.IDLE}
+    assert (line.as_before, line.journal.unfinished()) == (True, None)
+
+
+def test_a_stop_after_which_nothing_can_be_read_is_not_believed() -> None:
+    """Also where project 1 has to be given back: one note more says so."""
+    line = Line1()
+    line.line = deaf = Losing("FF AA 3E", 0)
+
+    def lose(event: object, bus: object) -> None:
+        if isinstance(event, Progress) and event.what.startswith("moving"):
+            deaf.times = 1_000_000
+
+    line.react = lose
+    notes = failed(line.run(turned), MotorbusError)
+    assert notes[-2:] == [f"the stop was accepted, and nothing came since: {MAY_TURN}", NOTE]
 
 
 def test_what_project_1_has_already_is_not_borrowed() -> None:
@@ -129,15 +182,6 @@ def test_other_readings_of_the_controller_do_no_harm(options: dict[str, Any]) ->
     line = Line1(replace(MINE, stop_mode=1), **options)
     line.run(lambda device: device.jog(tau, 0.5))
     assert (line.simulated.position, line.as_before, line.journal.unfinished()) == (800, True, None)
-
-
-def test_an_expert_may_move_without_that() -> None:
-    line = Line1(read_view="stored")
-    working = line.simulated.store.working
-    line.run(lambda device: device.jog(tau, 0.5, expert=True))
-    assert line.simulated.position == 800
-    assert line.simulated.store.working == working
-    assert line.journal.unfinished() is None
 
 
 def test_a_cleared_project_1_is_cleared_again() -> None:
@@ -187,7 +231,7 @@ def test_a_lost_acknowledgement_of_the_order_means_stop() -> None:
     line.line = Losing("FF AA 03 0C", 1)
     failed(line.run(turned), OutcomeUnknown)
     assert (line.as_before, line.at_rest, line.journal.unfinished()) == (True, True, None)
-    assert line.sent[(move := starts(line.sent).index(MOVE)) + 1 : move + 3] == [PROJECT, MOTOR]
+    assert line.sent[(move := starts(line.sent).index(MOVE)) + 1 : move + 3] == [MOTOR, PROJECT]
 
 
 @pytest.mark.parametrize("lost", ["FF AA 5E", "FF AA 03 0D"])
@@ -245,17 +289,19 @@ def test_two_borrows_come_one_after_the_other() -> None:
     assert line.as_before
 
 
+def _stopped(device: Controller, moment: float) -> Operation[object]:
+    yield from Pause(moment)
+    return (yield from stop(device))
+
+
 @pytest.mark.parametrize("moment", [0.001, 0.01, 0.4])
 def test_a_stop_of_somebody_else_ends_it(moment: float) -> None:
     """While it is being edited the order does not leave any more; while it moves the wait is over."""
     line = Line1()
 
-    def stopped(device: Controller) -> Operation[object]:
-        yield from Pause(moment)
-        return (yield from stop(device))
-
     def both(device: Controller) -> object:
-        return device.bus.run(iter(Together([jog(device, tau, 50.0), stopped(Controller(device.bus))])))
+        other = Controller(device.bus)
+        return device.bus.run(iter(Together([jog(device, tau, 50.0), _stopped(other, moment)])))
 
     failed(line.run(both), Interrupted, "the motion was stopped")
     assert (MOVE in starts(line.sent)) == (moment == 0.4)

@@ -58,7 +58,7 @@ def test_one_field_takes_the_selection_and_one_command_and_one_dump() -> None:
 def test_nothing_that_differs_is_nothing_sent() -> None:
     with bench() as there:
         after = decode_image(image(there, 1))
-        assert bring(there, after) == (image(there, 1), "untold", 0, 0)
+        assert bring(there, after) == Readback(image(there, 1), "untold", 0, 0)
         assert [frame[:8] for frame in there.sent()] == ["FF AA 3E"] * 2
 
 

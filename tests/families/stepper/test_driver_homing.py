@@ -14,7 +14,7 @@ from motorbus.families.stepper.driver import Homed
 from motorbus.families.stepper.driver.stopping import MAY_TURN
 from tests.families.stepper.loans import MINE, Line1
 from tests.families.stepper.test_driver_borrowing import SELECT, failed, starts
-from tests.families.stepper.test_driver_stopping import MOTOR, PROJECT, Losing
+from tests.families.stepper.test_driver_stopping import Losing, is_stopped_last
 
 HOME = "FF AA 03 0F"
 WIRED: dict[str, Any] = {"home_switch": "wired", "home_at": -3000}
@@ -31,7 +31,7 @@ def test_it_turns_until_the_switch_and_is_told_to_stop() -> None:
     assert told.velocity == pytest.approx(90 * tau / 60)
     assert told.seconds == pytest.approx(3000 / 2400, abs=0.15)
     assert "input 5 was active after 1." in str(told)
-    assert line.sent[-2:] == [PROJECT, MOTOR]
+    assert is_stopped_last(line.sent)
     assert SELECT not in starts(line.sent)
     assert (line.at_rest, line.simulated.travel.position(line.simulated.state, line.now)) == (True, -3000)
     assert [one.what for one in line.events if isinstance(one, Progress)] == ["homing"] * 5
@@ -83,7 +83,7 @@ def test_a_lost_acknowledgement_means_stop() -> None:
     line = Line1(**WIRED)
     line.line = Losing(HOME, 1)
     failed(line.run(homed), OutcomeUnknown)
-    assert line.sent[-2:] == [PROJECT, MOTOR]
+    assert is_stopped_last(line.sent)
     line.later(1.0)
     assert line.at_rest
 
@@ -98,7 +98,7 @@ def test_an_input_that_cannot_be_read_means_stop() -> None:
 
     line.react = lose  # from the first report of progress on, 0.25 s after it began to turn
     assert isinstance(line.run(homed), MotorbusError)
-    assert line.sent[-2:] == [PROJECT, MOTOR]
+    assert is_stopped_last(line.sent)
     line.later(1.0)
     assert (line.at_rest, line.now < 5.0) == (True, True)
 

@@ -9,13 +9,15 @@ from typing import Any
 
 import pytest
 
-from motorbus.errors import Interrupted, RequestError
-from motorbus.families.stepper.driver import Moved
+from motorbus.core.operation import Pause
+from motorbus.errors import Interrupted, OutcomeUnknown, RequestError
+from motorbus.families.stepper import Controller
+from motorbus.families.stepper.driver import Moved, Outcome, Ran
 from motorbus.families.stepper.driver.jogging import paced, shaped, whole_rpm
 from motorbus.families.stepper.table import Project
 from tests.families.stepper.loans import MINE, Line1
 from tests.families.stepper.test_driver_borrowing import MOVE, SELECT, failed, starts
-from tests.families.stepper.test_driver_stopping import MOTOR, PROJECT
+from tests.families.stepper.test_driver_stopping import Losing, is_stopped_last
 
 
 def test_a_jog_is_one_move_of_velocity_times_seconds() -> None:
@@ -51,12 +53,33 @@ def test_an_acceleration_is_sent_as_the_controller_has_it() -> None:
     line = Line1()
     line.run(lambda device: device.move_by(tau, velocity=tau, acceleration=77))
     assert any(one.startswith("FF AA 03 05 4D 00 3C 00 00 01") for one in line.sent)
-    failed(
-        line.run(lambda device: device.move_by(tau, velocity=tau, acceleration=70_000)),
-        RequestError,
-        "acceleration",
-    )
-    assert SELECT not in starts(line.sent)
+
+
+@pytest.mark.parametrize("acceleration", [-1, 65_536, 1.5, 30.0, True, "30", 10**400])
+def test_an_acceleration_that_no_frame_holds_is_refused_before_anything_is_sent(acceleration: Any) -> None:
+    line = Line1()
+    for work in (
+        lambda device: device.move_by(tau, velocity=tau, acceleration=acceleration),
+        lambda device: device.jog(tau, 1.0, acceleration=acceleration),
+    ):
+        failed(line.run(work), RequestError, "acceleration: ")
+        assert (line.sent, line.journal.unfinished()) == ([], None)
+
+
+@pytest.mark.parametrize("much", [1e9, 1e306, 1e308, 10**300, 10**400])
+def test_what_is_too_much_for_any_number_is_refused(much: Any) -> None:
+    for work in (
+        lambda device: device.move_by(much),
+        lambda device: device.move_by(-much),
+        lambda device: device.move_by(tau, velocity=much),
+        lambda device: device.jog(-much, 60.0),
+        lambda device: device.jog_forward(much),
+        lambda device: device.home(deadline=much),
+        lambda device: device.home(velocity=much),
+    ):
+        line = Line1()
+        failed(line.run(work), RequestError)
+        assert {one[:8] for one in line.sent} <= {"FF AA 3E"}
 
 
 @pytest.mark.parametrize(
@@ -141,7 +164,7 @@ def test_run_once_makes_the_move_of_project_1() -> None:
     assert isinstance(told, Moved)
     assert line.simulated.position == -28
     assert told.angle == pytest.approx(-7 / 400 * tau)
-    assert (SELECT in starts(line.sent), line.sent[-2:]) == (False, [PROJECT, MOTOR])
+    assert (SELECT in starts(line.sent), is_stopped_last(line.sent)) == (False, True)
 
 
 @pytest.mark.parametrize(("verb", "sign"), [("jog_forward", 1), ("jog_reverse", -1)])
@@ -152,7 +175,7 @@ def test_the_endless_jog_is_bounded_by_this_host(verb: str, sign: int) -> None:
     assert line.simulated.position * sign > 2000
     assert told.angle == pytest.approx(line.simulated.position * tau / 1600, abs=0.6)
     line.later(1.0)
-    assert (line.at_rest, line.sent[-2:]) == (True, [PROJECT, MOTOR])
+    assert (line.at_rest, is_stopped_last(line.sent)) == (True, True)
     failed(
         Line1(None, shipped="empty").run(lambda device: getattr(device, verb)(1.0)),
         RequestError,
@@ -171,6 +194,64 @@ def test_without_waiting_it_goes_on_where_nothing_was_borrowed() -> None:
     line = Line1()
     failed(line.run(lambda device: device.move_by(tau, velocity=tau, wait=False)), RequestError, "wait=False")
     assert SELECT not in starts(line.sent)
+
+
+LEFT = replace(MINE, turn_distance=1600).with_step(1, direction=0, distance=16000, speed=60)
+"""A project 1 of which ten turns at 60 RPM need not borrow anything."""
+
+
+def leave(device: Controller) -> Moved:
+    return device.move_by(10 * tau, velocity=tau, wait=False)
+
+
+def test_what_was_left_to_itself_is_not_forgotten() -> None:
+    """It takes ten seconds and more: nothing else begins meanwhile, but a stop."""
+    for second in (
+        leave,
+        lambda device: device.jog(-tau, 1.0),
+        lambda device: device.home(),
+        lambda device: device.jog_reverse(1.0),
+        lambda device: device.run(1),
+        lambda device: device.start_project(1),
+        lambda device: device.characterise(),
+    ):
+        line = Line1(LEFT)
+        failed(
+            line.run(lambda device, then=second: (leave(device), then(device))),
+            RequestError,
+            "a move may not be",
+        )
+        assert len(line.sent) == 3
+        line.later()
+        assert line.simulated.position == 16000
+
+
+def test_what_was_left_is_over_with_its_time_or_with_a_stop() -> None:
+    line = Line1(LEFT)
+
+    def waits(device: Controller) -> Moved:
+        told = leave(device)
+        device.bus.run(iter(Pause(told.seconds)))
+        return device.jog(-tau, 1.0)
+
+    assert isinstance(line.run(waits), Moved)
+    assert line.simulated.position == 16000 - 1600
+    line = Line1(LEFT)
+    assert isinstance(line.run(lambda device: (leave(device), device.stop(), device.jog(-tau, 1.0))), tuple)
+
+
+def test_one_that_is_to_be_left_is_stopped_where_it_was_not_acknowledged() -> None:
+    line = Line1(LEFT)
+    line.line = Losing(MOVE, 1)
+    failed(line.run(leave), OutcomeUnknown)
+    assert (is_stopped_last(line.sent), line.at_rest) == (True, True)
+
+
+def test_run_can_stop_what_was_left() -> None:
+    line = Line1(LEFT)
+    told = line.run(lambda device: (leave(device), device.run(1, stop_first=True))[1])
+    assert isinstance(told, Ran)
+    assert told.outcome is Outcome.COMPLETED
 
 
 @pytest.mark.parametrize("seconds", [0, -1, 60.1, float("inf"), float("nan"), True, None, "1"])

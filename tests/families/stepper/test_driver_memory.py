@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from motorbus.families.stepper.driver.memory import Memory, ports_of
 
 
 def test_in_the_beginning_nothing_is_known() -> None:
     memory = Memory()
-    assert (memory.stops, memory.owed, memory.proven) == (0, False, False)
+    assert (memory.stops, memory.wanted, memory.owed, memory.turning) == (0, 0, False, -inf)
     assert memory.outputs == {1: None, 2: None, 3: None, 5: None}
 
 

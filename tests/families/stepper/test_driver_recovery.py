@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import tau
 from typing import Any
 
 import pytest
 
-from motorbus.core.operation import REACHED
+from motorbus.core.operation import REACHED, Progress
 from motorbus.errors import OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
+from motorbus.families.stepper.execution import Phase
 from tests.families.stepper.loans import MINE, Cut, Line1
 from tests.families.stepper.test_borrow_cuts import jogged, wrecked
 from tests.families.stepper.test_driver_borrowing import SELECT, failed, starts
@@ -32,7 +35,7 @@ def facts_of(line: Line1) -> dict[str, Any]:
 def test_it_stops_first_and_writes_only_what_differs(line: Line1) -> None:
     assert line.run(line.recovery) == "old"
     sent = line.sent
-    assert sent[:2] == [PROJECT, MOTOR]
+    assert sent[:2] == [MOTOR, PROJECT]
     assert [one for one in starts(sent) if one in (SELECT, "FF AA 03 02")] == [SELECT, "FF AA 03 02"]
     assert (line.as_before, line.journal.unfinished()) == (True, None)
 
@@ -75,6 +78,13 @@ def test_alone_makes_no_difference(line: Line1) -> None:
         {"image": "xx"},
         {"order": "middle"},
         {"wanted": None},
+        {"wanted": {"step_1_speed": 1.5}},
+        {"wanted": {"step_1_speed": True}},
+        {"wanted": {"step_1_speed": "90"}},
+        {"wanted": {"step_1_acceleration": -5}},
+        {"wanted": {"step_1_acceleration": 10**9}},
+        {"wanted": [1]},
+        {"reached": 7},
         {"wanted": {"speed": 1}},
         {"wanted": {"step_11_speed": 1}},
         {"wanted": {"step_0_speed": 1}},
@@ -83,6 +93,7 @@ def test_alone_makes_no_difference(line: Line1) -> None:
 )
 def test_facts_of_something_else_are_refused(line: Line1, changes: dict[str, Any]) -> None:
     facts = {**facts_of(line), **changes}
+    line.journal.forget()
     failed(line.run(lambda device: device.recover("jog", facts)), RequestError)
     assert line.sent == []
 
@@ -121,3 +132,67 @@ def test_there_is_nothing_to_do_twice(line: Line1) -> None:
 
     assert line.run(twice) == ("old", "old")
     assert line.as_before
+
+
+def test_another_motor_is_refused_for_nothing_would_stop_this_one() -> None:
+    line = Line1(motor=5)
+    line.settings = {"motor": 5}
+    line.run(jogged, MOVING)
+    line.settings = {}
+    failed(line.run(line.recovery), RequestError, "motor=5")
+    assert line.sent == []
+    line.settings = {"motor": 5}
+    line.later()
+    assert line.run(line.recovery) == "old"
+    assert line.as_before
+
+
+WORK = replace(MINE, project_loop=5).with_step(2, delay=999).with_step(1, distance=123)
+
+
+@pytest.mark.parametrize("saved", [False, True])
+def test_what_somebody_has_written_since_is_not_overwritten(line: Line1, saved: bool) -> None:
+    if saved:
+        line.simulated.power_cycle()
+    line.simulated.put(1, WORK)
+    image = line.simulated.store.image(1)
+    told = line.run(line.recovery)
+    failed(
+        told,
+        RequestError,
+        "somebody has written project 1 since it was borrowed: project_loop, step_1_distance, ",
+    )
+    assert {one[:8] for one in line.sent} == {"FF AA 03", "FF AA 5E", "FF AA 3E"}
+    assert line.simulated.store.image(1) == image
+    assert line.journal.unfinished() is not None
+
+
+@pytest.mark.parametrize("edits", [1, 2, 3, 4, 5, 30])
+def test_another_project_under_this_number_is_this_borrow_s_own_work(edits: int) -> None:
+    """Selecting has left the numbers of project 2 in place, and the host died before it has written all of its own."""
+    line = Line1(select="relabel", selected_at_boot=2)
+    other = replace(WORK, number=2, turn_distance=77)
+    line.simulated.put(2, other)
+    stored = dict(line.simulated.store.stored)
+    line.run(jogged, Cut(2 + edits))
+    if edits > 1:
+        assert line.simulated.store.image(1)[: len(line.before)] != line.before
+    assert line.run(line.recovery) == "old"
+    assert line.as_before
+    assert line.simulated.store.stored == stored
+
+
+def test_what_turns_still_when_the_next_host_comes_has_its_time_to_slow_down() -> None:
+    line = Line1(MINE.with_step(1, acceleration=5), ramp_tick_ms=10.0)
+    line.run(lambda device: device.jog(3 * tau, 50.0), Cut(8, sent=True))
+    line.later(15.0)
+    assert not line.at_rest
+    phases: list[Phase] = []
+
+    def look(event: object, bus: object) -> None:
+        if isinstance(event, Progress) and event.what == "writing project 1":
+            phases.append(line.simulated.state.phase)
+
+    line.react = look
+    assert line.run(line.recovery) == "old"
+    assert set(phases) == {Phase.IDLE}

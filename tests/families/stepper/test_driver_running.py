@@ -119,12 +119,12 @@ def test_a_project_that_there_is_not_is_refused(project: Any) -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"timeout": 0}, "no time to wait for"),
-        ({"timeout": -3.0}, "no time to wait for"),
-        ({"timeout": float("nan")}, "no time to wait for"),
-        ({"timeout": float("inf")}, "no time to wait for"),
-        ({"timeout": "10"}, "no time to wait for"),
-        ({"timeout": True}, "no time to wait for"),
+        ({"timeout": 0}, "timeout: "),
+        ({"timeout": -3.0}, "timeout: "),
+        ({"timeout": float("nan")}, "timeout: "),
+        ({"timeout": float("inf")}, "timeout: "),
+        ({"timeout": "10"}, "timeout: "),
+        ({"timeout": True}, "timeout: "),
         ({"watch": (0,)}, "there is no input 0"),
         ({"watch": (6,)}, "there is no input 6"),
         ({"watch": ("4",)}, "there is no input '4'"),

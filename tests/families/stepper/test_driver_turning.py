@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import inf
+from dataclasses import replace
+from math import inf, nan
 from random import Random
 
 import pytest
@@ -18,10 +19,13 @@ from motorbus.families.stepper.driver.turning import (
     finite,
     longest,
     refuse_unless_idle,
+    slowing,
     waited,
     within,
 )
 from motorbus.families.stepper.simulator.memory import EXAMPLE
+from motorbus.families.stepper.table import Project
+from tests.families.stepper.loans import MINE
 
 
 def test_the_slowest_reading_counts() -> None:
@@ -31,9 +35,10 @@ def test_the_slowest_reading_counts() -> None:
 
 
 def test_a_stop_before_it_begins_lets_nothing_leave() -> None:
+    """From its first word on: whether it is accepted is another matter."""
     node = Node()
     watch = Watch(node)
-    node.memory.stops += 1
+    node.memory.wanted += 1
     assert isinstance(watch.refusal(lambda asked: 0), Interrupted)
 
 
@@ -41,8 +46,16 @@ def test_a_stop_that_only_ended_another_motion_is_none() -> None:
     node = Node()
     watch = Watch(node)
     node.memory.stops += 1
-    node.memory.ends += 1
     assert watch.refusal(lambda asked: 3) is None
+
+
+def test_a_stop_that_has_not_left_yet_ends_it_as_well() -> None:
+    node = Node()
+    watch = Watch(node)
+    assert watch.refusal(lambda asked: 3) is None
+    node.memory.wanted += 1
+    with pytest.raises(Interrupted, match="by somebody else"):
+        watch.check()
 
 
 def test_a_stop_meanwhile_ends_it() -> None:
@@ -56,20 +69,33 @@ def test_a_stop_meanwhile_ends_it() -> None:
         watch.check()
 
 
-def test_a_project_that_may_run_refuses() -> None:
+def test_what_may_turn_refuses_until_its_time_is_over() -> None:
     node = Node()
-    refuse_unless_idle(node, "jog")
+    looks(refuse_unless_idle(node, "jog()"), 5.0)
+    node.memory.turning = 5.1
+    with pytest.raises(RequestError, match="a move may not be over, so jog\\(\\) is refused"):
+        looks(refuse_unless_idle(node, "jog()"), 5.0)
+    looks(refuse_unless_idle(node, "jog()"), 5.1)
     node.memory.owed = True
-    with pytest.raises(RequestError, match="so jog\\(\\) is refused"):
-        refuse_unless_idle(node, "jog")
+    with pytest.raises(RequestError, match="may still run, so jog\\(\\) is refused"):
+        looks(refuse_unless_idle(node, "jog()"), 1e6)
+
+
+def test_the_slowest_reading_counts_for_slowing_down_too() -> None:
+    """From 2400 Hz to 60 Hz by 40 Hz every 10 ms, and in step 2 from 3200 Hz to 50 Hz by 30 Hz."""
+    assert slowing(MINE) == pytest.approx(1.05, abs=0.01)
+    assert slowing(replace(MINE, total_steps=1)) == pytest.approx(0.585, abs=0.01)
+    assert slowing(replace(MINE, stop_mode=1)) == 0.0
+    assert slowing(Project()) == 0.0
 
 
 def test_numbers_are_numbers() -> None:
     assert (within(2, 60, "time"), finite(-3.5, "angle")) == (2, -3.5)
     with pytest.raises(RequestError, match="time: 61 s"):
         within(61, 60, "time")
-    with pytest.raises(RequestError, match="angle: inf"):
-        finite(inf, "angle")
+    for bad in (inf, -inf, nan, 10**400, "1", None, True):
+        with pytest.raises(RequestError, match="angle: "):
+            finite(bad, "angle")  # type: ignore[arg-type]
 
 
 def looks(operation: Operation[None], now: float) -> int:

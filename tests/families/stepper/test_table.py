@@ -305,3 +305,10 @@ def test_what_must_not_be_said_twice() -> None:
 def test_the_commands_that_set_parameters() -> None:
     assert len(table.EDITS) == 15
     assert all(wire.COMMANDS[name].places for name in table.EDITS)
+
+
+@pytest.mark.parametrize("number", [0, 5, -1, True, 1.0, "1", None])
+def test_a_number_of_no_project_is_refused(number: object) -> None:
+    assert [table.checked_project(one) for one in range(1, 5)] == [1, 2, 3, 4]
+    with pytest.raises(RequestError, match="there is no project"):
+        table.checked_project(number)

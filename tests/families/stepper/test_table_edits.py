@@ -9,7 +9,7 @@ from hypothesis import given
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
-from motorbus.families.stepper.table import Edit, Project, edited, edits, edits_between
+from motorbus.families.stepper.table import Edit, Project, amended, edited, edits, edits_between
 from tests.families.stepper.program.projects import projects
 from tests.families.stepper.vectors import DUMP_B
 
@@ -76,3 +76,14 @@ def test_a_step_that_has_no_row_changes_nothing() -> None:
     for step in (0, 11):
         assert edited(B, "set_step_delay", {"delay": 5, "step": step}) == B
     assert edited(B, "set_step_delay", {"delay": 5, "step": 10}).step(10).delay == 5
+
+
+def test_numbers_are_changed_by_the_names_of_the_table() -> None:
+    found = amended(B, {"step_10_start_frequency": 77, "turn_distance": 5})
+    assert found == replace(B, turn_distance=5).with_step(10, start_frequency=77)
+
+
+@pytest.mark.parametrize("name", ["step_0_delay", "step_11_delay", "step_1_colour", "delay", "", "steps"])
+def test_a_name_that_is_none_changes_nothing(name: str) -> None:
+    with pytest.raises(KeyError):
+        amended(B, {name: 1})

@@ -78,7 +78,7 @@ def test_an_interruption_between_commands_says_how_far_it_came() -> None:
 
 
 def test_what_is_saved_by_itself_is_told_too() -> None:
-    for at in range(30):
+    for at in range(200):
         with bench() as there:
             there.device.write_project(program(PICK), save=False)
             interruption = cut(there, save(there.device, 2), at, before=False)

@@ -21,12 +21,13 @@ from motorbus.cli.stepper import (
 )
 from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import app
-from motorbus.cli.stepper.offers import COMMANDS, sample
+from motorbus.cli.stepper.offers import COMMANDS, KEPT, planned, sample, written
 from motorbus.cli.stepper.rehearsal import as_written
 from motorbus.cli.stepper.showing import demo
 
 __all__ = [
     "COMMANDS",
+    "KEPT",
     "app",
     "as_written",
     "characterise",
@@ -36,6 +37,7 @@ __all__ = [
     "inputs",
     "manual",
     "moves",
+    "planned",
     "programs",
     "projects",
     "runs",
@@ -43,4 +45,5 @@ __all__ = [
     "say",
     "show",
     "writing",
+    "written",
 ]

@@ -14,17 +14,18 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.core.operation import Progress
+from motorbus.core.operation import Alone, Progress
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
+from motorbus.families.stepper.driver.editing import refuse_while_lent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
-    from motorbus.core.operation import Runnable
+    from motorbus.core.operation import Operation, Runnable
 
 T = TypeVar("T")
 
@@ -52,6 +53,19 @@ def verb(name: str, *args: Any, **values: Any) -> Callable[[Controller], Runnabl
     """A verb of the controller with what it gets, to be carried out on one."""
     function = getattr(Controller, name).function
     return lambda one: function(one, *args, **values)
+
+
+def unless_lent(one: Node, name: str, orders: Runnable[None]) -> Operation[None]:
+    """Carry these out, with nobody else on the bus; RequestError while a motion that was cut off has borrowed anything.
+
+    For the commands that are one frame: their verbs do not ask, for a motion sends them itself.
+    """
+
+    def both() -> Operation[None]:
+        yield from refuse_while_lent(one, name)
+        yield from orders
+
+    return (yield from Alone(both()))
 
 
 def carried_out(

@@ -112,6 +112,12 @@ def reading(said: dict[str, str], command: str) -> Behaviour:
     return replace(how_of(Path(profile)), **settled) if profile else told
 
 
+def settler(said: dict[str, str]) -> Path | None:
+    """The profile that says how the acceleration is meant, unless a switch says it otherwise."""
+    own = {"ramp", "ramp-tick-ms", "ramp_tick_ms"} & said.keys()
+    return Path(said["profile"]) if said.get("profile") and not own else None
+
+
 def _unknown(flag: str, command: str) -> RequestError:
     """The error for a flag that a command has not: flags as it are told first."""
     own = [

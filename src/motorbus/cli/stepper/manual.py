@@ -6,7 +6,6 @@ What takes more than a frame to be safe, as whatever moves the motor, has a func
 
 from __future__ import annotations
 
-from functools import partial
 from inspect import Parameter, Signature
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -14,11 +13,11 @@ from cyclopts import Parameter as Said
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, verb
+from motorbus.cli.stepper.controller import BusName, BusOption, carried_out, unless_lent, verb
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.numbers import expected, number
 from motorbus.families.stepper.driver import Node, commands
-from motorbus.families.stepper.table import EDITS, ORDERS, PARAMETERS, check
+from motorbus.families.stepper.table import EDITS, ORDERS, PARAMETERS, check, checked_project
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -79,13 +78,15 @@ def _edit(
 ) -> Exit:
     values = {field.removesuffix("_"): number(field.removesuffix("_"), text) for field, text in texts.items()}
     check(name, values)
+    if project is not None:
+        checked_project(project)
     order = ORDERS[name]
     guarded = any(PARAMETERS[field].protected for field in values)
     carried_out(
         bus,
         options,
         output,
-        partial(_selected_first, name, project, values),
+        lambda one: unless_lent(one, name, _selected_first(name, project, values, one)),
         consent=f"{order.title.lower()}: {order.note}" if guarded and not yes else "",
         dry_run=dry_run,
     )

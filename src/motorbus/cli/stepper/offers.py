@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from motorbus.cli.stepper.writing import result
+from motorbus.families.stepper import Planned
+
 if TYPE_CHECKING:
-    from motorbus.families.stepper import Controller
+    from motorbus.families.stepper import Controller, Written
 
 COMMANDS: Final = {
     "select()": "`motorbus stepper select-project`",
@@ -31,6 +34,19 @@ COMMANDS: Final = {
     "stop_first=True": "--stop-first",
 }
 """What errors of this family call by the name of a method, and the command that does the same."""
+
+KEPT: Final = "the project it has stored"
+"""Where its parameters are kept; what memory that is nobody says."""
+
+
+def planned(event: object) -> str:
+    """What would change and what that costs, as `difference` has it."""
+    return str(event.difference) if isinstance(event, Planned) else ""
+
+
+def written(told: Written) -> dict[str, object]:
+    """What was written, and what is known of it, as `motorbus stepper write` says it."""
+    return result(told)
 
 
 def sample(one: Controller) -> dict[str, object]:

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from motorbus.errors import RequestError
-from motorbus.families.stepper import Behaviour
+from motorbus.families.stepper import Behaviour, Estimate
 from motorbus.families.stepper.program.profile import Profile
 
 ProfileFile = Annotated[
@@ -22,10 +22,19 @@ def how_of(path: Path | None) -> Behaviour:
 
     Raises RequestError, with the name of the file, for what cannot be.
     """
-    if path is None:
-        return Behaviour()
+    return Behaviour() if path is None else _loaded(path).behaviour()
+
+
+def settled(estimate: Estimate, path: Path | None) -> Estimate:
+    """The estimate, without its band where this profile settles how the acceleration is meant. Raises as `how_of`."""
+    if path is None or not _loaded(path).settles_acceleration:
+        return estimate
+    return estimate.settled(path.name)
+
+
+def _loaded(path: Path) -> Profile:
     try:
-        return Profile.load(str(path)).behaviour()
+        return Profile.load(str(path))
     except RequestError as error:
         error.summary = error.summary if str(path) in error.summary else f"{path}: {error.summary}"
         raise

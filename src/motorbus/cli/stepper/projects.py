@@ -10,7 +10,14 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
-from motorbus.cli.stepper.controller import BusName, BusOption, ProjectNumber, carried_out, verb
+from motorbus.cli.stepper.controller import (
+    BusName,
+    BusOption,
+    ProjectNumber,
+    carried_out,
+    unless_lent,
+    verb,
+)
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.writing import result
 from motorbus.families.stepper import Program
@@ -18,7 +25,7 @@ from motorbus.families.stepper.driver import Node, commands, reading
 from motorbus.families.stepper.table import check
 
 if TYPE_CHECKING:
-    from motorbus.core.operation import Exchange, Operation
+    from motorbus.core.operation import Operation
 
 
 @app.command(
@@ -51,14 +58,7 @@ def select_project(
     total_steps
         Give it so many steps, 1 to 10; as many as it has when left out.
     """
-    if total_steps is None:
-        do = verb("select", project)
-    else:
-        steps = total_steps
-
-        def do(one: Node) -> Exchange[None]:
-            return commands.select_project(one, project, steps)
-
+    do = verb("select", project) if total_steps is None else partial(_selected, project, total_steps)
     carried_out(bus, options, output, do, dry_run=dry_run)
     if not dry_run:
         facts = {"project": project, "total_steps": total_steps, "accepted": True}
@@ -66,6 +66,10 @@ def select_project(
         count = "with the number of steps it had" if total_steps is None else f"with {total_steps} steps"
         output.text(f"project {project} is selected, {count}")
     return Exit.OK
+
+
+def _selected(project: int, steps: int, one: Node) -> Operation[None]:
+    return unless_lent(one, "select_project", commands.select_project(one, project, steps))
 
 
 @app.command(

@@ -162,6 +162,8 @@ def result(told: writing.Written) -> dict[str, object]:
     return {
         "project": told.project,
         "changed": len(told.changes),
+        "more": [change.name for change in told.more],
+        "shared": list(told.shared),
         "commands": told.commands,
         "dumps": told.dumps,
         "seconds": told.seconds,

@@ -141,7 +141,7 @@ class Stepper:
     def link(self) -> LinkNeeds:
         from motorbus.families.stepper.simulator import OPTIONS
 
-        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS)
+        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY)
 
     def configured(self, **settings: object) -> Stepper:
         for name in settings.keys() - {"motor", "dump_order"}:

@@ -25,23 +25,23 @@ from motorbus.core.operation import (
     Alone,
     Journal,
     Operation,
+    Pause,
     Report,
     afterwards,
     outcome,
 )
-from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
-from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver import commands
+from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.editing import brought
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.reading import dump
-from motorbus.families.stepper.driver.stopping import stop
-from motorbus.families.stepper.driver.turning import refuse_unless_idle
+from motorbus.families.stepper.driver.selecting import cleared
+from motorbus.families.stepper.driver.stopping import BY_HAND, MAY_TURN, ended
+from motorbus.families.stepper.driver.turning import refuse_unless_idle, slowing
 from motorbus.families.stepper.table import (
-    BASE_NAMES,
     STEPS,
     Order,
     Project,
+    amended,
     check,
     checked_order,
     decode_image,
@@ -62,6 +62,7 @@ GIVEN_BACK: Final = "old"
 """How every borrow ends, in the journal and for `recover`."""
 TRIES: Final = 3
 """How often giving back is tried: after an emergency stop the bus itself repeats nothing."""
+LOST: Final = "the controller has lost its supply meanwhile: where the motor stands is not known"
 NOTE: Final = "project 1 may still be borrowed: recover() gives it back, and so does a power cycle"
 
 
@@ -72,6 +73,10 @@ class Loan:
     `open`     the journal may hold it as unfinished
     `seen`     it was read back as wanted: a reading shows what is being edited, and can be believed
     `restless` a motion was ordered and no stop was accepted since
+    `cut`      the motion has not come to its end by itself: behind the stop the motor may slow down still
+    `heard`    the controller has told something since the stop, and an echo cannot have made that up
+    `touched`  giving back has begun
+    `lost`     before that it read as it was before the borrow: a power cycle has given it back
     """
 
     def __init__(self, verb: str, image: bytes, order: Order, wanted: Project) -> None:
@@ -80,7 +85,8 @@ class Loan:
         self.order: Final[Order] = order
         self.before = replace(decode_image(image, order), number=PROJECT)
         self.wanted = replace(wanted, number=PROJECT)
-        self.open = self.seen = self.restless = self.restored = False
+        self.open = self.seen = self.restless = self.cut = self.touched = self.lost = self.restored = False
+        self.heard = True
 
     @property
     def needed(self) -> bool:
@@ -97,6 +103,7 @@ class Loan:
             **self.name(node),
             "what": f"the borrow of project {PROJECT} (for {self.verb})",
             "order": self.order,
+            "motor": node.motor,
             "wanted": {
                 f"step_{step}_{name}" if step else name: value
                 for name, step, _, value in differences(self.before, self.wanted)
@@ -121,31 +128,26 @@ def loan_of(verb: str, facts: Mapping[str, Any]) -> Loan:
     """The borrow that these facts tell of. Raises RequestError when they tell of none."""
     try:
         image, order = bytes.fromhex(facts["image"]), checked_order(facts["order"])
-        loan = Loan(verb, image, order, _changed(decode_image(image, order), facts["wanted"]))
+        loan = Loan(verb, image, order, amended(decode_image(image, order), _whole(facts["wanted"])))
+        loan.seen = BORROWED in facts.get(REACHED, ())
+        encode_image(loan.wanted, order)
         if verb not in VERBS:
             raise ValueError(verb)
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise RequestError(
             f"these are not the facts of a borrow that can be recovered: {error!r}",
             expected="what the journal of the bus holds of a jog(), a move_by() or a home()",
             advice="nothing was sent",
         ) from error
-    loan.seen = BORROWED in facts.get(REACHED, ())
     return loan
 
 
-def _changed(project: Project, values: Mapping[str, int]) -> Project:
-    """The project with these values, by the names of the rows."""
-    for name, value in values.items():
-        if name in BASE_NAMES:
-            changes: dict[str, Any] = {name: value}
-            project = replace(project, **changes)
-        else:
-            _, step, field = name.split("_", 2)
-            if int(step) not in range(1, STEPS + 1):
-                raise ValueError(name)
-            project = project.with_step(int(step), **{field: value})
-    return project
+def _whole(values: Mapping[str, object]) -> dict[str, int]:
+    """These values, all of which are whole numbers. Raises TypeError for one that is none."""
+    found = {name: value for name, value in values.items() if type(value) is int}
+    if len(found) < len(values):
+        raise TypeError(values)
+    return found
 
 
 def borrowed(
@@ -154,21 +156,21 @@ def borrowed(
     wanted: Callable[[Project], Operation[Project]],
     motion: Callable[[Project], Operation[T]],
     *,
-    expert: bool = False,
     leave: bool = False,
 ) -> Operation[T]:
     """Make a motion with project 1 as `wanted` makes it of what it is, then stop, then give it back, come what may.
 
-    Where it is so already nothing is edited. With `leave` it is not stopped, and it must be so already. `expert` goes
-    on where what was edited cannot be read back.
+    Where it is so already nothing is edited. With `leave` it is not stopped once its order was acknowledged, and it
+    must be so already.
 
     Raises RequestError, with nothing sent that changes anything, while a borrow that was cut off is unfinished on this
-    bus, while a project may run, for unsaved edits of another project, which a borrow would lose, and for a project 1
-    that could not be given back; VerificationFailed when it does not read as wanted; whatever `motion` raises;
-    OutcomeUnknown when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
+    bus, while a project or a move that was left may not be over, for unsaved edits of another project, which a borrow
+    would lose, and for a project 1 that could not be given back; VerificationFailed when it does not read as wanted;
+    whatever `motion` raises; OutcomeUnknown when the controller has lost its supply meanwhile, when it tells nothing
+    after the stop, or when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
     still borrowed.
     """
-    return (yield from Alone(_borrowing(node, verb, wanted, motion, expert, leave)))
+    return (yield from Alone(_borrowing(node, verb, wanted, motion, leave)))
 
 
 def _borrowing(
@@ -176,36 +178,46 @@ def _borrowing(
     verb: str,
     wanted: Callable[[Project], Operation[Project]],
     motion: Callable[[Project], Operation[T]],
-    expert: bool,
     leave: bool,
 ) -> Operation[T]:
-    refuse_unless_idle(node, verb)
+    yield from refuse_unless_idle(node, f"{verb}()")
     yield from Report(Journal(verb, ASKED, {"node": node.node}))
-    image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
+    image = yield from reading.image(node, PROJECT)
     loan = Loan(verb, image, node.order, (yield from wanted(decode_image(image, node.order))))
     if loan.needed:
         _refuse(node, loan, leave)
     try:
-        return (yield from afterwards(_lent(node, loan, motion, expert, leave), lambda: _ended(node, loan)))
+        value = yield from afterwards(_lent(node, loan, motion, leave), lambda: _ended(node, loan))
     except BaseException as error:
-        if loan.open:
-            error.add_note(NOTE)
+        _annotate(error, loan)
         raise
+    if loan.lost:
+        raise _supply_lost(node, verb)
+    return value
 
 
-def _lent(
-    node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], expert: bool, leave: bool
-) -> Operation[T]:
+def _annotate(error: BaseException, loan: Loan) -> None:
+    """Say beside an error what it does not say itself."""
+    if not loan.heard:
+        error.add_note(f"the stop was accepted, and nothing came since: {MAY_TURN}")
+    if loan.lost:
+        error.add_note(LOST)
+    if loan.open:
+        error.add_note(NOTE)
+
+
+def _lent(node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], leave: bool) -> Operation[T]:
     if loan.needed:
         yield from _recorded(node, loan)
         found = yield from brought(node, loan.image, loan.wanted)
         loan.seen = found.view == "working"
-        if not loan.seen and not expert:
+        if not loan.seen:
             raise _unseen(node)
-        if loan.seen:
-            yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
-    loan.restless = not leave
-    return (yield from motion(loan.wanted))
+        yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
+    loan.restless = loan.cut = True
+    value = yield from motion(loan.wanted)
+    loan.restless, loan.cut = not leave, False
+    return value
 
 
 def _recorded(node: Node, loan: Loan) -> Operation[None]:
@@ -223,18 +235,48 @@ def _recorded(node: Node, loan: Loan) -> Operation[None]:
 def _ended(node: Node, loan: Loan) -> Operation[None]:
     """Whatever has happened: the motor is told to stop, then project 1 is given back, then the journal is closed."""
     if loan.restless:
-        yield from stop(node)
-        node.memory.ends += 1
-        loan.restless = False
+        yield from ended(node, BY_HAND)
+        loan.restless = loan.heard = False
     if loan.open:
         yield from given_back(node, loan)
+    elif not loan.heard:
+        yield from _still_there(node)
+        loan.heard = True
+
+
+def _still_there(node: Node) -> Operation[None]:
+    """Read something: an acknowledgement of 11 bytes may be an echo of what was said, and nobody has heard it."""
+    for left in reversed(range(TRIES)):
+        told = yield from outcome(reading.dump_once(node, PROJECT))
+        if not isinstance(told, MotorbusError):
+            return
+        if isinstance(told, LinkError):
+            raise told
+        if not left:
+            raise _unheard(node, told)
+
+
+def _unheard(node: Node, told: MotorbusError) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"the stop was accepted, and nothing could be read since: {MAY_TURN}",
+        sent=told.sent,
+        received=told.received,
+        expected=told.expected,
+        cause="what came may have been an echo: the controller is gone, or hears nothing while it turns",
+        advice="say stop again, or cut the power of the motor",
+        node=node.node,
+    )
 
 
 def given_back(node: Node, loan: Loan) -> Operation[None]:
     """Bring project 1 back to what it was, see that it is, and close the journal. May be repeated at any point.
 
-    Raises what the last of several tries has raised.
+    Where the motion was cut the motor has its time to slow down before. Raises what the last of several tries has
+    raised.
     """
+    if loan.cut:
+        yield from Pause(slowing(replace(loan.wanted, total_steps=1)))
+        loan.cut = False
     if not loan.restored:
         unsaved = node.memory.unsaved
         told = yield from _insisted(node, loan)
@@ -265,27 +307,17 @@ def _restored(node: Node, loan: Loan) -> Operation[None]:
     A reading tells which, and only what differs is written; where no reading can be believed, all that was edited is
     written once more.
     """
-    if loan.before.is_cleared:
-        yield from _cleared(node)
-        return
     image = encode_image(loan.wanted, loan.order, over=loan.image)
     if loan.seen:
-        image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
-    yield from brought(node, image, loan.before)
-
-
-def _cleared(node: Node) -> Operation[None]:
-    """A project without steps: no command writes that but the one that clears, and what is stored was clear too."""
-    told = yield from outcome(commands.clear_project(node, PROJECT))
-    image = (yield from dump(node, PROJECT))[wire.REPLY_LENGTH :]
-    if any(image):
-        raise told or VerificationFailed(
-            "project 1 was cleared and does not read so",
-            received=image,
-            expected="zeros",
-            advice="recover() tries again, and a power cycle brings back what is stored",
-            node=node.node,
-        )
+        image = yield from reading.image(node, PROJECT)
+        loan.heard = True
+        shown = replace(decode_image(image, loan.order), number=PROJECT)
+        loan.lost = loan.lost or (shown == loan.before and not loan.touched)
+    loan.touched = True
+    if not loan.before.is_cleared:
+        yield from brought(node, image, loan.before)
+    elif any(image):
+        yield from cleared(node, PROJECT)  # no command writes such a one, and what is stored was clear too
 
 
 def _refuse(node: Node, loan: Loan, leave: bool) -> None:
@@ -306,6 +338,15 @@ def _refuse(node: Node, loan: Loan, leave: bool) -> None:
             advice="wait in another thread or task; nothing was sent",
             node=node.node,
         )
+
+
+def _supply_lost(node: Node, verb: str) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"{verb}() was cut short: {LOST}",
+        cause="project 1 read as before the borrow, though it was read back as lent: a power cycle loses edits",
+        advice="see to the supply; project 1 is as it was, and nothing is left to recover",
+        node=node.node,
+    )
 
 
 def _not_returnable(node: Node, why: str) -> RequestError:

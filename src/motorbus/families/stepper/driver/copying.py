@@ -24,9 +24,9 @@ from motorbus.families.stepper.driver.editing import (
 )
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.selecting import cleared, is_blank
-from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
+from motorbus.families.stepper.driver.writing import Proof, Written, unwritable, written
 from motorbus.families.stepper.program.backups import Backup
-from motorbus.families.stepper.table import PROJECTS, Project, decode_image, refusals
+from motorbus.families.stepper.table import PROJECTS, Project, checked_project, decode_image, refusals
 
 ALL: Final = tuple(range(1, PROJECTS + 1))
 
@@ -35,13 +35,15 @@ def backup(node: Node, projects: Iterable[int] = ALL) -> Operation[Backup]:
     """Read these projects, each until two dumps agree; about 0.5 s for each. Only reads.
 
     Edits of the selected project that were not saved are read in place of what is stored of it, or so it is assumed.
-    Reports `Progress`. Raises RequestError for a number that is none, and as `dump`.
+    Reports `Progress`. Raises RequestError for a number that is none, and while projects are lent to a motion that was
+    cut off, for then it would keep what was lent; as `dump` else.
     """
     numbers = _numbers(projects)
     return (yield from Alone(_read(node, numbers)))
 
 
 def _read(node: Node, numbers: tuple[int, ...]) -> Operation[Backup]:
+    yield from refuse_while_lent(node, "backup")
     dumps = {}
     for done, number in enumerate(numbers):
         yield from Report(Progress(done, len(numbers), f"reading project {number}"))

@@ -11,7 +11,7 @@ does is found out here each time, for a project that reads as it did before it w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -73,12 +73,16 @@ class Change(NamedTuple):
 
 
 class Readback(NamedTuple):
-    """What came of editing: the 220 bytes that were read at last, what these are, and what was spent on it."""
+    """What came of editing: the 220 bytes that were read at last, what these are, and what was spent on it.
+
+    `more` is what the first read-back showed to differ beyond what was planned; it was written as well.
+    """
 
     image: bytes
     view: View
     commands: int
     dumps: int
+    more: tuple[Change, ...] = ()
 
 
 def changes(before: Project, after: Project) -> Iterator[Change]:
@@ -109,6 +113,7 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     whole = _orders(node, all_edits(after), strict=False)
     rounds = [whole] if node.memory.shows_stored else [whole if every else some, whole]
     commands, dumps, unmoved = 0, 0, True
+    more: tuple[Change, ...] = ()
     for orders in rounds:
         yield from _told(node, after.number, orders)
         reading = read_until(node, after.number, lambda it: it == after or _is_alike(it, before))
@@ -117,8 +122,10 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
         shown = held(node, image, after.number)
         if shown == after:
             node.memory.shows_stored = node.memory.shows_stored and not some
-            return Readback(image, "working" if some else "untold", commands, dumps)
-        unmoved = unmoved and _is_alike(shown, before)
+            view: View = "working" if some else "stored" if node.memory.shows_stored else "untold"
+            return Readback(image, view, commands, dumps, more)
+        if not _is_alike(shown, before):
+            unmoved, more = False, tuple(_beyond(changes(before, after), changes(shown, after)))
     if unmoved:
         node.memory.shows_stored = True
         return Readback(image, "stored", commands, dumps)
@@ -128,8 +135,14 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     )  # fmt: skip
 
 
+def _beyond(planned: Iterable[Change], found: Iterable[Change]) -> Iterator[Change]:
+    """Those of parameters that were not to change."""
+    known = {change.name for change in planned}
+    return (change for change in found if change.name not in known)
+
+
 def refuse_while_lent(node: Node, verb: str) -> Operation[None]:
-    """Raise RequestError while project 1 is lent to a motion that was cut off: saving would keep what was lent.
+    """Raise RequestError while project 1 is lent to a motion that was cut off: what was lent would be kept.
 
     Call it inside `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
     """

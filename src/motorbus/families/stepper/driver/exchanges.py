@@ -18,6 +18,17 @@ from motorbus.families.stepper.table import ORDERS, check
 T = TypeVar("T")
 
 
+def timed(said: Exchange[object]) -> Exchange[float]:
+    """The same exchange, which gives the moment of its reply (s), once that is the right one."""
+
+    def at(answer: Answer) -> float:
+        if said.read is not None:
+            said.read(answer)
+        return answer.at
+
+    return said.reading(at)
+
+
 def command(
     node: Node,
     name: str,

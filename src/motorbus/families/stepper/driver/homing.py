@@ -47,9 +47,7 @@ class Homed(NamedTuple):
         return f"{found}; {self.promise.value}"
 
 
-def home(
-    node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, expert: bool = False
-) -> Operation[Homed]:
+def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = None) -> Operation[Homed]:
     """Turn in reverse until input 5 is active, at most for so long (s, up to 600), then stop: always.
 
     The speed is that of step 1 of project 1; with a `velocity` (rad/s, above 0, in whole RPM) project 1 is borrowed for
@@ -74,7 +72,7 @@ def home(
     def motion(project: Project) -> Operation[Homed]:
         return (yield from _until_active(node, project, deadline, watch))
 
-    return (yield from borrowed(node, "home", wanted, motion, expert=expert))
+    return (yield from borrowed(node, "home", wanted, motion))
 
 
 def _refuse_active(node: Node) -> Operation[None]:

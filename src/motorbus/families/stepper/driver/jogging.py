@@ -18,7 +18,7 @@ from fractions import Fraction
 from math import copysign, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Operation, Pause
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.driver import commands, goals
@@ -47,7 +47,8 @@ ACCELERATION: Final = 30
 HUNDREDTHS: Final = 36000
 """The unit, in so many for a turn, where one pulse as the unit does not fit."""
 _DISTANCE: Final = 0xFFFFFF
-_SPEED: Final = 0xFFFF
+_WORD: Final = 0xFFFF
+"""The greatest speed (RPM) and acceleration (Hz) that a frame holds."""
 
 
 class Moved(NamedTuple):
@@ -78,57 +79,62 @@ def move_by(
     velocity: float | None = None,
     acceleration: int | None = None,
     wait: bool = True,
-    expert: bool = False,
 ) -> Operation[Moved]:
     """Turn the motor by an angle (rad, forward positive), with a journalled borrow of project 1; then stop.
 
     `velocity` in rad/s, above 0, is rounded to whole RPM; None is that of step 1. `acceleration` is the number that the
-    controller takes, in Hz; None is that of step 1. Where step 1 has none, or no start frequency, it is that of the
-    manual's example; a start frequency that is not below the running one becomes half of that. The angle is rounded to
-    whole pulses. A project 1 that was cleared takes its geometry from the first other project that has one.
+    controller takes, in Hz, 0 to 65535; None is that of step 1. Where step 1 has none, or no start frequency, it is
+    that of the manual's example; a start frequency that is not below the running one becomes half of that. The angle is
+    rounded to whole pulses. A project 1 that was cleared takes its geometry from the first other project that has one.
 
     Waits as long as the slowest reading of the ramp says, then says stop, which ends what turns still. Without `wait`
-    it goes on when this returns: possible only when nothing had to be borrowed.
+    it goes on when this returns: possible only when nothing had to be borrowed. Until it may be over, nothing else
+    begins on this bus but a stop.
 
     Raises RequestError, before anything is written, for a speed that is 0 or more than 10 % off in whole RPM, an angle
     of less than a pulse or too far, and as `borrowed`; Interrupted when somebody stops it; OutcomeUnknown when the
-    order was not acknowledged: it is stopped then. `expert` goes on where what was edited cannot be read back.
+    order was not acknowledged: it is stopped then, also without `wait`.
     """
     finite(angle, "angle")
     rpm = None if velocity is None else whole_rpm(finite(velocity, "velocity"))
-    watch = Watch(node)
-
-    def wanted(project: Project) -> Operation[Project]:
-        project = yield from grounded(node, project, "move_by", rpm)
-        return shaped(paced(project, rpm, acceleration), angle)
-
-    def motion(project: Project) -> Operation[Moved]:
-        return (yield from single(node, project, watch, wait=wait))
-
-    return (yield from borrowed(node, "move_by", wanted, motion, expert=expert, leave=not wait))
+    return (yield from _turned(node, "move_by", angle, rpm, acceleration, wait))
 
 
-def jog(
-    node: Node, velocity: float, seconds: float, *, acceleration: int | None = None, expert: bool = False
-) -> Operation[Moved]:
+def jog(node: Node, velocity: float, seconds: float, *, acceleration: int | None = None) -> Operation[Moved]:
     """Turn at a velocity (rad/s, forward positive) for a while (s, at most 60), then stop.
 
     It is one single move of exactly velocity times seconds, see `move_by`: the motor ends by itself when this host
     dies. It takes a little longer for its ramps, and for its speed is in whole RPM. Raises as `move_by`.
     """
-    finite(velocity, "velocity")
+    rpm = whole_rpm(abs(finite(velocity, "velocity")))
     angle = velocity * within(seconds, LONGEST, "seconds")
-    rpm = whole_rpm(abs(velocity))
+    return (yield from _turned(node, "jog", angle, rpm, acceleration, True))
+
+
+def _turned(
+    node: Node, verb: str, angle: float, rpm: int | None, acceleration: int | None, wait: bool
+) -> Operation[Moved]:
+    ramp = None if acceleration is None else _checked_acceleration(acceleration)
     watch = Watch(node)
 
     def wanted(project: Project) -> Operation[Project]:
-        project = yield from grounded(node, project, "jog", rpm)
-        return shaped(paced(project, rpm, acceleration), angle)
+        project = yield from grounded(node, project, verb, rpm)
+        return shaped(paced(project, rpm, ramp), angle)
 
     def motion(project: Project) -> Operation[Moved]:
-        return (yield from single(node, project, watch))
+        return (yield from single(node, project, watch, wait=wait))
 
-    return (yield from borrowed(node, "jog", wanted, motion, expert=expert))
+    return (yield from borrowed(node, verb, wanted, motion, leave=not wait))
+
+
+def _checked_acceleration(number: int) -> int:
+    if isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= _WORD:
+        return number
+    raise RequestError(
+        f"acceleration: {number!r} is not possible",
+        expected=f"0 to {_WORD} Hz, a whole number: as the controller takes it",
+        advice="nothing was sent",
+    )
 
 
 def run_once(node: Node) -> Operation[Moved]:
@@ -193,6 +199,8 @@ def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> 
     seconds = longest(project, count)
     if wait:
         yield from waited(watch, seconds, "moving")
+    else:
+        node.memory.turning = (yield from Pause(0)) + seconds
     angle = step.sign * step.distance * tau / project.turn_distance
     promise = Promise.STOP_ACCEPTED if wait else None
     return Moved(node.node, angle, step.sign * _velocity(project), seconds, promise)
@@ -217,16 +225,19 @@ def whole_rpm(velocity: float) -> int:
 
     Raises RequestError when it is more than 10 % off, naming those that are possible.
     """
-    exact = velocity * 60 / tau
-    rpm = round(exact)
-    if 0 < rpm <= _SPEED and abs(rpm - exact) <= OFF * exact:
+    exact = velocity / tau * 60
+    near = min(max(exact, 0.0), _WORD + 1.0)
+    rpm = round(near)
+    if 0 < rpm <= _WORD and abs(rpm - exact) <= OFF * exact:
         return rpm
-    below = min(max(int(exact), 0), _SPEED)
-    near = [one for one in (below, below + 1) if 0 < one <= _SPEED]
     raise RequestError(
         f"{velocity:.6g} rad/s are {exact:.4g} RPM, and speeds are whole RPM",
-        expected=" or ".join(f"{one * tau / 60:.4g} rad/s ({one} RPM)" for one in near)
-        or f"above 0, at most {_SPEED * tau / 60:.6g} rad/s",
+        expected=" or ".join(
+            f"{one * tau / 60:.4g} rad/s ({one} RPM)"
+            for one in (int(min(near, _WORD)), int(near) + 1)
+            if 0 < one <= _WORD
+        )
+        or f"above 0, at most {_WORD * tau / 60:.6g} rad/s",
         cause="the nearest is more than 10 % off",
         advice="choose one of these, or move_by() an angle; nothing was sent",
     )
@@ -292,12 +303,13 @@ def shaped(project: Project, angle: float) -> Project:
     what is too far to be said.
     """
     turn = project.pulses_per_turn or Fraction(0)
-    pulses = round(abs(angle) / tau * turn)
+    turns = Fraction(abs(angle) / tau)  # exact, and so without an end: a product of floats may be infinite
+    pulses = round(turns * turn)
     if not pulses:
         raise less_than_a_pulse(project)
     unit, distance = turn.numerator, turn.denominator * pulses
     if unit > _DISTANCE or distance > _DISTANCE:
-        unit, distance = HUNDREDTHS, round(abs(angle) / tau * HUNDREDTHS)
+        unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
     if distance > _DISTANCE:
         raise RequestError(
             f"{angle:.6g} rad are too far for one move",

@@ -6,29 +6,31 @@ bus, and it is never called more than that: another host, a button or a power cy
 
 from __future__ import annotations
 
+from math import inf
+
 from motorbus.families.stepper.table import OUTPUTS, OutputPort, Project
 
 
 class Memory:
     """What was said to the controller of one bus since it was opened.
 
-    `stops`    how many stops it has accepted
-    `ends`     how many of these did no more than end a motion by hand, as each of them is ended
+    `wanted`   how many stops somebody has asked for, counted when each begins; not those that end every motion by hand
+    `stops`    how many stops it has accepted, these included
     `stopping` how many stops are being said just now, accepted or not yet
     `owed`     a project was started, and neither its notice nor an accepted stop has come since: it may still run
+    `turning`  until when (s on the link's clock) a motion may last that nobody waits for; no stop was accepted since
     `outputs`  the level last commanded, by output 1 to 3 and 5, the LEDs; None where that is not known
-    `proven`   a dump has come: there is a controller, and not only a line that echoes
     `unsaved`  the project that was edited last without being saved, as it was meant to be; None: none was
     `shows_stored` when that was tried last, reading showed what was stored, and not what was being edited
     """
 
     def __init__(self) -> None:
+        self.wanted = 0
         self.stops = 0
-        self.ends = 0
         self.stopping = 0
         self.owed = False
+        self.turning = -inf
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), int(OutputPort.LEDS)))
-        self.proven = False
         self.unsaved: Project | None = None
         self.shows_stored = False
 

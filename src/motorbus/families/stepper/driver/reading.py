@@ -22,8 +22,6 @@ from motorbus.families.stepper.table import INPUTS, STEPS, row_value
 
 READINGS: Final = 5
 """How often a dump is read at most until it is believed."""
-_NUMBER: Final = 0
-_TOTAL: Final = 1
 
 
 def dump_once(node: Node, project: int, timeout: Timeout | None = None) -> Exchange[bytes]:
@@ -38,6 +36,11 @@ def dump(node: Node, project: int = 1) -> Operation[bytes]:
     project. Reading changes nothing; with unsaved edits it shows those, or so it is assumed.
     """
     return agreed(node, project, (yield from readings(node, project)))
+
+
+def image(node: Node, project: int) -> Operation[bytes]:
+    """The 220 bytes of a project, 1 to 4, without the six before them. Raises as `dump`."""
+    return (yield from dump(node, project))[wire.REPLY_LENGTH :]
 
 
 def readings(node: Node, project: int, lasted: list[float] | None = None) -> Operation[list[bytes]]:
@@ -66,7 +69,6 @@ def agreed(node: Node, project: int, seen: Sequence[bytes]) -> bytes:
             node=node.node,
         )
     _plausible(node, found, project)
-    node.memory.proven = True
     return found
 
 
@@ -82,10 +84,10 @@ def vote(readings: Sequence[bytes]) -> bytes:
 
 
 def _plausible(node: Node, data: bytes, project: int) -> None:
-    image = data[wire.REPLY_LENGTH :]
-    if image[_NUMBER] not in (0, project) or image[_TOTAL] > STEPS:
+    number, total = data[wire.REPLY_LENGTH :][:2]
+    if number not in (0, project) or total > STEPS:
         raise UnexpectedReply(
-            f"the dump of project {project} says project {image[_NUMBER]} with {image[_TOTAL]} steps",
+            f"the dump of project {project} says project {number} with {total} steps",
             received=data,
             expected=f"project {project}, or 0 when it was cleared, and up to {STEPS} steps",
             cause="a line that changes the same byte each time, or another device",
@@ -114,8 +116,8 @@ def read(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, Va
 def read_raw(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, int]]:
     """The same as raw values."""
     rows: list[Entry] = [node.table[name] for name in names or node.table]
-    image = (yield from dump(node, project))[wire.REPLY_LENGTH :]
-    return {row.name: row_value(image, row, node.order) for row in rows}
+    held = yield from image(node, project)
+    return {row.name: row_value(held, row, node.order) for row in rows}
 
 
 def read_input(node: Node, port: int) -> Exchange[bool]:

@@ -8,14 +8,16 @@ saved, as nothing was. Carrying this out again, after another crash in the middl
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from motorbus.core.operation import REACHED, Alone, Journal, Operation, Report
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.families.stepper.driver import characterising
-from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, Loan, given_back, loan_of
+from motorbus.families.stepper.driver import characterising, reading
+from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.stopping import stop
+from motorbus.families.stepper.driver.stopping import BY_HAND, ended
+from motorbus.families.stepper.table import PROJECTS, Project, decode_image, differences
 
 RESUMED: Final = "recovering"
 
@@ -27,18 +29,23 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     no difference: there is one controller on a line. A `characterise` that was cut off is ended likewise.
 
     Raises RequestError, with nothing sent, for facts of something else, or of a bus that was opened with another order
-    of bytes; OutcomeUnknown when the stop is not accepted, for nothing is edited while the motor may turn; whatever
-    writing and reading raise. The journal stays open then.
+    of bytes or another motor; RequestError, with nothing but the stop sent, when somebody has written project 1 since;
+    OutcomeUnknown when the stop is not accepted, for nothing is edited while the motor may turn; whatever writing and
+    reading raise. The journal stays open then.
     """
     if change == characterising.VERB:
         return (yield from characterising.recovered(node, facts))
     loan = loan_of(change, facts)
-    if loan.order != node.order:
-        raise RequestError(
-            f"project 1 was borrowed on a bus with dump_order={loan.order}, and this one has {node.order}",
-            advice=f"open it with dump_order={loan.order}; nothing was sent",
-            node=node.node,
-        )
+    for name, then, now in (
+        ("dump_order", loan.order, node.order),
+        ("motor", facts.get("motor"), node.motor),
+    ):
+        if then != now:
+            raise RequestError(
+                f"project 1 was borrowed on a bus with {name}={then}, and this one has {now}",
+                advice=f"open it with {name}={then}; nothing was sent",
+                node=node.node,
+            )
     try:
         return (yield from Alone(_recovered(node, loan, facts)))
     except BaseException as error:
@@ -50,6 +57,39 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
 def _recovered(node: Node, loan: Loan, facts: Mapping[str, Any]) -> Operation[str]:
     told = {**loan.facts(node), REACHED: list(facts.get(REACHED, ()))}
     yield from Report(Journal(loan.verb, RESUMED, told))
-    yield from stop(node)
+    yield from ended(node, BY_HAND)
+    yield from _refuse_written(node, loan)
+    loan.cut = True  # it may have turned until now
     yield from given_back(node, loan)
     return GIVEN_BACK
+
+
+def _refuse_written(node: Node, loan: Loan) -> Operation[None]:
+    """Raise RequestError where project 1 reads neither as it was nor as it was lent: that is somebody's work.
+
+    A borrow that was cut off before it was read back may have left another project's numbers under this number.
+    """
+    shown = yield from _project(node, PROJECT)
+    strange = _unlike(shown, loan.before) & _unlike(shown, loan.wanted)
+    if strange and not loan.seen:
+        for number in range(PROJECT + 1, PROJECTS + 1):
+            if not strange & _unlike(shown, (yield from _project(node, number))):
+                return
+    if strange:
+        raise RequestError(
+            f"somebody has written project 1 since it was borrowed: {', '.join(sorted(strange))}",
+            expected="each parameter as it was before, or as it was lent",
+            cause="recover would put back what is older",
+            advice="if it is as it should be, `motorbus recover BUS --forget` gives the borrow up; nothing was edited",
+            node=node.node,
+        )
+
+
+def _project(node: Node, number: int) -> Operation[Project]:
+    return decode_image((yield from reading.image(node, number)), node.order)
+
+
+def _unlike(shown: Project, other: Project) -> set[str]:
+    """The names of the parameters in which they differ."""
+    alike = replace(other, number=shown.number)
+    return {f"step_{step}_{name}" if step else name for name, step, _, _ in differences(shown, alike)}

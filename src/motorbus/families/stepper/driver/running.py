@@ -7,16 +7,16 @@ of inputs that somebody asked for; that it ends, in whatever way, stops nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import inf, isfinite
-from typing import Final
+from collections.abc import Callable, Iterable, Sequence
+from math import inf
+from typing import Final, NamedTuple
 
 from motorbus.core.operation import (
     ASKED,
-    Answer,
-    Exchange,
+    Alone,
     Journal,
     Listen,
+    Notice,
     Operation,
     Pause,
     Report,
@@ -33,16 +33,17 @@ from motorbus.errors import (
     RequestError,
     WireError,
 )
-from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver import goals, outputs, reading, stopping
 from motorbus.families.stepper.driver.commands import motion
+from motorbus.families.stepper.driver.exchanges import timed
 from motorbus.families.stepper.driver.inputs import Levels, checked, inputs
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.progress import Twin
+from motorbus.families.stepper.driver.turning import Watch, refuse_unless_idle, slowing, within
 from motorbus.families.stepper.driver.waiting import Outcome, Ran, Wait
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import Conditions, Plan, Program
-from motorbus.families.stepper.table import PROJECTS, STOP_INPUT, Project, StopMode
+from motorbus.families.stepper.table import STOP_INPUT, checked_project
 
 TICK: Final = 0.25
 """s between two reports of progress."""
@@ -67,16 +68,15 @@ def start_project(
 
     It is read until two readings agree. Refused, with nothing started: a project without steps, one with lint errors
     (unless `expert`), one that never ends by itself (unless `endless`), and a start while an earlier project may still
-    run (`stop_first` stops it; so does `stop`). Also refused while a change of project 1 is unfinished.
+    run (`stop_first` stops it; so does `stop`). Also refused while a change of project 1 is unfinished, and while a
+    move may not be over. A motion by hand of this bus that is under way is waited for.
 
     Returns when the start is acknowledged, which is no proof that it runs: a busy controller may acknowledge and
     ignore it. Raises RequestError for what is refused, LimitExceeded for one without geometry, Interrupted for one that
     a stop has overtaken, OutcomeUnknown when the acknowledgement did not come; and as `dump` and `stop`.
     """
-    _check(project, how)
-    plan, stops = yield from _ready(node, project, how, endless, stop_first, expert)
-    yield from _begin(node, plan, stops)
-    return plan
+    asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
+    return (yield from Alone(_started(node, asked, Watch(node))))
 
 
 def run(
@@ -112,25 +112,38 @@ def run(
     Interrupted; whether it was heard is not known, so the next run wants a `stop` first. Raises as `start_project`, and
     LinkError when the port goes away: the project goes on.
     """
-    _check(project, how)
+    asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
     _check_timeout(timeout, endless)
-    ports = checked(watch)
-    plan, stops = yield from _ready(node, project, how, endless, stop_first, expert)
-    levels = Levels((yield from inputs(node, ports)))
-    wait = Wait(node.memory, plan, (yield from Pause(0)), timeout)
-    return (yield from _waited(node, wait, levels, stops))
+    course = _Course(timeout, checked(watch))
+    branches = (_launched(node, asked, course, Watch(node)), _listening(course), _following(node, course))
+    try:
+        yield from Together([_failing(course, branch) for branch in branches])
+    except MotorbusError:
+        raise
+    except BaseException as interruption:
+        if course.wait is not None:
+            interruption.add_note(f"project {project} was started and goes on: nothing was sent to stop it")
+        raise
+    assert course.wait is not None, "a start that fails raises"
+    assert course.wait.ran is not None, "a wait ends with an outcome"
+    return course.wait.ran
 
 
 # -- before it starts --------------------------------------------------------------------------------------------------
 
 
-def _check(project: int, how: Behaviour) -> None:
-    if isinstance(project, bool) or not isinstance(project, int) or not 1 <= project <= PROJECTS:
-        raise RequestError(
-            f"there is no project {project!r}", expected=f"1 to {PROJECTS}", advice="nothing was sent"
-        )
+class _Asked(NamedTuple):
+    project: int
+    how: Behaviour
+    endless: bool
+    stop_first: bool
+    expert: bool
+
+
+def _checked(how: Behaviour) -> Behaviour:
     if not isinstance(how, Behaviour):
         raise RequestError(f"{how!r} is no Behaviour", expected="Behaviour(...)", advice="nothing was sent")
+    return how
 
 
 def _check_timeout(timeout: float | None, endless: bool) -> None:
@@ -143,31 +156,22 @@ def _check_timeout(timeout: float | None, endless: bool) -> None:
                 advice="nothing was sent; start_project does not wait",
             )
         return
-    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    if not number or not isfinite(timeout) or timeout <= 0:
-        raise RequestError(
-            f"timeout: {timeout!r} is no time to wait for",
-            expected="seconds, more than 0, or None",
-            advice="nothing was sent",
-        )
+    within(timeout, inf, "timeout")
 
 
-def _ready(
-    node: Node, project: int, how: Behaviour, endless: bool, stop_first: bool, expert: bool
-) -> Operation[tuple[Plan, int]]:
-    """Whether it may be started: its plan, and how many stops were accepted before it was asked for."""
+def _ready(node: Node, asked: _Asked) -> Operation[Plan]:
+    """Whether it may be started: its plan."""
     yield from Report(Journal("run", ASKED, {"node": node.node}))
-    if stop_first:
-        yield from stopping.stop(node)
-    elif node.memory.owed:
-        raise _owed(project)
-    stops = node.memory.stops
-    program = yield from reading.read_project(node, project)
-    plan = program.plan(how)
-    _judge(program, plan, endless, expert)
-    if stop_first:
-        yield from Pause(_slowing(program.project, how))
-    return plan, stops
+    if asked.stop_first:
+        yield from stopping.ended(node)
+    else:
+        yield from refuse_unless_idle(node, f"starting project {asked.project}")
+    program = yield from reading.read_project(node, asked.project)
+    plan = program.plan(asked.how)
+    _judge(program, plan, asked.endless, asked.expert)
+    if asked.stop_first:
+        yield from Pause(slowing(program.project, asked.how))  # of this one, for the other is not known
+    return plan
 
 
 def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
@@ -192,138 +196,117 @@ def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
         )
 
 
-def _owed(project: int) -> RequestError:
-    return RequestError(
-        f"project {project} is not started: another that this host started may still run",
-        cause="neither its notice nor an accepted stop has come since; its notice would be taken for this one's",
-        advice="stop() first, or say stop_first=True; nothing was started",
-    )
+# -- the start: all of it alone, so that nothing of this bus moves or edits between the reading and the order -----------
 
 
-def _slowing(project: Project, how: Behaviour) -> float:
-    """s that a slow stop takes at most, for one that was stopped first; of this project, for the other is not known."""
-    if project.stop_mode != StopMode.SLOW:
-        return 0.0
-    steps = [project.step(number) for number in range(1, execution.last_step(project) + 1)]
-    moves = [execution.move(project, step, None, how) for step in steps]
-    return max(
-        (move.slowing(sum(piece.duration for piece in move.pieces[:1])).duration for move in moves), default=0
-    )
+def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
+    plan = yield from _ready(node, asked)
+    yield from _begin(node, plan, lambda: watch.overtaken)
+    return plan
 
 
-# -- the start ---------------------------------------------------------------------------------------------------------
-
-
-def _begin(node: Node, plan: Plan, stops: int) -> Operation[float]:
+def _begin(node: Node, plan: Plan, called_off: Callable[[], bool]) -> Operation[float]:
     """Send it; when it was acknowledged (s). It may run from the moment it leaves."""
+    memory, number, left = node.memory, plan.project.number, True
 
     def overtaken(_: Stops) -> MotorbusError | None:
-        if node.memory.stops == stops and not node.memory.stopping:
-            return None
-        return Interrupted(
-            f"project {plan.project.number} is not started: a stop came in between",
-            cause="somebody stopped this controller after the start was asked for",
-            advice="start it again if it is still wanted; nothing was sent",
-        )
+        nonlocal left
+        left = not called_off()
+        return None if left else _overtaken(number)
 
-    number, where = plan.project.number, goals.of_project(node, plan.project, plan.how)
-    if node.memory.owed:  # by another run, while this one was read
-        raise _owed(number)
+    where = goals.of_project(node, plan.project, plan.how)
     said = motion(node, "start_project", where, overtaken, project=number)
-    node.memory.owed = True
+    memory.owed = True
     outputs.forget(node)
     try:
-        return (yield from _timed(said))
+        return (yield from timed(said))
     except (LimitExceeded, RequestError):
-        node.memory.owed = False
+        memory.owed = False
         raise
     except Interrupted:
-        node.memory.owed = node.memory.stops == stops
+        memory.owed = memory.owed and left
         raise
 
 
-def _timed(said: Exchange[None]) -> Exchange[float]:
-    """The same exchange, which gives the moment of its reply (s) once that is the right one."""
-
-    def at(answer: Answer) -> float:
-        if said.read is not None:
-            said.read(answer)
-        return answer.at
-
-    return Exchange(
-        said.request,
-        said.replies,
-        at,
-        rank=said.rank,
-        effect=said.effect,
-        goals=said.goals,
-        timeout=said.timeout,
-        repeatable=said.repeatable,
-        refusal=said.refusal,
+def _overtaken(number: int) -> Interrupted:
+    return Interrupted(
+        f"project {number} is not started: a stop came in between",
+        cause="somebody stopped this controller after the start was asked for",
+        advice="start it again if it is still wanted; nothing was sent",
     )
 
 
 # -- three branches of one run -----------------------------------------------------------------------------------------
 
 
-def _waited(node: Node, wait: Wait, levels: Levels, stops: int) -> Operation[Ran]:
-    over = _Over()
-    try:
-        yield from Together(
-            [_starting(node, wait, stops, over), _listening(wait, over), _following(node, wait, levels, over)]
-        )
-    except MotorbusError:
-        raise
-    except BaseException as interruption:
-        number = wait.plan.project.number
-        interruption.add_note(f"project {number} was started and goes on: nothing was sent to stop it")
-        raise
-    assert wait.ran is not None, "a wait ends with an outcome"
-    return wait.ran
+class _Course:
+    """What the branches of one run share: its `wait` once it is about to start, and whether one of them has failed."""
 
-
-class _Over:
-    """Whether one of the branches has failed, so that the others need not go on."""
-
-    def __init__(self) -> None:
+    def __init__(self, timeout: float | None, ports: Sequence[int]) -> None:
+        self.timeout = timeout
+        self.ports = ports
+        self.levels = Levels({})
+        self.wait: Wait | None = None
         self.failed = False
 
+    @property
+    def over(self) -> bool:
+        return self.failed or (self.wait is not None and self.wait.ran is not None)
 
-def _starting(node: Node, wait: Wait, stops: int, over: _Over) -> Operation[None]:
+    def heard(self, notice: Notice) -> bool:
+        return self.wait is not None and self.wait.heard(notice)
+
+
+def _failing(course: _Course, branch: Operation[None]) -> Operation[None]:
     try:
-        wait.begun((yield from _begin(node, wait.plan, stops)))
+        yield from branch
+    except BaseException:
+        course.failed = True
+        raise
+
+
+def _launched(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Operation[None]:
+    yield from Alone(_launching(node, asked, course, watch))
+
+
+def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Operation[None]:
+    plan = yield from _ready(node, asked)
+    course.levels = Levels((yield from inputs(node, course.ports)))
+    course.wait = wait = Wait(node.memory, plan, (yield from Pause(0)), course.timeout)
+    try:
+        wait.begun((yield from _begin(node, plan, lambda: watch.overtaken or course.failed)))
     except _UNHEARD as error:
         wait.unacknowledged(error)
-    except BaseException:
-        over.failed = True
-        raise
 
 
-def _listening(wait: Wait, over: _Over) -> Operation[None]:
+def _listening(course: _Course) -> Operation[None]:
     """Nothing but listen: there is a listener also while the other branch reads inputs."""
-    while wait.ran is None and not over.failed:
-        yield from Listen(wait.heard, AGAIN)
+    while not course.over:
+        yield from Listen(course.heard, AGAIN)
 
 
-def _following(node: Node, wait: Wait, levels: Levels, over: _Over) -> Operation[None]:
+def _following(node: Node, course: _Course) -> Operation[None]:
     """Look at the clock, tell where it should be, and read the inputs that are watched."""
+    while course.wait is None and not course.failed:
+        yield from Pause(SOON)
+    if course.wait is not None:
+        yield from _followed(node, course, course.wait, course.levels)
+
+
+def _followed(node: Node, course: _Course, wait: Wait, levels: Levels) -> Operation[None]:
     twin: Twin | None = None
     told = -inf
-    try:
-        while wait.ran is None and not over.failed:
-            now = yield from Pause(0)
-            if not wait.pending and twin is None:
-                active = frozenset(port for port, level in levels.believed.items() if level)
-                twin = Twin(wait.plan, wait.start, active)
-            if twin is not None and now - told >= TICK:
-                told = now
-                yield from Report(twin.told(now))
-            yield from _reading(node, wait, levels, twin)
-            yield from Listen(wait.heard, _patience(wait, levels, now))
-            wait.look((yield from Pause(0)))
-    except BaseException:
-        over.failed = True
-        raise
+    while not course.over:
+        now = yield from Pause(0)
+        if not wait.pending and twin is None:
+            active = frozenset(port for port, level in levels.believed.items() if level)
+            twin = Twin(wait.plan, wait.start, active)
+        if twin is not None and now - told >= TICK:
+            told = now
+            yield from Report(twin.told(now))
+        yield from _reading(node, wait, levels, twin)
+        yield from Listen(wait.heard, _patience(wait, levels, now))
+        wait.look((yield from Pause(0)))
 
 
 def _patience(wait: Wait, levels: Levels, now: float) -> float:

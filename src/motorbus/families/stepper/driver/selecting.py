@@ -24,8 +24,8 @@ from motorbus.families.stepper.driver.editing import (
     selected,
 )
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.writing import Proof, Written, checked_project, unwritable, written
-from motorbus.families.stepper.table import Project, decode_image
+from motorbus.families.stepper.driver.writing import Proof, Written, unwritable, written
+from motorbus.families.stepper.table import Project, checked_project, decode_image
 
 JOGS: Final = 1
 """The project whose step 1 says how manual motion goes."""
@@ -66,7 +66,8 @@ def _selected(node: Node, project: int) -> Operation[int]:
 def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written]:
     """Save what this host has edited of a project, 1 to 4, and not saved, as `write_project` saves what it writes.
 
-    What is not there any more, because the controller has lost its supply, is written again first. It is refused when
+    All of it is written once more before, behind the command that selects it: nobody can ask which project is being
+    edited, and whichever that is would be stored. It is refused when
     this host left nothing of this project unsaved: whatever else is being edited would be stored in its place. An
     `expert` may do that; then all that can be verified is that it reads as before, and an acknowledgement that is lost
     is not asked for again.

@@ -9,15 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+from math import inf
 from typing import Final
 
 from motorbus.core.family import Stop
 from motorbus.core.operation import Answer, Exchange, Operation, Rank, outcome
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown
+from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
 
 STOPS: Final = ("stop_project", "stop_motor")
+BY_HAND: Final = ("stop_motor", "stop_project")
+"""The order for a motion by hand, which may heed the second only."""
 TRIES: Final = 5
 """How often each is said until it is accepted; of a device that is silent that takes about 2 s."""
 MAY_TURN: Final = "the motor may be turning"
@@ -35,48 +39,53 @@ class Promise(Enum):
 def stop(node: Node) -> Operation[Promise]:
     """End the project, then any other motion. Returns what was promised.
 
-    Each is said up to five times, the second also when the first was not accepted. Raises OutcomeUnknown when one of
-    them never was, for it may have been heard all the same, and the motor may be turning as well; LinkError when the
-    port is gone.
+    Both are said, then each again that was not accepted, up to five times. From its first word on no motion and no
+    project begins that was asked for before. Raises OutcomeUnknown when one of them never was accepted, for it may have
+    been heard all the same, and the motor may be turning as well; LinkError when the port is gone.
     """
-    failures = {}
+    node.memory.wanted += 1
+    return (yield from ended(node))
+
+
+def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:
+    """The same, as part of a longer work: what others have asked for meanwhile is not called off by it."""
+    failures: dict[str, MotorbusError] = {}
     node.memory.stopping += 1  # a run that waits for its notice does not take one of this stop for it
     try:
-        for name in STOPS:
-            told = yield from _insisted(node, name)
-            if told is not None:
-                failures[name] = told
+        for _ in range(TRIES):
+            failures = yield from _said(node, tuple(failures) or names)
+            if not failures or any(isinstance(told, LinkError) for told in failures.values()):
+                break
         if failures:
             raise _not_accepted(node, failures)
         node.memory.stops += 1
         node.memory.owed = False
+        node.memory.turning = -inf
     finally:
         node.memory.stopping -= 1
     return Promise.STOP_ACCEPTED
 
 
-def _insisted(node: Node, name: str) -> Operation[MotorbusError | None]:
-    told: MotorbusError | None = None
-    for _ in range(TRIES):
-        told = yield from outcome(command(node, name, _nothing, rank=Rank.STOP))
-        if told is None or isinstance(told, LinkError):
-            break
-    return told
-
-
-def _nothing(reply: bytes) -> None:
-    """An acknowledgement carries no value."""
+def _said(node: Node, names: tuple[str, ...]) -> Operation[dict[str, MotorbusError]]:
+    """Say each of them once; what was told of those that were not accepted."""
+    failures = {}
+    for name in names:
+        told = yield from outcome(command(node, name, nothing, rank=Rank.STOP))
+        if told is not None:
+            failures[name] = told
+    return failures
 
 
 def _not_accepted(node: Node, failures: Mapping[str, MotorbusError]) -> MotorbusError:
     """The error for a stop of which so much was not accepted; that of a port that is gone stays what it is."""
+    for told in failures.values():
+        if isinstance(told, LinkError):
+            told.add_note(f"the stop was not accepted: {MAY_TURN}")
+            return told
     first = next(iter(failures.values()))
-    if isinstance(first, LinkError):
-        first.add_note(f"the stop was not accepted: {MAY_TURN}")
-        return first
-    said = " and ".join(name.replace("_", " ") for name in failures)
+    said = " and ".join(name.replace("_", " ") for name in STOPS if name in failures)
     return OutcomeUnknown(
-        f"{said} was not accepted, said {TRIES} times: {MAY_TURN}",
+        f"{said} {'was' if len(failures) == 1 else 'were'} not accepted, said {TRIES} times: {MAY_TURN}",
         sent=first.sent,
         received=first.received,
         expected=first.expected,
@@ -96,6 +105,6 @@ def stop_all(nodes: Mapping[int, Answer | None], motor: int) -> Stop:
             effect=said.effect,
             repeatable=True,
         )
-        for said in (command(Node(motor=motor), name, _nothing, rank=Rank.STOP) for name in STOPS)
+        for said in (command(Node(motor=motor), name, nothing, rank=Rank.STOP) for name in STOPS)
     )
     return Stop(frames, Promise.STOP_ACCEPTED.value)

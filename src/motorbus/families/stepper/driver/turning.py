@@ -8,7 +8,8 @@ was sent by anybody on this bus ends the wait, and none of these orders leaves a
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, isfinite
+from math import inf
+from sys import float_info
 from typing import Final
 
 from motorbus.core.operation import Operation, Pause, Progress, Report, Stops
@@ -17,7 +18,7 @@ from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program.plan import READINGS
-from motorbus.families.stepper.table import Project
+from motorbus.families.stepper.table import Project, StopMode
 
 LOOK: Final = 0.1
 """s between two looks at whether somebody has stopped it."""
@@ -33,25 +34,25 @@ class Watch:
     def __init__(self, node: Node) -> None:
         self._node = node.node
         self._memory = node.memory
-        self._before = self._wanted
+        self._before = self._memory.wanted
         self._stops: Stops | None = None
         self._left = 0
 
     @property
-    def _wanted(self) -> int:
-        """The accepted stops that somebody wanted: not those that end each motion by hand, of whoever came before."""
-        return self._memory.stops - self._memory.ends
+    def overtaken(self) -> bool:
+        """Whether somebody has begun to say stop since, accepted or not."""
+        return self._memory.wanted != self._before
 
     def refusal(self, stops: Stops) -> MotorbusError | None:
         """For the exchange that begins the motion: it must not leave after a stop."""
-        if self._wanted != self._before:
+        if self.overtaken:
             return _stopped("before it began", "the motor was not told to move")
         self._stops, self._left = stops, stops(self._node)
         return None
 
     def check(self) -> None:
-        """Raise Interrupted when a stop has left since the motion was ordered."""
-        if self._stops is not None and self._stops(self._node) != self._left:
+        """Raise Interrupted when somebody has said stop since the motion was ordered."""
+        if self.overtaken or (self._stops is not None and self._stops(self._node) != self._left):
             raise _stopped("by somebody else", "where the motor stands now is not known")
 
 
@@ -83,22 +84,40 @@ def longest(project: Project, count: int | None) -> float:
 
     With a little more for a slow clock; infinity for a move without an end.
     """
-    step = project.step(1)
-    readings: list[Behaviour] = [USUAL, *(replace(USUAL, **changes) for changes in READINGS.values())]
-    seconds = max(execution.move(project, step, count, how).duration for how in readings)
+    seconds = max(execution.move(project, project.step(1), count, how).duration for how in _readings())
     return seconds * CLOCK + SPARE if seconds < inf else inf
 
 
-def refuse_unless_idle(node: Node, verb: str) -> None:
-    """Raise RequestError while a project that was started on this bus may still run: it would be stopped half-way."""
-    if node.memory.owed:
-        raise RequestError(
-            f"a project that was started may still run, so {verb}() is refused",
-            expected="its notice, or an accepted stop",
-            cause="a controller that runs a project ignores the order, and the stop at its end would end the project",
-            advice="wait for the project, or stop(); nothing was sent",
-            node=node.node,
-        )
+def slowing(project: Project, how: Behaviour = USUAL) -> float:
+    """s that it takes at most to come to rest after a stop, from any of its steps; 0 where a stop ends it at once.
+
+    By the slowest of the readings of its ramp, `how` among them.
+    """
+    if project.stop_mode != StopMode.SLOW or project.pulses_per_unit is None:
+        return 0.0
+    steps = [project.step(number) for number in range(1, max(1, execution.last_step(project)) + 1)]
+    moves = [execution.move(project, step, None, one) for step in steps for one in _readings(how)]
+    return max(move.slowing(sum(piece.duration for piece in move.pieces[:1])).duration for move in moves)
+
+
+def _readings(how: Behaviour = USUAL) -> list[Behaviour]:
+    return [how, *(replace(how, **changes) for changes in READINGS.values())]
+
+
+def refuse_unless_idle(node: Node, what: str) -> Operation[None]:
+    """Raise RequestError while something that was begun on this bus may still turn: `what` would end it half-way."""
+    now = yield from Pause(0)
+    if not node.memory.owed and node.memory.turning <= now:
+        return
+    begun = "a project that was started may still run" if node.memory.owed else "a move may not be over"
+    raise RequestError(
+        f"{begun}, so {what} is refused",
+        expected="its notice, or an accepted stop" if node.memory.owed else "its time, or an accepted stop",
+        cause="a busy controller ignores such an order, a stop ends whatever turns, and a notice does not say whose "
+        "end it tells",
+        advice="wait for it, or say stop() first; nothing was sent",
+        node=node.node,
+    )
 
 
 def refuse_unless_turning(node: Node, project: Project, verb: str) -> None:
@@ -120,7 +139,7 @@ def within(seconds: float, most: float, what: str) -> float:
         return seconds
     raise RequestError(
         f"{what}: {seconds!r} s is not possible",
-        expected=f"above 0, at most {most:g} s",
+        expected="above 0" + (f", at most {most:g} s" if most < inf else ""),
         advice="nothing was sent",
     )
 
@@ -135,4 +154,6 @@ def finite(value: float, what: str) -> float:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return -float_info.max <= value <= float_info.max

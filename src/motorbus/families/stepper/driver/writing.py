@@ -14,14 +14,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from motorbus.core.entry import Entry, Value, shown
+from motorbus.core.entry import Entry, Value
 from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver.commands import save_project
 from motorbus.families.stepper.driver.costs import Cost, Taken, taken
 from motorbus.families.stepper.driver.editing import (
+    FLAGS,
     Change,
     Readback,
     all_edits,
@@ -37,13 +38,13 @@ from motorbus.families.stepper.driver.editing import (
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.program import Conditions, Program
 from motorbus.families.stepper.table import (
-    BASE_NAMES,
     BLANK,
-    PROJECTS,
     RESERVED,
     STEPS,
     Edit,
     Project,
+    amended,
+    checked_project,
     refusals,
 )
 
@@ -80,9 +81,11 @@ class Difference(NamedTuple):
     """What would be written, and what that takes.
 
     `changes` are the parameters by name, step and both values; `edits` the commands for them, the one that selects the
-    project first; `reserved` the bytes of the image that no command writes and that are not as in the program, or not
-    0 when that was not read from a controller: by offset, what the controller has there. `cost` is that of writing it
-    as a whole, with the dumps before and after.
+    project first. Where a reading shows nothing to change, and edits of this host that were not saved are to be saved,
+    or undone unseen, `before` is the project as this host left it, and all of it is written. `reserved` are the bytes
+    of the image that no command writes and that are not as in the program, or not 0 when that was not read from a
+    controller: by offset, what the controller has there. `cost` is that of writing it as a whole, with the dumps
+    before and after.
     """
 
     project: int
@@ -112,6 +115,8 @@ class Planned(NamedTuple):
 class Written(NamedTuple):
     """What was written, and what is known of it.
 
+    `changes` were planned; `more` are what the read-back showed to differ as well, once the project was selected: edits
+    that were lost with that, another project's numbers, something that another program wrote; these were written too.
     `commands` that changed something and `dumps` that were read, `seconds` all of it took, `saved` whether it was
     saved now, `proof` how far that is known, `reserved` as in `Difference`.
     """
@@ -124,10 +129,20 @@ class Written(NamedTuple):
     saved: bool
     proof: Proof
     reserved: Mapping[int, int]
+    more: tuple[Change, ...] = ()
+
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """The parameters among those written that may belong to the device, and so have changed for all projects."""
+        return tuple(one.name for one in (*self.changes, *self.more) if one.name in FLAGS)
 
     def __str__(self) -> str:
         spent = Cost(self.commands, self.dumps, self.seconds)
-        return f"project {self.project}, {len(self.changes)} changed, {spent}: {self.proof.value}"
+        more = f" and {len(self.more)} more that the read-back showed to differ" if self.more else ""
+        shared = f" ({', '.join(self.shared)}: perhaps for all projects)" if self.shared else ""
+        return (
+            f"project {self.project}, {len(self.changes)} changed{more}{shared}, {spent}: {self.proof.value}"
+        )
 
 
 class Kept(NamedTuple):
@@ -158,10 +173,11 @@ def write_project(
 ) -> Operation[Written]:
     """Write a program into project 1 to 4, its own number when none is said, save it, and read it back.
 
-    Only what differs is sent, nothing when nothing does; rows behind its last step stay as they are. Unless it is to
-    `save`, a power cycle takes it away again. Edits of another project that were not saved are lost, for this selects
-    its own. While a project runs, what edits do to it is not known. `expert` writes what lint calls an error, never
-    what is out of range.
+    Only what differs is sent, nothing when nothing does; rows behind its last step stay as they are. All of it is sent
+    where this host has left edits of this project unsaved that are to be saved now, or that cannot be read and are to
+    be undone. Unless it is to `save`, a power cycle takes it away again. Edits of another project that were not saved
+    are lost, for this selects its own. While a project runs, what edits do to it is not known. `expert` writes what
+    lint calls an error, never what is out of range.
 
     An acknowledgement of the save that is lost is not believed to be either: unless what is stored can be read, all of
     it is written once more and saved once more, which does no harm, whereas saving alone would store another project
@@ -194,20 +210,22 @@ def written(
 ) -> Operation[Written]:
     """Bring a project that was just read to `meant` in all ten rows, and save it. Call it inside `Alone`."""
     plan = compared(node, found, meant, raw, save=save)
-    edited = Readback(found.image, "working", 0, 0)
-    if plan:
+    if not plan:
+        unread = Readback(found.image, "untold", 0, 0)
+        return (yield from _done(plan, unread, found.dumps, began, Proof.UNCHANGED))
+    alike = held(node, found.image, meant.number) == meant
+    if not alike:
         node.memory.unsaved = None
-        yield from Report(Planned(plan))
-        edited = yield from brought(node, found.image, meant)
-    elif not (save and node.memory.unsaved == meant):
-        return (yield from _done(plan, edited, found.dumps, began, Proof.UNCHANGED))
+    yield from Report(Planned(plan))
+    # nobody can ask which project is being edited: where the reading finds nothing to send, all of it is sent
+    edited = yield from brought(node, found.image, meant, every=alike)
     if not save:
         node.memory.unsaved = meant
         proof = Proof.NOT_SEEN if edited.view == "stored" else Proof.NOT_SAVED
         return (yield from _done(plan, edited, found.dumps, began, proof))
     kept = yield from saved(node, meant, edited)
     node.memory.unsaved = None
-    spent = Readback(kept.image, edited.view, edited.commands + kept.commands, edited.dumps + kept.dumps)
+    spent = edited._replace(commands=edited.commands + kept.commands, dumps=edited.dumps + kept.dumps)
     return (yield from _done(plan, spent, found.dumps, began, kept.proof, saved=True))
 
 
@@ -242,14 +260,19 @@ def _saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
 
 def compared(node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool) -> Difference:
     """How a project that was just read differs from `meant`."""
-    before = held(node, found.image, meant.number)
-    edits = tuple(edits_to(before, meant))
+    before, unsaved = held(node, found.image, meant.number), node.memory.unsaved
+    edits = edits_to(before, meant)
+    due = save if unsaved == meant else node.memory.shows_stored  # of what this host left unsaved
+    if not edits and due and unsaved is not None and unsaved.number == meant.number:
+        before, edits = unsaved, all_edits(meant)
     saves = 1 if save and edits else 0
     commands = 0 if not edits else len(all_edits(meant)) if node.memory.shows_stored else len(edits)
     dumps = found.dumps + (1 + saves if edits else 0)
     cost = found.tempo.cost(commands + saves, dumps, saves)
     reserved = unwritable(found.image, raw)
-    return Difference(meant.number, before, meant, tuple(changes(before, meant)), edits, reserved, cost)
+    return Difference(
+        meant.number, before, meant, tuple(changes(before, meant)), tuple(edits), reserved, cost
+    )
 
 
 def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
@@ -281,24 +304,21 @@ def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Op
     return (yield from written(node, found, meant, found.image, save=save, began=began))
 
 
-def amended(project: Project, raws: Mapping[str, int]) -> Project:
-    """The project with these rows different, by the names of the table."""
-    base: dict[str, Any] = {name: raw for name, raw in raws.items() if name in BASE_NAMES}
-    project = replace(project, **base)
-    for name, raw in raws.items():
-        if name not in BASE_NAMES:
-            _, number, field = name.split("_", 2)
-            project = project.with_step(int(number), **{field: raw})
-    return project
-
-
 def _done(
     plan: Difference, spent: Readback, before: int, began: float, proof: Proof, *, saved: bool = False
 ) -> Operation[Written]:
     now = yield from Pause(0)
     dumps = before + spent.dumps
     return Written(
-        plan.project, plan.changes, spent.commands, dumps, now - began, saved, proof, plan.reserved
+        plan.project,
+        plan.changes,
+        spent.commands,
+        dumps,
+        now - began,
+        saved,
+        proof,
+        plan.reserved,
+        spent.more,
     )
 
 
@@ -321,15 +341,6 @@ def _wanted(program: Program, project: int | None) -> tuple[int, Project]:
     for error in refusals(wanted, expert=True):
         raise error
     return number, wanted
-
-
-def checked_project(number: object) -> int:
-    """The number of a project, 1 to 4. Raises RequestError for anything else."""
-    if isinstance(number, int) and not isinstance(number, bool) and 1 <= number <= PROJECTS:
-        return number
-    raise RequestError(
-        f"there is no project {shown(number)}", expected=f"1 to {PROJECTS}", advice="nothing was sent"
-    )
 
 
 def _linted(program: Program, wanted: Project, expert: bool) -> None:

@@ -69,6 +69,7 @@ class Estimate:
     `cuts`     how often a stop input may end a motion early, so that it takes less
     `low`, `high`  the same in the readings of the acceleration, `readings` says each
     `stuck`    the first step that never ends by itself, 0 when each does
+    `settled_by`  what says how the acceleration is meant, so that there are no other readings; "" when nothing does
     """
 
     seconds: float
@@ -77,16 +78,21 @@ class Estimate:
     endless: bool
     readings: Mapping[str, float]
     stuck: int = 0
+    settled_by: str = ""
+
+    def settled(self, by: str) -> Estimate:
+        """The same where something, as a profile, says how the acceleration is meant: without a band."""
+        return replace(self, readings={}, settled_by=by)
 
     @property
     def low(self) -> float:
         """The shortest of the readings (s)."""
-        return min(self.seconds, *self.readings.values())
+        return min((self.seconds, *self.readings.values()))
 
     @property
     def high(self) -> float:
         """The longest of the readings (s)."""
-        return max(self.seconds, *self.readings.values())
+        return max((self.seconds, *self.readings.values()))
 
     def __str__(self) -> str:
         if self.stuck:
@@ -95,6 +101,8 @@ class Estimate:
         text = f"at least {duration(self.seconds)}{waits}" + (
             " for each pass, without an end" if self.endless else ""
         )
+        if self.settled_by:
+            text += f"; the acceleration is meant as {self.settled_by} says"
         if duration(self.low) != duration(self.high):
             text += f"; {duration(self.low)} to {duration(self.high)} if the acceleration is meant otherwise"
         if self.cuts:
@@ -113,6 +121,7 @@ class Estimate:
             "high": finite(self.high),
             "readings": {name: finite(seconds) for name, seconds in self.readings.items()},
             "never_ends_at_step": self.stuck or None,
+            "settled_by": self.settled_by or None,
         }
 
 

@@ -111,6 +111,12 @@ class Profile:
         found: dict[str, Any] = {name: value for name, value in self.settled.items() if name in _EXECUTION}
         return replace(base, **found)
 
+    @property
+    def settles_acceleration(self) -> bool:
+        """Whether it says per what the frequency grows, so that an estimate has no other readings."""
+        ramp = self.settled.get("ramp")
+        return ramp == "pulse" or (ramp == "time" and "ramp_tick_ms" in self.settled)
+
     def options(self) -> dict[str, Setting]:
         """The settled questions as options of a simulated controller that reads them alike."""
         return dict(self.settled)

@@ -19,7 +19,7 @@ from motorbus.families.stepper.table.codes import (
     after_step,
     step_output_of,
 )
-from motorbus.families.stepper.table.edits import Edit, edited, edits, edits_between
+from motorbus.families.stepper.table.edits import Edit, amended, edited, edits, edits_between
 from motorbus.families.stepper.table.image import (
     BLANK,
     Order,
@@ -40,7 +40,15 @@ from motorbus.families.stepper.table.orders import (
     REPLY,
     STORE,
 )
-from motorbus.families.stepper.table.project import EMPTY, PROJECTS, STEPS, Project, Step, with_steps
+from motorbus.families.stepper.table.project import (
+    EMPTY,
+    PROJECTS,
+    STEPS,
+    Project,
+    Step,
+    checked_project,
+    with_steps,
+)
 from motorbus.families.stepper.table.rows import (
     BASE,
     BASE_NAMES,
@@ -100,8 +108,10 @@ __all__ = [
     "after_port",
     "after_step",
     "allowed",
+    "amended",
     "check",
     "checked_order",
+    "checked_project",
     "decode_image",
     "differences",
     "dump_offset",

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table.project import STEPS, Project
-from motorbus.families.stepper.table.rows import BASE_NAMES
+from motorbus.families.stepper.table.rows import BASE_NAMES, TABLE
 
 _OF_PROJECT: Final = (
     "select_project",
@@ -75,6 +75,23 @@ def edited(project: Project, command: str, values: Mapping[str, int]) -> Project
     if "step" in values:
         return project.with_step(values["step"], **changes) if 1 <= values["step"] <= STEPS else project
     return replace(project, **changes)
+
+
+def amended(project: Project, raws: Mapping[str, int]) -> Project:
+    """The project with these numbers, by the names of the table, as `turn_distance` and `step_3_delay`.
+
+    Raises KeyError for a name that is none.
+    """
+    for name, raw in raws.items():
+        if name not in TABLE:
+            raise KeyError(name)
+        if name in BASE_NAMES:
+            own: dict[str, Any] = {name: raw}
+            project = replace(project, **own)
+        else:
+            _, step, field = name.split("_", 2)
+            project = project.with_step(int(step), **{field: raw})
+    return project
 
 
 def _values(project: Project, command: str, step: int = 0) -> dict[str, int]:

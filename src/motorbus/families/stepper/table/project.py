@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Final
 
+from motorbus.core.entry import shown
+from motorbus.errors import RequestError
 from motorbus.families.stepper.table.codes import ENDLESS, Direction
 
 STEPS: Final = 10
@@ -100,6 +102,15 @@ class Project:
     def is_cleared(self) -> bool:
         """Whether it has no steps to carry out."""
         return self.total_steps == 0
+
+
+def checked_project(number: object) -> int:
+    """The number of a project, 1 to 4. Raises RequestError for anything else."""
+    if isinstance(number, int) and not isinstance(number, bool) and 1 <= number <= PROJECTS:
+        return number
+    raise RequestError(
+        f"there is no project {shown(number)}", expected=f"1 to {PROJECTS}", advice="nothing was sent"
+    )
 
 
 def with_steps(project: Project, steps: tuple[Step, ...]) -> Project:

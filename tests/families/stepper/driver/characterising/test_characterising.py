@@ -125,8 +125,8 @@ def test_the_plan_can_be_seen_without_a_controller_and_is_what_is_done() -> None
 @pytest.mark.parametrize(
     ("wishes", "says"),
     [
-        ({"scratch": 5}, "scratch: there is no project 5"),
-        ({"scratch": 0}, "scratch: there is no project 0"),
+        ({"scratch": 5}, "there is no project 5"),
+        ({"scratch": 0}, "there is no project 0"),
         ({"travel": 0.4}, "travel: 0.4 turns"),
         ({"travel": float("nan")}, "travel: nan turns"),
         ({"travel": 1e3}, "travel: 1000.0 turns"),
@@ -195,7 +195,7 @@ def test_a_stop_of_somebody_else_ends_it_and_all_is_put_back() -> None:
         stored = dict(there.simulated.store.stored)
 
         def stop() -> None:
-            there.device.memory.stops += 1
+            there.device.memory.wanted += 1
 
         with pytest.raises(Interrupted) as ended:
             study(there, "started twice", stop)

@@ -6,7 +6,8 @@ import pytest
 
 from motorbus.errors import Interrupted, NoReply
 from motorbus.families.stepper.driver.characterising.experiments import Act, Motor
-from motorbus.families.stepper.driver.characterising.listening import FLAGS, listened, timed, write
+from motorbus.families.stepper.driver.characterising.listening import FLAGS, listened, write
+from motorbus.families.stepper.driver.exchanges import timed
 from motorbus.families.stepper.driver.reading import read_input
 from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.execution import Phase
@@ -43,7 +44,7 @@ def test_the_moments_of_answers_and_of_the_notice_are_told() -> None:
         assert second - first == pytest.approx(0.2, abs=0.02)
         assert heard.sent[1] - heard.sent[0] == pytest.approx(0.2, abs=0.02)
         assert [one - first for one in heard.notices] == pytest.approx([0.5], abs=0.02)
-        assert (device.memory.owed, device.memory.stops - device.memory.ends) == (False, 0)
+        assert (device.memory.owed, device.memory.wanted, device.memory.stops) == (False, 0, 1)
 
 
 def test_what_is_not_answered_is_told_and_no_error() -> None:

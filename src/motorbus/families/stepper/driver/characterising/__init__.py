@@ -28,10 +28,9 @@ from motorbus.core.operation import (
     outcome,
 )
 from motorbus.errors import LinkError, RequestError, VerificationFailed
-from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.characterising.experiments import Motor
 from motorbus.families.stepper.driver.characterising.findings import Case
-from motorbus.families.stepper.driver.characterising.listening import rested
 from motorbus.families.stepper.driver.characterising.study import (
     SELECTION,
     VIEWS,
@@ -42,7 +41,7 @@ from motorbus.families.stepper.driver.characterising.study import (
 from motorbus.families.stepper.driver.characterising.trials import controls, trials
 from motorbus.families.stepper.driver.editing import brought
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.reading import dump
+from motorbus.families.stepper.driver.stopping import ended
 from motorbus.families.stepper.driver.turning import refuse_unless_idle
 from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.table import (
@@ -52,6 +51,7 @@ from motorbus.families.stepper.table import (
     TABLE,
     Order,
     Project,
+    checked_project,
     decode_image,
     refusals,
     row_value,
@@ -90,8 +90,7 @@ def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Operat
     not read as it was written; Interrupted when somebody stops the controller meanwhile; OutcomeUnknown when a stop is
     not accepted: the motor may be turning then; whatever reading and writing raise on a line that is too bad.
     """
-    if scratch not in range(1, PROJECTS + 1):
-        raise _refused(f"scratch: there is no project {scratch!r}", f"1 to {PROJECTS}")
+    checked_project(scratch)
     if not (isfinite(travel) and LEAST_TRAVEL <= travel <= MOST_TRAVEL):
         raise _refused(f"travel: {travel!r} turns", f"{LEAST_TRAVEL:g} to {MOST_TRAVEL:g}")
     return (yield from Alone(_characterised(node, scratch, travel)))
@@ -134,13 +133,13 @@ def _refused(what: str, expected: str) -> RequestError:
 
 
 def _characterised(node: Node, scratch: int, travel: float) -> Operation[Profile]:
-    refuse_unless_idle(node, VERB)
+    yield from refuse_unless_idle(node, f"{VERB}()")
     _refuse_unsaved(node)
     yield from Report(Journal(VERB, ASKED, {"node": node.node}))
-    yield from rested(node)
+    yield from ended(node)
     stored: dict[int, bytes] = {}
     for number in range(1, PROJECTS + 1):
-        stored[number] = (yield from dump(node, number))[wire.REPLY_LENGTH :]
+        stored[number] = yield from reading.image(node, number)
     order = likely_order(tuple(stored.values()), node.order)
     home = _home(stored, order, scratch)
     here = Node(node.node, node.motor, order, node.memory)
@@ -183,7 +182,7 @@ def put_back(node: Node, image: bytes, facts: Mapping[str, Any], seen: bool = Fa
 
     `seen` says that reading shows what is edited: then every field is sent only where a reading says that it must be.
     """
-    yield from rested(node)
+    yield from ended(node)
     for left in reversed(range(TRIES)):
         told = yield from outcome(_edited_again(node, image, int(facts["project"]), seen))
         if told is None:
@@ -201,7 +200,7 @@ def _edited_again(node: Node, image: bytes, number: int, seen: bool) -> Operatio
 def _compared(node: Node, stored: Mapping[int, bytes]) -> Operation[None]:
     """See that all of them read as before. Raises VerificationFailed when one does not."""
     for number, image in stored.items():
-        now = (yield from dump(node, number))[wire.REPLY_LENGTH :]
+        now = yield from reading.image(node, number)
         if _carried_out(now, node.order) != _carried_out(image, node.order):
             raise VerificationFailed(
                 f"project {number} does not read as it did before the experiments",

@@ -10,7 +10,6 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import (
-    Answer,
     Exchange,
     Goal,
     Listen,
@@ -26,10 +25,10 @@ from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper.driver import goals
 from motorbus.families.stepper.driver.characterising.experiments import Act
 from motorbus.families.stepper.driver.commands import motion, nothing
-from motorbus.families.stepper.driver.exchanges import command
+from motorbus.families.stepper.driver.exchanges import command, timed
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import read_input
-from motorbus.families.stepper.driver.stopping import stop
+from motorbus.families.stepper.driver.stopping import ended
 from motorbus.families.stepper.driver.turning import Watch
 from motorbus.families.stepper.table import Edit, Project, edits
 
@@ -83,23 +82,16 @@ def listened(
 
     yield from outcome(read_input(node, 1))
     yield from Pause(QUIET)
-    wanted_stops = node.memory.stops - node.memory.ends
     node.memory.owed = True
     said, _ = yield from Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
-    if node.memory.stops - node.memory.ends != wanted_stops:
+    if watch.overtaken:
         raise Interrupted(
             "somebody stopped the controller during an experiment",
             advice="characterise it again when nobody else uses it",
         )
-    yield from rested(node)
+    yield from ended(node)
     sent, answered = said
     return Heard(sent, answered, tuple(notices))
-
-
-def rested(node: Node) -> Operation[None]:
-    """Stop it, and keep in mind that nobody else did."""
-    yield from stop(node)
-    node.memory.ends += 1
 
 
 def _listening(heard: Callable[[Notice], bool], seconds: float) -> Operation[Notice | None]:
@@ -138,24 +130,3 @@ def order(node: Node, watch: Watch, project: Project, name: str) -> Exchange[Non
 
 def _nowhere(node: Node) -> Goal:
     return Goal(node.node, "relative", 0.0, -float("inf"), float("inf"))
-
-
-def timed(exchange: Exchange[Any]) -> Exchange[float]:
-    """The same exchange, whose value is when its answer came (s)."""
-
-    def read(answer: Answer) -> float:
-        if exchange.read is not None:
-            exchange.read(answer)
-        return answer.at
-
-    return Exchange(
-        exchange.request,
-        exchange.replies,
-        read,
-        rank=exchange.rank,
-        effect=exchange.effect,
-        goals=exchange.goals,
-        timeout=exchange.timeout,
-        repeatable=exchange.repeatable,
-        refusal=exchange.refusal,
-    )

@@ -12,8 +12,9 @@ from motorbus.core.operation import Operation, Pause
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial
 from motorbus.families.stepper.driver.characterising.findings import Case
-from motorbus.families.stepper.driver.characterising.listening import Heard, listened, timed, write
+from motorbus.families.stepper.driver.characterising.listening import Heard, listened, write
 from motorbus.families.stepper.driver.characterising.trials import controls
+from motorbus.families.stepper.driver.exchanges import timed
 from motorbus.families.stepper.driver.reading import dump_once, read_input
 
 MARGIN: Final = 1.0

@@ -12,12 +12,11 @@ from typing import Any, Final
 
 from motorbus.core.operation import Operation
 from motorbus.errors import VerificationFailed
-from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.characterising.experiments import SLACK, SLACK_PART, Act
 from motorbus.families.stepper.driver.characterising.findings import Case
 from motorbus.families.stepper.driver.characterising.listening import FLAGS, listened, told, write
 from motorbus.families.stepper.driver.characterising.trials import controls
-from motorbus.families.stepper.driver.reading import dump
 from motorbus.families.stepper.table import (
     STEPS,
     TABLE,
@@ -38,11 +37,6 @@ _LONGEST: Final = 5.0
 """s of a stored pause that are waited for."""
 
 
-def image_of(case: Case, number: int) -> Operation[bytes]:
-    """The 220 bytes of a project as they read now."""
-    return (yield from dump(case.node, number))[wire.REPLY_LENGTH :]
-
-
 def view(case: Case) -> Operation[Project]:
     """Write a project and look whether it is shown, and in which order; gives that project.
 
@@ -55,7 +49,7 @@ def view(case: Case) -> Operation[Project]:
         if not any(shows(before, one.project, order) for order in ORDERS)
     )
     yield from write(case.node, project)
-    image = yield from image_of(case, case.scratch)
+    image = yield from reading.image(case.node, case.scratch)
     orders = [order for order in ORDERS if shows(image, project, order)]
     if len(orders) == 1:
         case.found.settle("read_view", "working", "a project that was edited and not saved reads as edited")
@@ -94,8 +88,8 @@ def flags(case: Case) -> Operation[None]:
         return
     mode = 1 - before[_STOP_MODE]
     yield from told(case.node, Edit("set_stop_mode", {"stop_mode": mode}))
-    theirs = yield from image_of(case, other)
-    own = yield from image_of(case, case.scratch)
+    theirs = yield from reading.image(case.node, other)
+    own = yield from reading.image(case.node, case.scratch)
     device = theirs[_STOP_MODE] == mode
     yield from told(
         case.node, Edit("set_stop_mode", {"stop_mode": before[_STOP_MODE] if device else mine & 1})
@@ -117,7 +111,7 @@ def select(case: Case, edited: Project) -> Operation[None]:
     other = case.other
     count = max(1, min(case.stored[other][1], STEPS))
     yield from told(case.node, _selection(other, count))
-    image = yield from image_of(case, other)
+    image = yield from reading.image(case.node, other)
     loaded = _without_flags(bytes((other, count)) + case.stored[other][2:])
     case.found.leave("select", f"project {other}, selected, reads neither as stored nor as what was edited")
     if _without_flags(image) == loaded:
