@@ -227,12 +227,19 @@ class _Columns:
             elif not isinstance(state, MotorbusError):
                 self._told |= {name: None for name in COLUMNS if getattr(state, name) is not None}
         shown = self._told or self._usual
-        return [name for name in COLUMNS if name in shown], [name for name in self._told if name not in COLUMNS]
+        return [name for name in COLUMNS if name in shown], [
+            name for name in self._told if name not in COLUMNS
+        ]
 
 
 def _grid(sample: Sample, output: Output, columns: _Columns) -> Any:
     names, others = columns.of(sample)
-    titles = [">id", *(COLUMNS[name] for name in names), *(name.replace("_", " ") for name in others), "alarm"]
+    titles = [
+        ">id",
+        *(COLUMNS[name] for name in names),
+        *(name.replace("_", " ") for name in others),
+        "alarm",
+    ]
     return output.grid(titles, [_row(node, state, names, others) for (_, node), state in sample.items()])
 
 

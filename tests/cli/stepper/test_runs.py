@@ -107,6 +107,7 @@ def test_a_profile_changes_what_is_predicted(
         words = ("stepper", "run", line.url, "--project", "1", "--yes", "--json", "--profile", str(profile))
         found = run(*words).document
     assert found["predicted"]["seconds"] == pytest.approx(1.8212, abs=1e-3)
+    assert found["predicted"]["settled_by"] == "ours.toml"
     assert found["seconds"] == pytest.approx(1.8212, rel=0.02)
 
 

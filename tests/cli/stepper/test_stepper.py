@@ -115,7 +115,9 @@ def test_nobody_looks_for_the_only_controller_of_a_line(command: str, run: Run, 
 
 def test_a_stop_leaves_at_once(run: Run, line: Line) -> None:
     assert run("stop", line.url).code == 0
-    assert line.commands() == ["read_project", "stop_project", "stop_motor"], "the first asks whether it echoes"
+    assert line.commands() == ["read_project", "stop_project", "stop_motor"], (
+        "the first asks whether it echoes"
+    )
 
 
 def test_where_it_cannot_go_is_told_without_its_number_too(run: Run, line: Line) -> None:

@@ -11,9 +11,9 @@ import pytest
 from motorbus.core.operation import ASKED, Journal, outcome
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Backup, Controller, Program
-from motorbus.families.stepper.driver.selecting import clear, is_blank
+from motorbus.families.stepper.driver.selecting import EditsLost, clear, is_blank, select
 from motorbus.families.stepper.driver.writing import Proof
-from motorbus.families.stepper.table import Project
+from motorbus.families.stepper.table import Project, decode_image
 from tests.families.stepper.bench import Tampering, bench
 from tests.families.stepper.written import KINDS, LONGER, PICK, named, program, stored
 
@@ -63,10 +63,24 @@ def test_a_cleared_one_is_not_selected() -> None:
 def test_one_that_keeps_another_projects_numbers_is_told() -> None:
     with bench(select="relabel") as there:
         there.simulated.put(2, PICK)
-        with pytest.raises(VerificationFailed, match="does not read as before") as told:
+        with pytest.raises(VerificationFailed, match="reads as project 1 does") as told:
             there.device.select(2)
         assert "save nothing now" in told.value.advice
         assert stored(there.simulated, 2) == PICK
+
+
+def test_edits_that_selecting_loses_are_told_and_no_error() -> None:
+    told: list[object] = []
+    with bench() as there:
+        there.simulated.put(2, PICK)
+        there.device.write(project=2, step_1_delay=0.75, save=False)
+        assert there.bus.run(select(there.device, 2), told.append) == PICK.total_steps
+        (lost,) = [one for one in told if isinstance(one, EditsLost)]
+        assert lost.project == 2
+        assert [(one.name, one.before) for one in lost.changes] == [("step_1_delay", 0.75)]
+        assert decode_image(there.simulated.store.working) == replace(PICK, number=2)
+        with pytest.raises(RequestError, match="left unsaved"):
+            there.device.save(2)
 
 
 @pytest.mark.parametrize("project", [0, 5, -1, "2", True, 1.0, None])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from motorbus.families.stepper import Sends
+from motorbus.families.stepper import EditsLost, Sends
 
 
 def say(event: object) -> str:
@@ -13,4 +13,7 @@ def say(event: object) -> str:
     if isinstance(event, Sends) and isinstance(event.request, bytes):
         sent = event.request.hex(" ").upper()
         return f"to find out who is there, this is sent and nothing else: {sent} (read project 1)"
+    if isinstance(event, EditsLost):
+        lost = "; ".join(map(str, event.changes))
+        return f"selecting project {event.project} has loaded what is stored of it; edits not saved are lost: {lost}"
     return ""

@@ -180,7 +180,7 @@ def _help(name: str) -> str:
     else:
         own = EXAMPLES[name]
         between = " " if len(start) + len(own) < _WIDTH else " \\\n        "
-        shown = [f"{start}/dev/ttyUSB0 \\\n        {own} --project 2", f"{start}sim{between}{own}"]
+        shown = [f"{start}sim{between}{own}", f"{start}/dev/ttyUSB0 \\\n        {own} --project 2"]
         more = _SELECTED
     note = f"{order.note.capitalize()}.\n" if order.note else ""
     return _EXPLAINED.format(note=note, more=more, examples="\n".join(shown))

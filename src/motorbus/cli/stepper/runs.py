@@ -11,7 +11,7 @@ from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
 from motorbus.cli.stepper.controller import BusName, BusOption, ProjectNumber, carried_out, numbers_in, verb
 from motorbus.cli.stepper.files import app
-from motorbus.cli.stepper.profiles import ProfileFile, how_of
+from motorbus.cli.stepper.profiles import ProfileFile, how_of, settled
 from motorbus.cli.target import face
 from motorbus.core import units
 from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown
@@ -103,7 +103,9 @@ def run(
         what=f"project {project}", consent=agreed, dry_run=dry_run,
         rehearse=verb("start_project", project, **chosen), hear=partial(heard, progress, output),
     )  # fmt: skip
-    return Exit.OK if told is None else _ended(project, told, output)
+    if told is None:
+        return Exit.OK
+    return _ended(project, told._replace(predicted=settled(told.predicted, profile)), output)
 
 
 @app.command(

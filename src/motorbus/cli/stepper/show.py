@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,8 @@ from typing import TYPE_CHECKING
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.parameters import Silent
-from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, reading
+from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, reading, settler
+from motorbus.cli.stepper.profiles import settled
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
@@ -64,13 +66,15 @@ def show(
         raise RequestError(f"--passes {passes} is not possible", expected="1 or more")
     if output_ is not None and len(files) > 1:
         raise RequestError(f"one picture of {len(files)} programs", expected="--output with one program")
-    how = reading(readings, "show")
+    how, by = reading(readings, "show"), settler(readings)
     programs, worst = each(files, dump_order, output)
     for file, program in programs:
         if output_ is not None:
             _draw(program, how, output_, wait, passes)
         drawn = f"{output_}{_part(program, passes)}" if output_ else ""
-        _show(file, program, how, output_, drawn, output)
+        plan = program.plan(how)
+        plan = replace(plan, estimate=settled(plan.estimate, by))
+        _show(file, program, plan, output_, drawn, output)
     return worst
 
 
@@ -81,10 +85,7 @@ def _part(program: Program, passes: int) -> str:
     return f": {passes} pass{'es' if passes > 1 else ''} of an endless program"
 
 
-def _show(
-    file: Path, program: Program, how: Behaviour, picture: Path | None, drawn: str, output: Output
-) -> None:
-    plan = program.plan(how)
+def _show(file: Path, program: Program, plan: Plan, picture: Path | None, drawn: str, output: Output) -> None:
     facts = {"file": str(file), **{name: value for name, value in plan.data().items() if name != "schema"}}
     output.document("motorbus.stepper.plan/1", {**facts, "picture": str(picture) if picture else None})
     if not plan.order:

@@ -39,7 +39,7 @@ from motorbus.families.stepper.driver.reading import (
 from motorbus.families.stepper.driver.recovery import recover
 from motorbus.families.stepper.driver.running import run, start_project
 from motorbus.families.stepper.driver.scanning import Sends, scan
-from motorbus.families.stepper.driver.selecting import clear, save, select
+from motorbus.families.stepper.driver.selecting import EditsLost, clear, save, select
 from motorbus.families.stepper.driver.stopping import Promise, stop
 from motorbus.families.stepper.driver.waiting import Outcome, Ran
 from motorbus.families.stepper.driver.writing import (
@@ -58,6 +58,7 @@ __all__ = [
     "Controller",
     "Cost",
     "Difference",
+    "EditsLost",
     "Estimated",
     "Experiment",
     "Homed",

@@ -8,13 +8,15 @@ single move and homing with it. So each reads the project first, and again when 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
-from motorbus.core.operation import Alone, Operation, Pause, outcome
+from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken
 from motorbus.families.stepper.driver.editing import (
+    Change,
+    changes,
     differs,
     held,
     noted,
@@ -24,19 +26,28 @@ from motorbus.families.stepper.driver.editing import (
     selected,
 )
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.reading import image
 from motorbus.families.stepper.driver.writing import Proof, Written, unwritable, written
-from motorbus.families.stepper.table import Project, checked_project, decode_image
+from motorbus.families.stepper.table import PROJECTS, Project, checked_project, decode_image, encode_image
 
 JOGS: Final = 1
 """The project whose step 1 says how manual motion goes."""
 
 
+class EditsLost(NamedTuple):
+    """An event: selecting a project has loaded what is stored of it, and these edits of it were not saved."""
+
+    project: int
+    changes: tuple[Change, ...]
+
+
 def select(node: Node, project: int) -> Operation[int]:
-    """Select a project, 1 to 4, without changing it; gives how many steps it has.
+    """Select a project, 1 to 4, without changing what is stored of it; gives how many steps it has.
 
     It is read before, for the command says how many steps there are, and read after. Edits that were not saved are
-    lost. Raises RequestError for one that has been cleared, which has none to say; VerificationFailed when it does not
-    read as before: then this controller goes on editing another project's numbers under this number.
+    lost, and reported as `EditsLost`. Raises RequestError for one that has been cleared, which has none to say;
+    VerificationFailed when it reads as another project does: then this controller goes on editing that one's numbers
+    under this number.
     """
     checked_project(project)
     return (yield from Alone(_selected(node, project)))
@@ -53,14 +64,26 @@ def _selected(node: Node, project: int) -> Operation[int]:
             node=node.node,
         )
     yield from selected(node, before)
-    image, _ = yield from read_back(node, before)
-    if held(node, image, project) != before:
-        raise differs(
-            node, image, before, f"project {project} was selected and does not read as before",
-            "save nothing now; write_project writes whole projects on such a controller, and a power cycle brings back "
-            "what is stored",
-        )  # fmt: skip
+    shown = held(node, (yield from read_back(node, before))[0], project)
+    if shown != before:
+        yield from _told_apart(node, before, shown)
     return before.total_steps
+
+
+def _told_apart(node: Node, before: Project, shown: Project) -> Operation[None]:
+    """It reads otherwise once it is selected: its own edits were lost, or what is edited is another project's."""
+    others = [number for number in range(1, PROJECTS + 1) if number != before.number]
+    for number in others:
+        theirs = decode_image((yield from image(node, number)), node.order)
+        if replace(theirs, number=before.number, total_steps=before.total_steps) == shown:
+            raise differs(
+                node, encode_image(shown, node.order), before,
+                f"project {before.number} was selected and reads as project {number} does",
+                "save nothing now; write_project writes whole projects on such a controller, and a power cycle brings "
+                "back what is stored",
+            )  # fmt: skip
+    node.memory.unsaved = None
+    yield from Report(EditsLost(before.number, tuple(changes(before, shown))))
 
 
 def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written]:
@@ -101,15 +124,15 @@ def _saved_as_is(node: Node, project: int) -> Operation[Written]:
     before = held(node, found.image, project)
     note = f"project {project} was being saved: what it holds is not known; read it"
     yield from noted(commands.save_project(node, project), note)
-    image, dumps = yield from noted(read_back(node, before), note)
-    if held(node, image, project) != before:
+    now, dumps = yield from noted(read_back(node, before), note)
+    if held(node, now, project) != before:
         raise differs(
-            node, image, before, f"project {project} was saved and does not read as before",
+            node, now, before, f"project {project} was saved and does not read as before",
             "another project was being edited, or this controller shows what is stored; write it if it is not as meant",
         )  # fmt: skip
     ended = yield from Pause(0)
     spent = found.dumps + dumps
-    return Written(project, (), 1, spent, ended - began, True, Proof.ACKNOWLEDGED, unwritable(image, b""))
+    return Written(project, (), 1, spent, ended - began, True, Proof.AS_BEFORE, unwritable(now, b""))
 
 
 def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]:
@@ -145,11 +168,10 @@ def cleared(node: Node, project: int) -> Operation[tuple[int, int]]:
     """Clear a project and read it; gives how many commands and dumps that took. Call it inside `Alone`."""
     note = f"project {project} was being cleared: it may hold what it held, or nothing"
     tries = yield from noted(_until_cleared(node, project), note)
-    image, dumps = yield from noted(read_until(node, project, is_blank), note)
-    shown = decode_image(image, node.order)
-    if not is_blank(shown):
+    now, dumps = yield from noted(read_until(node, project, is_blank), note)
+    if not is_blank(decode_image(now, node.order)):
         raise differs(
-            node, image, Project(), f"project {project} was cleared and does not read as cleared",
+            node, now, Project(), f"project {project} was cleared and does not read as cleared",
             "what was read is what the controller shows now; clear it again",
         )  # fmt: skip
     if node.memory.unsaved is not None and node.memory.unsaved.number == project:

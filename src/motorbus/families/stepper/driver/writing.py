@@ -71,6 +71,10 @@ class Proof(Enum):
         "it read like this already, so nothing was written; edits that somebody else made and did not save read the "
         "same, and a power cycle takes those away"
     )
+    AS_BEFORE = (
+        "saving was acknowledged, and the project reads as before; whether that is what was meant nobody here knows, "
+        "and that it is stored is proved by a power cycle only"
+    )
     CLEARED = (
         "clearing was acknowledged, and the project reads as cleared; that it stays so is proved by a power cycle "
         "only"
