@@ -176,6 +176,14 @@ def test_frames_are_explained_without_their_framing(
     assert "status packet" not in shown
 
 
+def test_that_nothing_is_withheld_is_told(arm: Simulation, capsys: pytest.CaptureFixture[str]) -> None:
+    with motorbus.open(arm.url) as bus:
+        rehearsal = DryBus(bus)
+        Servo(rehearsal, 1).read("torque_limit")
+        dry.show(rehearsal, Output())
+    assert capsys.readouterr().out == "nothing that changes anything would be sent\n"
+
+
 def test_a_field_that_says_its_name_is_named_once(capsys: pytest.CaptureFixture[str]) -> None:
     with motorbus.simulate("kst", ids="0x25", profile="xqpower") as simulation:
         with motorbus.open(simulation.url) as bus:

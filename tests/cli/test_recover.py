@@ -240,7 +240,7 @@ def lent() -> Iterator[Simulation]:
 def test_a_borrowed_project_is_called_by_its_name(run: Run, lent: Simulation) -> None:
     asked = run("recover", lent.url)
     assert asked.code == 8
-    assert "finish the borrow of project 1 (for jog), or take it back" in asked.err
+    assert "end the borrow of project 1 (for jog): stop the device, and give back what was there" in asked.err
     ran = run("recover", lent.url, "--yes", "--json")
     assert ran.code == 0, ran.err
     assert ran.document == {
@@ -254,6 +254,11 @@ def test_a_borrowed_project_is_called_by_its_name(run: Run, lent: Simulation) ->
         "simulated": True,
     }
     assert run("recover", lent.url).out == f"simulated\nnothing is unfinished on {lent.url}\n"
+
+
+def test_what_was_borrowed_is_given_back_and_not_finished(run: Run, lent: Simulation) -> None:
+    ran = run("recover", lent.url, "--yes")
+    assert ran.out.splitlines() == ["simulated", "given back: the borrow of project 1 (for jog)"]
 
 
 def test_a_dry_run_of_giving_back_shows_the_stop_first(run: Run, lent: Simulation) -> None:

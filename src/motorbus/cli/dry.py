@@ -178,10 +178,12 @@ def _answering(exchange: Exchange[Any]) -> set[int]:
 
 
 def show(dry: DryBus, output: Output) -> None:
-    """Print what was withheld, each frame explained."""
+    """Print what was withheld, each frame explained; that there was nothing, where that is so."""
     explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.family.explain(frame)]
     facts = [{**frames.facts(one.data, dry.family), "meaning": meaning} for one, meaning in explained]
     output.document("motorbus.dry-run/1", {"withheld": facts})
+    if not explained:
+        output.text("nothing that changes anything would be sent")
     for one, meaning in explained:
         output.text(f"would send {frames.shown(one.data, dry.family)}\n           {meaning}")
 

@@ -21,7 +21,8 @@ app = App(
     usage="Usage: motorbus home BUS#ID [OPTIONS]",
     help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the
 switch is not met before the deadline it is stopped, and the command ends with
-exit code 8. Ctrl-C stops it too.
+exit code 8. Ctrl-C stops it too. But the controller knows no end of it: if this
+program is killed, it goes on homing; keep a switch in the supply within reach.
 
 A stepper controller homes in reverse, with the speed of step 1 of its project
 1, until its input 5 is active. Is it active beforehand, then it stands on the
@@ -29,10 +30,10 @@ switch or the switch is stuck, and nothing moves.
 
 Examples:
 
-    motorbus home stepper:/dev/ttyUSB0#1
-    motorbus home stepper:/dev/ttyUSB0#1 --deadline 20s --velocity 30rpm --yes
-    motorbus home stepper:/dev/ttyUSB0#1 --dry-run
-    motorbus home stepper:sim,home_switch=wired#1 --yes""",
+    motorbus home stepper:/dev/ttyUSB0
+    motorbus home stepper:/dev/ttyUSB0 --deadline 20s --velocity 30rpm --yes
+    motorbus home stepper:/dev/ttyUSB0 --dry-run
+    motorbus home stepper:sim,home_switch=wired --yes""",
 )
 
 

@@ -38,7 +38,7 @@ Examples:
     motorbus monitor feetech:/dev/ttyACM0
     motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
     motorbus monitor kst:can://slcan/dev/ttyACM0,listen_only=yes --listen
-    motorbus monitor stepper:/dev/ttyUSB0#1 --rate 4
+    motorbus monitor stepper:/dev/ttyUSB0 --rate 4
     motorbus monitor feetech:sim,ids=1-2#1+2 --count 3 --json""",
 )
 

@@ -96,7 +96,7 @@ def recover(
         if dry_run:
             _rehearsed(opening, change, output, **extra)
             return Exit.OK
-        consent_to(f"finish {_called(change)}, or take it back", output, yes=yes)
+        consent_to(_ending(change), output, yes=yes)
         outcome = carried_out(
             opening, change.node, "recover", change.verb, change.facts, output=output, **extra
         )
@@ -153,7 +153,7 @@ def _nothing(bus: str, output: Output) -> Exit:
 
 def _told(bus: str, change: Change, outcome: str, output: Output, family: Family | None = None) -> Exit:
     """What has become of it; with its family, how the device is addressed now, if that has changed."""
-    told = {"new": "finished", "old": "taken back"}.get(outcome, outcome)
+    told = {"new": "finished", "old": "given back" if change.what else "taken back"}.get(outcome, outcome)
     there = {"address": _address(bus, change, family)} if family and outcome == "new" else {}
     output.document(SCHEMA, {"bus": bus, **_facts(change), "outcome": outcome, **there})
     output.text(f"{told}: {_called(change)}" + "".join(f"; it is {one} now" for one in there.values()))
@@ -209,6 +209,13 @@ def _facts(change: Change) -> dict[str, object]:
     }
     node = change.facts.get("node")
     return {"bus": change.bus, "change": change.verb, "id": node, **known, "begun": change.begun}
+
+
+def _ending(change: Change) -> str:
+    """What is about to be done. What a family calls by its own words is a loan, which nobody can finish."""
+    if change.what:
+        return f"end {change.what}: stop the device, and give back what was there"
+    return f"finish {_called(change)}, or take it back"
 
 
 def _called(change: Change) -> str:

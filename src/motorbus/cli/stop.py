@@ -23,7 +23,7 @@ Examples:
 
     motorbus stop feetech:/dev/ttyACM0#3
     motorbus stop feetech:/dev/ttyACM0
-    motorbus stop stepper:/dev/ttyUSB0#1""",
+    motorbus stop stepper:/dev/ttyUSB0""",
 )
 
 

@@ -1,4 +1,4 @@
-"""The commands of this family are there as if it were whole: until it has a driver, discovery passes it over."""
+"""A simulated controller in virtual time for the commands of this family, and what it has heard."""
 
 from __future__ import annotations
 
@@ -9,20 +9,12 @@ from typing import Any, NamedTuple
 import pytest
 
 import motorbus
-from motorbus.cli import faces
 from motorbus.core.operation import Data, Effect
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.simulation.named import Simulation
 
 EXAMPLE = str(Path(__file__).resolve().parents[3] / "examples" / "pick_and_place.toml")
-
-
-@pytest.fixture(autouse=True)
-def whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The face of this family beside the others."""
-    names = sorted({*faces.names(), "stepper"})
-    monkeypatch.setattr(faces, "names", lambda: names)
 
 
 class Line(NamedTuple):

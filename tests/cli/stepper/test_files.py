@@ -10,6 +10,7 @@ import pytest
 from motorbus.cli.stepper.files import CONCERNED, loaded, reading
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
+from motorbus.families.stepper.program.backups import Backup
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
 from tests.families.stepper.vectors import DUMP_B
@@ -40,6 +41,16 @@ def test_what_is_none_is_refused_with_its_name(tmp_path: Path, name: str, data: 
     with pytest.raises(RequestError, match=says) as caught:
         loaded(path)
     assert name in caught.value.summary
+
+
+@pytest.mark.parametrize("command", ["check FILE", "estimate FILE", "diff FILE BUS", "write FILE BUS --yes"])
+def test_a_backup_is_called_one_and_its_command_is_named(command: str, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "controller.toml"
+    path.write_text(Backup(dumps={2: DUMP_B}).text(), encoding="utf-8")
+    ran = run("stepper", *command.replace("FILE", str(path)).replace("BUS", "stepper:/dev/not-there").split())
+    assert (ran.code, ran.err.count("is a backup of a controller")) == (2, 1)
+    assert f"`motorbus stepper restore {path} BUS --dry-run`" in ran.err
+    assert "there is no field" not in ran.err
 
 
 def test_readings_are_switches_by_their_names() -> None:

@@ -97,6 +97,13 @@ def test_a_speed_that_is_more_than_a_tenth_off_is_refused(rpm: float) -> None:
     assert "rad/s" in caught.value.expected
 
 
+@pytest.mark.parametrize(("rpm", "cause"), [(-3, "not above 0"), (0, "not above 0"), (1.5, "10 % off")])
+def test_a_refused_speed_says_why(rpm: float, cause: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        whole_rpm(rpm * tau / 60)
+    assert cause in caught.value.cause
+
+
 def test_a_refused_speed_names_its_neighbours() -> None:
     with pytest.raises(RequestError) as caught:
         whole_rpm(1.5 * tau / 60)

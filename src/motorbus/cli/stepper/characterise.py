@@ -27,8 +27,8 @@ Where = Annotated[Path | None, Parameter(name="FILE", help="Where the profile go
 
 @app.command(
     usage="Usage: motorbus stepper characterise BUS FILE [OPTIONS]",
-    help_epilogue="""TAKE THE LOAD OFF THE MOTOR FIRST. It turns now and then for about two
-minutes, by up to 240 RPM and --travel turns each way, and is timed by the
+    help_epilogue="""TAKE THE LOAD OFF THE MOTOR FIRST. It turns now and then for a minute
+and a half, by up to 240 RPM and --travel turns each way, and is timed by the
 notices of its runs. Nothing is saved: in the end every project reads as
 before, and a power cycle brings the same. If this is cut off, `motorbus
 recover` puts it back.
@@ -74,7 +74,7 @@ def characterise(
     if file is not None and file.exists():
         consent_to(f"replace {file}", output, yes=yes or dry_run)
     question = (
-        f"turn the motor by up to {travel:g} turns each way for about two minutes, with its load taken off"
+        f"turn the motor by up to {travel:g} turns each way for about a minute and a half, with its load taken off"
     )
     found: Profile | None = carried_out(
         bus,

@@ -25,9 +25,9 @@ a form cannot hold is told on stderr.
 
 Examples:
 
-    motorbus stepper convert backup/project1.bin > project1.toml
     motorbus stepper convert examples/pick_and_place.toml --to frames
-    motorbus stepper convert pick.toml --to dump --output pick.bin""",
+    motorbus stepper convert examples/pick_and_place.toml --to dump --output pick.bin
+    motorbus stepper convert pick.bin > pick.toml""",
 )
 def convert(
     file: File,

@@ -17,6 +17,7 @@ from motorbus.cli.stepper.profiles import how_of
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
+from motorbus.families.stepper.program.backups import is_backup
 from motorbus.families.stepper.table import checked_order
 
 NAME: Final = "stepper"
@@ -71,8 +72,18 @@ def loaded(path: Path, order: str = "little") -> Program:
     except UnicodeDecodeError as error:
         raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
     except RequestError as error:
+        if is_text and is_backup(data.decode()):
+            raise _backup(path) from None
         error.summary = f"{path}: {error.summary}"
         raise
+
+
+def _backup(path: Path) -> RequestError:
+    return RequestError(
+        f"{path} is a backup of a controller, and no program",
+        expected="a program (.toml), or a dump of one project",
+        advice=f"`motorbus stepper restore {path} BUS --dry-run` shows what differs from it; nothing was sent",
+    )
 
 
 def each(files: tuple[Path, ...], order: str, output: Output) -> tuple[list[tuple[Path, Program]], Exit]:

@@ -163,7 +163,8 @@ def _show(name: str, told: Any, output: Output) -> None:
 
 @app.command(
     usage="Usage: motorbus stepper home BUS [OPTIONS]",
-    help_epilogue="""The same as `motorbus home BUS#1`.
+    help_epilogue="""The same as `motorbus home BUS`. If this program is killed, the controller goes
+on homing.
 
 Examples:
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.program import Program
-from motorbus.families.stepper.program.backups import Backup
+from motorbus.families.stepper.program.backups import Backup, is_backup
 from motorbus.families.stepper.table import Project
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
 
@@ -35,6 +35,13 @@ def test_whatever_it_holds_it_comes_back(images: dict[int, bytes], order: str, m
     said = "".join(letter for letter in made if letter.isprintable())
     whole = Backup(dumps=dumps, order="big" if order == "big" else "little", made=said)
     assert Backup.parse(whole.text()) == whole
+
+
+def test_a_file_is_told_for_one_though_it_is_damaged() -> None:
+    assert is_backup(TEXT)
+    assert is_backup(TEXT.replace("sha256", "sum"))
+    for other in ("", "format = 1", 'kind = "another"', "[", f"a = {'9' * 5000}", "[" * 5000):
+        assert not is_backup(other)
 
 
 def test_it_can_be_read() -> None:

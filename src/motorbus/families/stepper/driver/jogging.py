@@ -67,7 +67,7 @@ class Moved(NamedTuple):
     def __str__(self) -> str:
         rpm = abs(self.velocity) * 60 / tau
         return (
-            f"estimated: {self.angle:.6g} rad at {self.velocity:.6g} rad/s ({rpm:.0f} RPM), {self.seconds:.1f} s "
+            f"estimated: {self.angle:.6g} rad at {self.velocity:.6g} rad/s ({rpm:.0f} RPM), {self.seconds:.3f} s "
             "at most; nothing tells where the motor stands"
         )
 
@@ -238,7 +238,7 @@ def whole_rpm(velocity: float) -> int:
             if 0 < one <= _WORD
         )
         or f"above 0, at most {_WORD * tau / 60:.6g} rad/s",
-        cause="the nearest is more than 10 % off",
+        cause="the nearest is more than 10 % off" if exact > 0 else "it is not above 0",
         advice="choose one of these, or move_by() an angle; nothing was sent",
     )
 

@@ -7,7 +7,7 @@ of inputs that somebody asked for; that it ends, in whatever way, stops nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from math import inf
 from typing import Final, NamedTuple
 
@@ -201,17 +201,17 @@ def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
 
 def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
     plan = yield from _ready(node, asked)
-    yield from _begin(node, plan, lambda: watch.overtaken)
+    yield from _begin(node, plan, watch)
     return plan
 
 
-def _begin(node: Node, plan: Plan, called_off: Callable[[], bool]) -> Operation[float]:
+def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
     """Send it; when it was acknowledged (s). It may run from the moment it leaves."""
     memory, number, left = node.memory, plan.project.number, True
 
     def overtaken(_: Stops) -> MotorbusError | None:
         nonlocal left
-        left = not called_off()
+        left = not watch.overtaken
         return None if left else _overtaken(number)
 
     where = goals.of_project(node, plan.project, plan.how)
@@ -274,7 +274,7 @@ def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Oper
     course.levels = Levels((yield from inputs(node, course.ports)))
     course.wait = wait = Wait(node.memory, plan, (yield from Pause(0)), course.timeout)
     try:
-        wait.begun((yield from _begin(node, plan, lambda: watch.overtaken or course.failed)))
+        wait.begun((yield from _begin(node, plan, watch)))
     except _UNHEARD as error:
         wait.unacknowledged(error)
 

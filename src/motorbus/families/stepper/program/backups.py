@@ -82,6 +82,14 @@ class Backup:
         )
 
 
+def is_backup(source: str) -> bool:
+    """Whether the text of a file says that it is one, damaged or not."""
+    try:
+        return tomllib.loads(source).get("kind") == KIND
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError):
+        return False
+
+
 def _head(backup: Backup) -> Iterator[str]:
     yield "# What a stepper controller has stored. `dump` is what counts, comments are for reading."
     yield f"format = {FORMAT}"
