@@ -138,6 +138,8 @@ def test_every_unit_of_the_api_has_a_quantity_whose_unit_it_is() -> None:
         (200 * pi, "position", "deg", "36000 deg"),
         (0.0, "position", "deg", "0 deg"),
         (1.25, "position", "rad", "1.25 rad"),
+        (-2.0, "position", "deg", "-2 rad"),
+        (0.123456789012345, "length", "mm", "123.456789012345 mm"),
         (0.03, "length", "mm", "30 mm"),
         (0.5, "load", "%", "50 %"),
     ],
@@ -146,7 +148,9 @@ def test_a_value_is_written_as_people_would(value: float, quantity: str, unit: s
     assert written(value, quantity, unit) == text
 
 
-@given(st.floats(-1e6, 1e6), st.sampled_from([(kind, unit) for kind in sorted(SCALES) for unit in SCALES[kind]]))
+@given(
+    st.floats(-1e6, 1e6), st.sampled_from([(kind, unit) for kind in sorted(SCALES) for unit in SCALES[kind]])
+)
 def test_what_is_written_is_read_as_the_same_number(value: float, said: tuple[str, str]) -> None:
     quantity, unit = said
     assert parse(written(value, quantity, unit), quantity) == value

@@ -2,8 +2,8 @@
 
 The API knows one unit per quantity (rad, rad/s, rad/s², A, V, °C, s, a plain fraction for load, and m, m/s, m/s² for
 what a linear axis does), so that numbers can be passed on without asking. People say `90deg`, `30rpm` and `5 mm`; this
-is where the one becomes the other, and nowhere else. A number without a unit is in the API's unit. Raw counts are another thing than a quantity and
-are only ever taken as such: see `raw`.
+is where the one becomes the other, and nowhere else. A number without a unit is in the API's unit. Raw counts are
+another thing than a quantity and are only ever taken as such: see `raw`.
 """
 
 from __future__ import annotations
@@ -74,6 +74,8 @@ QUANTITIES: Mapping[str, str] = {
 """Which quantity a unit of the API (the unit of a table row) measures."""
 
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
+_LONG = 16
+"""Characters; a number with its unit that has as many is no number that a person wrote."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
 _FACTORS = {"k": 1000, "M": 1_000_000}
@@ -135,15 +137,21 @@ def show(value: float, quantity: str) -> str:
 def written(value: float, quantity: str, unit: str) -> str:
     """A value in the API's unit, for a file: the fewest digits in `unit` that `parse` reads as the same number.
 
-    In the API's own unit where no digits in `unit` do. Raises KeyError for
-    a unit that is none of `quantity`.
+    In the API's own unit where that is shorter by far, as 2 rad is, or where no digits in `unit` do. Raises KeyError
+    for a unit that is none of `quantity`.
     """
+    api = next(name for name, scale in SCALES[quantity].items() if scale == 1.0)
+    own, plain = _fewest(value, quantity, unit), f"{_plain(value)} {api}"
+    return own if own and (len(own) < _LONG or len(own) <= len(plain)) else plain
+
+
+def _fewest(value: float, quantity: str, unit: str) -> str:
     number = value / SCALES[quantity][unit]
     for digits in range(1, 18):
         text = f"{_plain(float(f'{number:.{digits}g}'))} {unit}"
         if parse(text, quantity) == value:
             return text
-    return f"{_plain(value)} {next(name for name, scale in SCALES[quantity].items() if scale == 1.0)}"
+    return ""
 
 
 def _plain(number: float) -> str:
