@@ -5,9 +5,14 @@ Each refusal names the key to change, and what it disagrees with.
 
 from __future__ import annotations
 
+from typing import Final
+
 from motorbus.motion.machine.keys import AXIS
 from motorbus.motion.machine.model import HIGHEST_NODE, AxisSpec, Description
 from motorbus.motion.machine.refusal import listed, nearest, path, refused
+
+OUTSIDE: Final = "change it, or low and high of its axis"
+ADD_AXIS: Final = "add a table [axis.NAME] for it, or take the name out"
 
 
 def check(machine: Description) -> None:
@@ -47,10 +52,12 @@ def _devices(machine: Description) -> None:
                 where,
                 f"there is no bus {axis.bus}",
                 listed(machine.buses, "a bus of the file, as [bus.arm]"),
-                nearest(axis.bus, machine.buses),
+                nearest(
+                    axis.bus, machine.buses, f"add a table [bus.{axis.bus}], or change the name before #"
+                ),
             )
         if axis.node > HIGHEST_NODE:
-            raise refused(where, f"{axis.node} is no id", f"0 to {HIGHEST_NODE}")
+            raise refused(where, f"{axis.node} is no id", f"0 to {HIGHEST_NODE}", "give the id of the device")
         device = axis.bus, axis.node
         if device in seen:
             raise refused(
@@ -65,7 +72,10 @@ def _devices(machine: Description) -> None:
 def _unit(name: str, axis: AxisSpec) -> None:
     choices = AXIS["unit"].choices(axis.linear)
     if axis.unit not in choices:
-        raise refused(path("axis", name, "unit"), f"{axis.unit} is not possible", listed(choices))
+        why = f"{axis.unit} is not possible"
+        raise refused(
+            path("axis", name, "unit"), why, listed(choices), f"unit = {AXIS['unit'].example[axis.linear]}"
+        )
 
 
 def _limits(name: str, axis: AxisSpec) -> None:
@@ -74,12 +84,18 @@ def _limits(name: str, axis: AxisSpec) -> None:
         return
     if low is None or high is None:
         missing, there = ("low", "high") if low is None else ("high", "low")
-        raise refused(path("axis", name, missing), f"is missing, and {there} is there", "both, or none")
+        raise refused(
+            path("axis", name, missing),
+            f"is missing, and {there} is there",
+            "both, or none",
+            f"add {missing}, or take {there} out",
+        )
     if low == high:
         raise refused(
             path("axis", name, "high"),
             f"it is {axis.show(high)} like low, and leaves the axis no way",
             f"more than {axis.show(low)}",
+            "set it higher, or leave both out",
         )
     if low > high:
         raise refused(
@@ -93,9 +109,11 @@ def _limits(name: str, axis: AxisSpec) -> None:
 def _leaving(name: str, axis: AxisSpec) -> None:
     where = path("axis", name, "park")
     if axis.exit == "park" and axis.park is None:
-        raise refused(where, 'is missing, and exit is "park"', f'park = "0 {axis.unit}", or another exit')
+        raise refused(
+            where, 'is missing, and exit is "park"', f'park = "0 {axis.unit}", or another exit', "add it"
+        )
     if axis.park is not None and not axis.allows(axis.park):
-        raise refused(where, f"{axis.show(axis.park)} is outside the limits", _range(axis))
+        raise refused(where, f"{axis.show(axis.park)} is outside the limits", _range(axis), OUTSIDE)
 
 
 def _caps(name: str, axis: AxisSpec) -> None:
@@ -114,7 +132,7 @@ def _groups(machine: Description) -> None:
                     where,
                     f"there is no axis {axis[:40]}",
                     listed(machine.axes, "an axis of the file"),
-                    nearest(axis, machine.axes),
+                    nearest(axis, machine.axes, ADD_AXIS),
                 )
             if axis in group.axes[:place]:
                 raise refused(where, f"{axis} is named twice", "each axis once", "take one of them out")
@@ -126,7 +144,7 @@ def _poses(machine: Description) -> None:
             spec = machine.axes[axis]
             if not spec.allows(position):
                 where = path("pose", name, axis)
-                raise refused(where, f"{spec.show(position)} is outside the limits", _range(spec))
+                raise refused(where, f"{spec.show(position)} is outside the limits", _range(spec), OUTSIDE)
 
 
 def _range(axis: AxisSpec) -> str:

@@ -43,7 +43,10 @@ def edited(
         keys = place.split(".")
         if not all(keys) or len(keys) > _DEEPEST:
             raise refused(
-                path(place), "this is no place in the file", "as axis.shoulder.zero, pose.ready or name"
+                path(place),
+                "this is no place in the file",
+                "axis.shoulder.zero, pose.ready, name",
+                "name one",
             )
         for where, leaf in list(_leaves(wanted, keys, value)):
             _put_plain(wanted, where, leaf)
@@ -61,12 +64,16 @@ def renamed(text: str, place: str, name: str, *, check_address: CheckAddress | N
     kind, _, old = place.partition(".")
     known = [f"{one}.{each}" for one in KINDS for each in wanted.get(one, {})]
     if place not in known:
-        raise refused(path(kind, old), "there is nothing of this name", listed(known), nearest(place, known))
+        raise refused(
+            path(place), "there is nothing of this name", listed(known), nearest(place, known, "name one")
+        )
     if name in wanted[kind] or not re.fullmatch(NAME, name):
         why = (
             f"{kind}.{name} is there already" if name in wanted[kind] else "the new name has other characters"
         )
-        raise refused(place, why, "a lower case letter, then lower case letters, digits, _ and -")
+        raise refused(
+            place, why, "a lower case letter, then lower case letters, digits, _ and -", "give another name"
+        )
     document = _document("".join(_renamed_lines(text, kind, old, name)))
     wanted[kind] = {name if one == old else one: table for one, table in wanted[kind].items()}
     for data in (wanted, document):
@@ -132,7 +139,7 @@ def _put_plain(data: Data, keys: list[str], value: Any) -> None:
     for depth, key in enumerate(tables, start=1):
         here = here.setdefault(key, {})
         if not isinstance(here, dict):
-            raise refused(path(*keys[:depth]), "this is no table", f"a table [{'.'.join(tables)}]")
+            raise refused(path(*keys[:depth]), "this is no table", f"a table [{'.'.join(tables)}]", BY_HAND)
     if value is None and last not in here:
         raise refused(
             path(*keys), "it is not there, and cannot be taken out", listed(here), nearest(last, here)
@@ -163,7 +170,9 @@ def _put(document: TOMLDocument, keys: list[str], value: Any) -> None:
             here.append(last, value)
             _body(here).extend(rest)
     except (TOMLKitError, ValueError, TypeError) as error:
-        raise refused(path(*keys), f"this cannot stand in a file: {error}", "text or a number") from None
+        raise refused(
+            path(*keys), f"this cannot stand in a file: {error}", "text, a number", "give one"
+        ) from None
 
 
 def _begin(parent: Any, name: str, *, is_super: bool) -> None:

@@ -24,7 +24,7 @@ class Key(NamedTuple):
 
     `says` is its meaning, `hint` what msgspec checks it by and `meta` the range in it, `default` in the API's unit
     (NODEFAULT where there is none), `measure` its quantity and `usual` the default as people write it, on a turning and
-    on a linear axis, "" where there is none.
+    on a linear axis, "" where there is none. `example` is a value in TOML on each of the two.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Key(NamedTuple):
     default: Any
     measure: Measure | None
     usual: tuple[str, str]
+    example: tuple[str, str]
 
     @property
     def needed(self) -> bool:
@@ -56,18 +57,22 @@ class Key(NamedTuple):
         return tuple(units.SCALES[self.measure.of(linear)]) if self.measure else ()
 
     def range(self, linear: bool) -> str:
-        """What it may be, in words: `above 0, at most 1 fraction`; "" where its type says all."""
+        """What it may be, in words: `above 0, at most 1000 A`; "" where its type says all."""
         meta, parts = self.meta, []
         parts += [f"above {meta.gt:.10g}"] if meta.gt is not None else []
         parts += [f"at least {meta.ge:.10g}"] if meta.ge is not None else []
         parts += [f"at most {meta.le:.10g}"] if meta.le is not None else []
-        unit = f" {api_unit(self.measure.of(linear))}" if self.measure else ""
-        return f"{', '.join(parts)}{unit}" if parts else ""
+        unit = api_unit(self.measure.of(linear)) if self.measure else ""
+        return " ".join([", ".join(parts), unit]).strip() if parts else ""
 
 
 def api_unit(quantity: str) -> str:
-    """The unit in which the API has it: `rad` for position."""
-    return next(unit for unit, measured in units.QUANTITIES.items() if measured == quantity)
+    """The unit in which the API has it: `rad` for position, "" for load, which is a plain fraction."""
+    return (
+        ""
+        if quantity == "load"
+        else next(unit for unit, measured in units.QUANTITIES.items() if measured == quantity)
+    )
 
 
 def _keys(kind: type[Struct]) -> Mapping[str, Key]:
@@ -79,7 +84,8 @@ def _key(one: structs.FieldInfo, hint: Any) -> Key:
     meta: Meta = get_args(hint)[1]
     extra = meta.extra or {}
     default = one.default if one.default_factory is NODEFAULT else one.default_factory()
-    return Key(one.encode_name, meta.description or "", hint, meta, default, extra["measure"], extra["usual"])
+    given = extra["measure"], extra["usual"], extra["example"]
+    return Key(one.encode_name, meta.description or "", hint, meta, default, *given)
 
 
 def _annotated(hint: Any) -> Any:

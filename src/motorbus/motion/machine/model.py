@@ -55,18 +55,85 @@ LOAD: Final = Measure("load", "load")
 
 
 def _key(
-    says: str, measure: Measure | None = None, *, usual: tuple[str, str] = ("", ""), **rest: Any
+    says: str,
+    example: str | tuple[str, str],
+    measure: Measure | None = None,
+    *,
+    usual: tuple[str, str] = ("", ""),
+    **rest: Any,
 ) -> Meta:
-    """One key: what it says, which quantity it is, and what it usually is on a turning and on a linear axis."""
-    return Meta(description=says, extra={"measure": measure, "usual": usual}, **rest)
+    """One key: what it says, an example in TOML, which quantity it is, and what it usually is.
+
+    Pairs are for an axis that turns and for a linear one. `rest` is its range.
+    """
+    examples = (example, example) if isinstance(example, str) else example
+    return Meta(description=says, extra={"example": examples, "measure": measure, "usual": usual}, **rest)
 
 
 class BusSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A bus: where it is."""
 
     address: Annotated[
-        str, _key("FAMILY:PORT, options after commas, as for `motorbus scan`", pattern=f"^{ADDRESS}$")
+        str,
+        _key(
+            "where the bus is: FAMILY:PORT, options after commas",
+            '"feetech:/dev/ttyACM0,baud=1000000"',
+            pattern=f"^{ADDRESS}$",
+        ),
     ]
+
+
+Zero: TypeAlias = Annotated[
+    float,
+    _key("angle of the device at which the axis is at 0", '"180 deg"', ANGLE, ge=-FARTHEST, le=FARTHEST),
+]
+Sign: TypeAlias = Annotated[Literal[1, -1], _key("-1 where the axis turns against the device", "-1")]
+Gear: TypeAlias = Annotated[
+    float, _key("turns of the device for one turn of the axis", "3.0", ge=1e-6, le=1e6)
+]
+Travel: TypeAlias = Annotated[
+    float, _key("makes the axis linear: its way for one turn", '"5 mm"', LENGTH, ge=1e-6, le=1e3)
+]
+Low: TypeAlias = Annotated[
+    float,
+    _key("lowest position; needs `high`", ('"-90 deg"', '"0 mm"'), POSITION, ge=-FARTHEST, le=FARTHEST),
+]
+High: TypeAlias = Annotated[
+    float,
+    _key("highest position; needs `low`", ('"90 deg"', '"120 mm"'), POSITION, ge=-FARTHEST, le=FARTHEST),
+]
+MaxVelocity: TypeAlias = Annotated[
+    float,
+    _key(
+        "it is never faster", ('"120 deg/s"', '"50 mm/s"'), VELOCITY,
+        usual=("90 deg/s", "50 mm/s"), gt=0, le=FARTHEST,
+    ),
+]  # fmt: skip
+MaxAcceleration: TypeAlias = Annotated[
+    float,
+    _key(
+        "it never starts or stops harder", ('"500 deg/s2"', '"200 mm/s2"'), ACCELERATION,
+        usual=("360 deg/s2", "200 mm/s2"), gt=0, le=FARTHEST,
+    ),
+]  # fmt: skip
+MaxStep: TypeAlias = Annotated[
+    float,
+    _key(
+        "farthest that one command may be from the measured position", ('"10 deg"', '"2 mm"'), POSITION,
+        gt=0, le=FARTHEST,
+    ),
+]  # fmt: skip
+Park: TypeAlias = Annotated[
+    float,
+    _key(
+        'where parking goes; needed with exit = "park"', ('"0 deg"', '"0 mm"'), POSITION,
+        ge=-FARTHEST, le=FARTHEST,
+    ),
+]  # fmt: skip
+Torque: TypeAlias = Annotated[float, _key("cap of its torque; not with `current`", "0.5", LOAD, gt=0, le=1)]
+Current: TypeAlias = Annotated[
+    float, _key("cap of its current; not with `torque`", '"0.4 A"', CURRENT, gt=0, le=1e3)
+]
 
 
 class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -76,59 +143,21 @@ class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     together, the limits of the device hold alone.
     """
 
-    device: Annotated[str, _key("what moves it: BUS#ID", pattern=f"^{DEVICE}$")]
-    zero: Annotated[
-        float,
-        _key("angle of the device at which the axis is at 0", ANGLE, ge=-FARTHEST, le=FARTHEST),
-    ] = 0.0
-    sign: Annotated[Literal[1, -1], _key("-1 where the axis turns against the device")] = 1
-    gear: Annotated[float, _key("turns of the device for one turn of the axis", ge=1e-6, le=1e6)] = 1.0
-    travel: (
-        Annotated[
-            float, _key("makes it a linear axis: its way for one turn of the axis", LENGTH, ge=1e-6, le=1e3)
-        ]
-        | None
-    ) = None
-    unit: Annotated[Unit, _key("how people see its positions", usual=("deg", "mm"))]
-    low: (
-        Annotated[float, _key("lowest position; needs `high`", POSITION, ge=-FARTHEST, le=FARTHEST)] | None
-    ) = None
-    high: (
-        Annotated[float, _key("highest position; needs `low`", POSITION, ge=-FARTHEST, le=FARTHEST)] | None
-    ) = None
-    max_velocity: Annotated[
-        float,
-        _key("never faster than this", VELOCITY, usual=("90 deg/s", "50 mm/s"), gt=0, le=FARTHEST),
-    ]
-    max_acceleration: Annotated[
-        float,
-        _key(
-            "never a harder start or stop",
-            ACCELERATION,
-            usual=("360 deg/s2", "200 mm/s2"),
-            gt=0,
-            le=FARTHEST,
-        ),
-    ]
-    max_step: (
-        Annotated[
-            float,
-            _key("farthest that one command may be from the measured position", POSITION, gt=0, le=FARTHEST),
-        ]
-        | None
-    ) = None
-    exit: Annotated[Exit, _key("what it does when the program ends, however that comes")] = "hold"
-    park: (
-        Annotated[
-            float,
-            _key('where parking goes; needed with `exit = "park"`', POSITION, ge=-FARTHEST, le=FARTHEST),
-        ]
-        | None
-    ) = None
-    torque: Annotated[float, _key("cap of its torque; not with `current`", LOAD, gt=0, le=1)] | None = None
-    current: Annotated[float, _key("cap of its current; not with `torque`", CURRENT, gt=0, le=1e3)] | None = (
-        None
-    )
+    device: Annotated[str, _key("what moves it: BUS#ID", '"arm#1"', pattern=f"^{DEVICE}$")]
+    zero: Zero = 0.0
+    sign: Sign = 1
+    gear: Gear = 1.0
+    travel: Travel | None = None
+    unit: Annotated[Unit, _key("how people see its positions", ('"deg"', '"mm"'), usual=("deg", "mm"))]
+    low: Low | None = None
+    high: High | None = None
+    max_velocity: MaxVelocity
+    max_acceleration: MaxAcceleration
+    max_step: MaxStep | None = None
+    exit: Annotated[Exit, _key("what it does when the program ends, however that comes", '"hold"')] = "hold"
+    park: Park | None = None
+    torque: Torque | None = None
+    current: Current | None = None
 
     # -- which device ------------------------------------------------------------------------------------------
 
@@ -204,25 +233,27 @@ class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class GroupSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A group: axes that are moved together under one name."""
 
-    axes: Annotated[tuple[str, ...], _key("names of its axes, in order", min_length=1)]
+    axes: Annotated[
+        tuple[str, ...], _key("names of its axes, in order", '["shoulder", "elbow"]', min_length=1)
+    ]
 
 
 class Description(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """All that a file says; tables by name, in the order of the file."""
 
-    name: Annotated[str, _key("what people call the machine", max_length=200)] = ""
-    buses: Annotated[Mapping[str, BusSpec], _key("a table [bus.NAME] for each bus")] = field(
+    name: Annotated[str, _key("what people call the machine", '"bench"', max_length=200)] = ""
+    buses: Annotated[Mapping[str, BusSpec], _key("a table [bus.NAME] for each bus", "[bus.arm]")] = field(
         name="bus", default_factory=dict
     )
-    axes: Annotated[Mapping[str, AxisSpec], _key("a table [axis.NAME] for each axis")] = field(
-        name="axis", default_factory=dict
+    axes: Annotated[Mapping[str, AxisSpec], _key("a table [axis.NAME] for each axis", "[axis.shoulder]")] = (
+        field(name="axis", default_factory=dict)
     )
-    groups: Annotated[Mapping[str, GroupSpec], _key("a table [group.NAME] for each group")] = field(
-        name="group", default_factory=dict
-    )
+    groups: Annotated[
+        Mapping[str, GroupSpec], _key("a table [group.NAME] for each group", "[group.left]")
+    ] = field(name="group", default_factory=dict)
     poses: Annotated[
         Mapping[str, Mapping[str, float]],
-        _key("a table [pose.NAME] for each pose: positions by the names of axes"),
+        _key("a table [pose.NAME] for each pose: positions by the names of axes", "[pose.ready]"),
     ] = field(name="pose", default_factory=dict)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
@@ -17,9 +17,9 @@ from motorbus.core import units
 from motorbus.core.entry import is_number
 from motorbus.errors import RequestError
 from motorbus.motion.machine import keys
-from motorbus.motion.machine.agreement import check
+from motorbus.motion.machine.agreement import ADD_AXIS, check
 from motorbus.motion.machine.keys import Key
-from motorbus.motion.machine.model import FORMAT, NAME, AxisSpec, BusSpec, Description, GroupSpec, Measure
+from motorbus.motion.machine.model import FORMAT, NAME, AxisSpec, BusSpec, Description, GroupSpec
 from motorbus.motion.machine.refusal import listed, nearest, path, refused, said
 
 CheckAddress: TypeAlias = Callable[[str], object]
@@ -30,7 +30,9 @@ EXAMPLES: Final = {
     "device": 'BUS#ID, as "arm#1" or "arm#0x25"',
     "name": "text in quotes, 200 characters at most",
 }
+LIST: Final = 'axes = ["shoulder", "elbow"]'
 IN_QUOTES: Final = 'text stands in quotes, and so does a number with its unit: "90 deg"'
+HEADS: Final = "write [axis.shoulder] on a line of its own, and its keys below"
 ONCE: Final = "each [table] stands in a file once, and each key in its table once"
 
 
@@ -58,17 +60,19 @@ def read(text: str, check_address: CheckAddress | None = None) -> Description:
 def toml(text: str) -> dict[str, Any]:
     """The plain data of a text. Raises RequestError, with line and column where they are known."""
     if len(text) > LONGEST:
-        raise refused("", f"the file has {len(text)} characters", f"{LONGEST} at most")
+        raise refused(
+            "", f"the file has {len(text)} characters", f"{LONGEST} at most", "see that it is the right one"
+        )
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError as error:
         why = str(error)
+        advice = ONCE if "overwrite" in why or "twice" in why else IN_QUOTES
     except RecursionError:
-        why = "it is nested too deeply"
+        why, advice = "it is nested too deeply", "no key needs a list in a list"
     except ValueError:  # Python reads no number of more than 4300 digits
-        why = "a number has thousands of digits"
-    twice = "overwrite" in why or "twice" in why
-    raise refused("", f"the file is no TOML: {why}", "TOML", ONCE if twice else IN_QUOTES)
+        why, advice = "a number has thousands of digits", "write fewer; 15 are enough"
+    raise refused("", f"the file is no TOML: {why}", "TOML", advice)
 
 
 def _format(data: Mapping[str, Any]) -> None:
@@ -76,23 +80,21 @@ def _format(data: Mapping[str, Any]) -> None:
     if "format" not in data:
         raise refused("format", "is missing", f"format = {FORMAT}", "make it the first line of the file")
     if type(found) is not int or found != FORMAT:
-        raise refused(
-            "format",
-            f"{said(found)} is not known",
-            f"format = {FORMAT}",
-            "a newer motorbus may read it: update motorbus, or write the file anew",
-        )
+        newer = type(found) is int and found > FORMAT
+        advice = "a newer motorbus may read it: update motorbus" if newer else f"write format = {FORMAT}"
+        raise refused("format", f"{said(found)} is not known", f"format = {FORMAT}", advice)
 
 
 def _tables(data: Mapping[str, Any], kind: str) -> list[tuple[str, Mapping[str, Any]]]:
     """The tables of one kind by their names, which are good ones."""
     tables = data.get(kind, {})
     if not isinstance(tables, dict):
-        raise refused(kind, f"{said(tables)} is no table", f"tables [{kind}.NAME]")
+        raise refused(kind, f"{said(tables)} is no table", f"tables [{kind}.NAME]", HEADS)
     for name, table in tables.items():
         _name(kind, name)
         if not isinstance(table, dict):
-            raise refused(path(kind, name), f"{said(table)} is no table", f"a table [{kind}.{name}]")
+            where, table_ = path(kind, name), f"a table [{kind}.{name}]"
+            raise refused(where, f"{said(table)} is no table", table_, HEADS)
     return list(tables.items())
 
 
@@ -105,14 +107,16 @@ def _name(kind: str, name: str) -> None:
         path(kind, name),
         "the name has other characters, or too many" if name else "the name is empty",
         "a lower case letter, then lower case letters, digits, _ and -, 40 at most",
-        f"call it {better}" if fits else "",
+        f"call it {better}" if fits else "call it by a word, as left-arm",
     )
 
 
 def _known(table: Mapping[str, Any], known: Iterable[str], *where: str) -> None:
     for key in table:
         if key not in known:
-            raise refused(path(*where, key), "there is no such key", listed(known), nearest(key, known))
+            raise refused(
+                path(*where, key), "there is no such key", listed(known), nearest(key, known, "take it out")
+            )
 
 
 # -- its tables ----------------------------------------------------------------------------------------------------
@@ -140,16 +144,15 @@ def _axis(name: str, table: Mapping[str, Any]) -> AxisSpec:
 
 def _group(name: str, table: Mapping[str, Any]) -> GroupSpec:
     _known(table, keys.GROUP, "group", name)
-    where, example = path("group", name, "axes"), 'axes = ["shoulder", "elbow"]'
-    axes = table.get("axes")
+    where, axes = path("group", name, "axes"), table.get("axes")
     if not isinstance(axes, list):
         what = "is missing" if "axes" not in table else f"{said(axes)} is no list"
-        raise refused(where, what, f"names of axes: {example}")
+        raise refused(where, what, LIST, "put the names of its axes into a list")
     for place, axis in enumerate(axes):
         if not isinstance(axis, str):
-            raise refused(f"{where}[{place}]", f"{said(axis)} is no name", f"names of axes: {example}")
+            raise refused(f"{where}[{place}]", f"{said(axis)} is no name", LIST, "names stand in quotes")
     if not axes:
-        raise refused(where, "it names no axis", f"names of axes: {example}")
+        raise refused(where, "it names no axis", LIST, "name one, or take the group out")
     return GroupSpec(axes=tuple(axes))
 
 
@@ -161,76 +164,99 @@ def _pose(name: str, table: Mapping[str, Any], axes: Mapping[str, AxisSpec]) -> 
 
 def _axes_of(table: Mapping[str, Any], axes: Mapping[str, AxisSpec], *where: str) -> None:
     if not table:
-        raise refused(path(*where), "it names no axis", 'positions by the names of axes: shoulder = "10 deg"')
+        expected = 'positions by the names of axes: shoulder = "10 deg"'
+        raise refused(path(*where), "it names no axis", expected, "name one, or take the pose out")
     for axis in table:
         if axis not in axes:
             raise refused(
                 path(*where, axis),
                 "there is no such axis",
                 listed(axes, "an axis of the file"),
-                nearest(axis, axes),
+                nearest(axis, axes, ADD_AXIS),
             )
 
 
 # -- one field -----------------------------------------------------------------------------------------------------
 
 
+class Place(NamedTuple):
+    """A field that is being read: its key, where it stands, what is written there, on which kind of axis."""
+
+    key: Key
+    where: str
+    written: Any
+    linear: bool
+
+    @property
+    def quantity(self) -> str:
+        """What it measures; "" where it is no quantity."""
+        return self.key.measure.of(self.linear) if self.key.measure else ""
+
+    @property
+    def example(self) -> str:
+        """A line that could stand there."""
+        return f"{self.key.name} = {self.key.example[self.linear]}"
+
+    def refused(self, what: str, expected: str, advice: str = "") -> RequestError:
+        """The error for it; without better advice it gives an example and says what the key means."""
+        return refused(self.where, what, expected, advice or f"write {self.example}, {self.key.says}")
+
+
 def _value(table: Mapping[str, Any], key: Key, where: tuple[str, ...], *, linear: bool = False) -> Any:
     """The value of one field in the API's unit, or its default."""
-    place = path(*where, key.name)
     if key.name not in table and key.needed:
-        raise refused(place, "is missing", EXAMPLES[key.name])
+        advice = f"add it to [{path(*where)}]"
+        raise refused(path(*where, key.name), "is missing", EXAMPLES[key.name], advice)
     if key.name not in table and not any(key.usual):
         return key.default
-    written = table.get(key.name, key.usual[linear])
-    if key.measure is None:
-        return _plain(written, key, place, linear)
-    return _within(_number(written, key, place, linear), written, key, place, linear)
+    place = Place(key, path(*where, key.name), table.get(key.name, key.usual[linear]), linear)
+    if place.quantity:
+        return _within(_amount(place), place)
+    if key.choices(linear):
+        return _choice(place)
+    if key.kind is float and not is_number(place.written):
+        raise place.refused(f"{said(place.written)} is no finite number", f"a number {key.range(linear)}")
+    return _within(place.written, place)
 
 
-def _plain(written: Any, key: Key, place: str, linear: bool) -> Any:
-    """A field that is no quantity: a word of several, a number, or text of a certain form."""
-    choices = key.choices(linear)
-    if choices:
-        return _choice(written, key, place, linear)
-    if key.kind is float and not is_number(written):
-        raise refused(place, f"{said(written)} is no finite number", f"a number {key.range(linear)}")
-    return _within(written, written, key, place, linear)
-
-
-def _choice(written: Any, key: Key, place: str, linear: bool) -> Any:
-    choices = key.choices(linear)
+def _choice(place: Place) -> Any:
+    """One word or number of several."""
+    written, choices = place.written, place.key.choices(place.linear)
     for choice in choices:
         if type(written) is type(choice) and written == choice:
             return choice
-    advice = _other_kind(linear) if key.name == "unit" and written in key.choices(not linear) else ""
-    if isinstance(written, str) and not advice:
-        advice = nearest(written, (str(choice) for choice in choices))
-    raise refused(place, f"{said(written)} is not possible", listed(map(str, choices)), advice)
+    advice = ""
+    if isinstance(written, str):
+        other = written in place.key.choices(not place.linear)
+        advice = _other_kind(place.linear) if other else nearest(written, map(str, choices))
+    raise place.refused(f"{said(written)} is not possible", listed(map(str, choices)), advice)
 
 
-def _number(written: Any, key: Key, place: str, linear: bool) -> float:
-    assert key.measure is not None
-    quantity = key.measure.of(linear)
+def _amount(place: Place) -> float:
+    """A quantity in the API's unit, from a number or from text with a unit."""
+    written, quantity = place.written, place.quantity
     if isinstance(written, str):
         try:
             return units.parse(written, quantity)
         except RequestError as error:
-            advice = _other_kind(linear) if _fits(written, key.measure, not linear) else ""
-            raise refused(place, error.summary, error.expected, advice) from None
+            advice = _other_kind(place.linear) if _fits_other(place) else ""
+            raise place.refused(error.summary, error.expected, advice) from None
     if is_number(written):
         return float(written)
-    unit = next(iter(units.SCALES[quantity]))
-    expected = f'a finite number in {keys.api_unit(quantity)}, or with its unit in quotes, as "10 {unit}"'
-    raise refused(place, f"{said(written)} is no {quantity}", expected)
+    unit = f"number in {keys.api_unit(quantity)}" if keys.api_unit(quantity) else "fraction of 1"
+    raise place.refused(f"{said(written)} is no {quantity}", f"a finite {unit}, or with its unit in quotes")
 
 
-def _fits(written: str, measure: Measure, linear: bool) -> bool:
+def _fits_other(place: Place) -> bool:
+    """Whether it would be right on the other kind of axis."""
+    measure = place.key.measure
+    if measure is None or measure.turning == measure.linear:
+        return False
     try:
-        units.parse(written, measure.of(linear))
+        units.parse(place.written, measure.of(not place.linear))
     except RequestError:
         return False
-    return measure.turning != measure.linear
+    return True
 
 
 def _other_kind(linear: bool) -> str:
@@ -239,13 +265,16 @@ def _other_kind(linear: bool) -> str:
     return 'an axis is linear when it has travel = "5 mm", its way for one turn'
 
 
-def _within(value: Any, written: Any, key: Key, place: str, linear: bool) -> Any:
+def _within(value: Any, place: Place) -> Any:
+    key, written = place.key, said(place.written)
     try:
         return msgspec.convert(value, key.hint)
     except msgspec.ValidationError:
-        range_ = key.range(linear)
+        range_ = key.range(place.linear)
     if range_:
-        raise refused(place, f"{said(written)} is out of range", range_)
+        percent = place.quantity == "load" and is_number(place.written) and 1 < place.written <= 100
+        advice = f'for {written} % write "{written} %"' if percent else ""
+        raise place.refused(f"{written} is out of range", range_, advice)
     what = {"address": "bus address", "device": "device", "name": "name of a machine"}[key.name]
-    advice = "ids stand in an axis" if key.name == "address" and "#" in str(written) else ""
-    raise refused(place, f"{said(written)} is no {what}", EXAMPLES[key.name], advice)
+    advice = "take # and the id out: it stands in an axis" if key.name == "address" and "#" in written else ""
+    raise place.refused(f"{written} is no {what}", EXAMPLES[key.name], advice)

@@ -19,10 +19,10 @@ def path(*keys: str) -> str:
     return ".".join(key if _BARE.fullmatch(key) else shown(key).replace("'", '"') for key in keys)
 
 
-def refused(where: str, what: str, expected: str, advice: str = "") -> RequestError:
-    """The error for what stands at `where`."""
-    told = f"{advice}; nothing was opened" if advice else "nothing was opened"
-    return RequestError(f"{where}: {what}" if where else what, expected=expected, advice=told)
+def refused(where: str, what: str, expected: str, advice: str) -> RequestError:
+    """The error for what stands at `where`; `advice` is what to do about it."""
+    summary = f"{where}: {what}" if where else what
+    return RequestError(summary, expected=expected, advice=f"{advice}; nothing was opened")
 
 
 def said(value: Any) -> str:
@@ -34,10 +34,10 @@ def said(value: Any) -> str:
     return shown(value) if isinstance(value, str | int | float) else shown(str(value))
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """`did you mean shoulder?`, or "" when nothing is near."""
+def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """`did you mean shoulder?`, or `otherwise` when nothing is near."""
     near = get_close_matches(word.lower()[:80], sorted(known), n=1)
-    return f"did you mean {near[0]}?" if near else ""
+    return f"did you mean {near[0]}?" if near else otherwise
 
 
 def listed(words: Iterable[str], otherwise: str = "none") -> str:
