@@ -5,14 +5,16 @@ Each refusal names the key to change, and what it disagrees with.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
+from motorbus.core.entry import shown
+from motorbus.errors import RequestError
 from motorbus.motion.machine.keys import AXIS
 from motorbus.motion.machine.model import HIGHEST_NODE, AxisSpec, Description
 from motorbus.motion.machine.refusal import listed, nearest, path, refused
 
 OUTSIDE: Final = "change it, or low and high of its axis"
-ADD_AXIS: Final = "add a table [axis.NAME] for it, or take the name out"
 
 
 def check(machine: Description) -> None:
@@ -128,20 +130,23 @@ def _groups(machine: Description) -> None:
         for place, axis in enumerate(group.axes):
             where = f"{path('group', name, 'axes')}[{place}]"
             if axis not in machine.axes:
-                raise refused(
-                    where,
-                    f"there is no axis {axis[:40]}",
-                    listed(machine.axes, "an axis of the file"),
-                    nearest(axis, machine.axes, ADD_AXIS),
-                )
+                raise no_axis(where, axis, machine.axes)
             if axis in group.axes[:place]:
                 raise refused(where, f"{axis} is named twice", "each axis once", "take one of them out")
+
+
+def no_axis(where: str, axis: str, axes: Mapping[str, AxisSpec]) -> RequestError:
+    """The error for a name that no axis has."""
+    advice = nearest(axis, axes, "add a table [axis.NAME] for it, or take the name out")
+    return refused(where, f"there is no axis {shown(axis)}", listed(axes, "an axis of the file"), advice)
 
 
 def _poses(machine: Description) -> None:
     for name, pose in machine.poses.items():
         for axis, position in pose.items():
-            spec = machine.axes[axis]
+            spec = machine.axes.get(axis)
+            if spec is None:
+                raise no_axis(path("pose", name, axis), axis, machine.axes)
             if not spec.allows(position):
                 where = path("pose", name, axis)
                 raise refused(where, f"{spec.show(position)} is outside the limits", _range(spec), OUTSIDE)

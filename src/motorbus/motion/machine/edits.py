@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from motorbus.errors import RequestError
@@ -65,7 +66,10 @@ def renamed(text: str, place: str, name: str, *, check_address: CheckAddress | N
     known = [f"{one}.{each}" for one in KINDS for each in wanted.get(one, {})]
     if place not in known:
         raise refused(
-            path(place), "there is nothing of this name", listed(known), nearest(place, known, "name one")
+            path(*place.split(".")[:_DEEPEST]),
+            "there is nothing of this name",
+            listed(known),
+            nearest(place, known, "name one"),
         )
     if name in wanted[kind] or not re.fullmatch(NAME, name):
         why = (
@@ -103,15 +107,19 @@ def _proved(text: str, document: TOMLDocument, wanted: Data, check_address: Chec
     """The new text, which says what is wanted and describes a machine, with the ends of lines of the old one."""
     after = document.as_string()
     try:
-        differs = reading.toml(after) != wanted
+        same = _filled(reading.toml(after)) == _filled(wanted)
     except RequestError:
-        differs = True
-    if not differs:
-        reading.read(after, check_address)
-    else:
+        same = False
+    if not same:
         raise refused("", "this file cannot be edited without changing more", "[axis.shoulder]", BY_HAND)
+    reading.read(after, check_address)
     start = "\ufeff" if text.startswith("\ufeff") else ""
     return start + (after.replace("\n", "\r\n") if "\r\n" in text else after)
+
+
+def _filled(data: Data) -> Data:
+    """The data without tables that hold nothing: [axis] alone on a line says as much as no such line."""
+    return {key: value for key, value in data.items() if value != {}}
 
 
 # -- values ----------------------------------------------------------------------------------------------------------
@@ -143,6 +151,10 @@ def _put_plain(data: Data, keys: list[str], value: Any) -> None:
     if value is None and last not in here:
         raise refused(
             path(*keys), "it is not there, and cannot be taken out", listed(here), nearest(last, here)
+        )
+    if isinstance(value, float) and not isfinite(value):
+        raise refused(
+            path(*keys), f"{value} is no finite number", "a number, or text with a unit", "give one"
         )
     if value is None:
         del here[last]
@@ -178,7 +190,11 @@ def _put(document: TOMLDocument, keys: list[str], value: Any) -> None:
 def _begin(parent: Any, name: str, *, is_super: bool) -> None:
     """Add a table behind its sisters; what stood behind the last of them stands behind it now."""
     import tomlkit
+    from tomlkit.items import InlineTable
 
+    if isinstance(parent, InlineTable):
+        parent[name] = tomlkit.inline_table()
+        return
     table = tomlkit.table(is_super_table=is_super)
     sisters = [one for one in parent.values() if _body(one)] if not is_super else []
     if not sisters:

@@ -17,7 +17,7 @@ from motorbus.core import units
 from motorbus.core.entry import is_number
 from motorbus.errors import RequestError
 from motorbus.motion.machine import keys
-from motorbus.motion.machine.agreement import ADD_AXIS, check
+from motorbus.motion.machine.agreement import check, no_axis
 from motorbus.motion.machine.keys import Key
 from motorbus.motion.machine.model import FORMAT, NAME, AxisSpec, BusSpec, Description, GroupSpec
 from motorbus.motion.machine.refusal import listed, nearest, path, refused, said
@@ -168,12 +168,7 @@ def _axes_of(table: Mapping[str, Any], axes: Mapping[str, AxisSpec], *where: str
         raise refused(path(*where), "it names no axis", expected, "name one, or take the pose out")
     for axis in table:
         if axis not in axes:
-            raise refused(
-                path(*where, axis),
-                "there is no such axis",
-                listed(axes, "an axis of the file"),
-                nearest(axis, axes, ADD_AXIS),
-            )
+            raise no_axis(path(*where, axis), axis, axes)
 
 
 # -- one field -----------------------------------------------------------------------------------------------------
@@ -199,7 +194,7 @@ class Place(NamedTuple):
 
     def refused(self, what: str, expected: str, advice: str = "") -> RequestError:
         """The error for it; without better advice it gives an example and says what the key means."""
-        return refused(self.where, what, expected, advice or f"write {self.example}, {self.key.says}")
+        return refused(self.where, what, expected, advice or f"write it as {self.example} ({self.key.says})")
 
 
 def _value(table: Mapping[str, Any], key: Key, where: tuple[str, ...], *, linear: bool = False) -> Any:

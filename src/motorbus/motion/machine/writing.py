@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from math import isfinite
 from typing import Any, Final
 
 from motorbus.core import units
@@ -63,7 +64,7 @@ def _line(name: str, value: str, says: str) -> str:
 def _value(value: Any, key: Key, axis: AxisSpec | None) -> str:
     if isinstance(value, str):
         return quoted(value)
-    if key.measure is None or axis is None or value != value:
+    if key.measure is None or axis is None or not isfinite(value):
         return str(value)
     quantity = key.measure.of(axis.linear)
     unit = _unit(quantity, axis.unit)
