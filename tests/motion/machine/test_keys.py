@@ -60,7 +60,7 @@ def test_choices_and_ranges_in_words() -> None:
     assert AXIS["exit"].choices(False) == ("hold", "torque_off", "park", "leave")
     assert AXIS["gear"].choices(False) == ()
     assert AXIS["torque"].range(False) == "above 0, at most 1"
-    assert AXIS["low"].range(True) == "at least -1000000, at most 1000000 m"
+    assert AXIS["low"].range(True) == "-1000000 to 1000000 m"
     assert AXIS["device"].range(False) == ""
 
 

@@ -58,12 +58,13 @@ class Key(NamedTuple):
 
     def range(self, linear: bool) -> str:
         """What it may be, in words: `above 0, at most 1000 A`; "" where its type says all."""
-        meta, parts = self.meta, []
-        parts += [f"above {meta.gt:.10g}"] if meta.gt is not None else []
-        parts += [f"at least {meta.ge:.10g}"] if meta.ge is not None else []
-        parts += [f"at most {meta.le:.10g}"] if meta.le is not None else []
+        meta, words = self.meta, ""
+        if meta.ge is not None:
+            words = f"{meta.ge:.10g} to {meta.le:.10g}"
+        elif meta.gt is not None:
+            words = f"above {meta.gt:.10g}, at most {meta.le:.10g}"
         unit = api_unit(self.measure.of(linear)) if self.measure else ""
-        return " ".join([", ".join(parts), unit]).strip() if parts else ""
+        return f"{words} {unit}".strip() if words else ""
 
 
 def api_unit(quantity: str) -> str:

@@ -33,6 +33,14 @@ LINEAR_UNITS: Final = ("mm", "m")
 Exit: TypeAlias = Literal["hold", "torque_off", "park", "leave"]
 Unit: TypeAlias = Literal["deg", "rad", "turn", "mm", "m"]
 
+EXITS: Final[Mapping[Exit, str]] = {
+    "hold": "it stops, and stays with its torque on",
+    "torque_off": "it stops, then lets go",
+    "park": "it goes to `park`, and stays with its torque on",
+    "leave": "nothing is sent",
+}
+"""What each way to end means."""
+
 
 class Measure(NamedTuple):
     """Which quantity (a key of `units.SCALES`) a value is, on an axis that turns and on a linear one."""

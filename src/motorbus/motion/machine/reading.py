@@ -210,7 +210,7 @@ def _value(table: Mapping[str, Any], key: Key, where: tuple[str, ...], *, linear
     if key.choices(linear):
         return _choice(place)
     if key.kind is float and not is_number(place.written):
-        raise place.refused(f"{said(place.written)} is no finite number", f"a number {key.range(linear)}")
+        raise place.refused(f"{said(place.written)} is no finite number", f"a number, {key.range(linear)}")
     return _within(place.written, place)
 
 
