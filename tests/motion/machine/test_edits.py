@@ -63,6 +63,58 @@ def test_only_what_was_meant_changes(changes: dict[str, Any], lines: list[str]) 
     assert sorted(changed(edited(GOOD, changes))) == sorted(lines)
 
 
+CHANGES = st.fixed_dictionaries(
+    {},
+    optional={
+        "name": st.sampled_from(["a", None]),
+        "axis.shoulder.zero": st.sampled_from(["1 deg", 0.5, None]),
+        "axis.shoulder.max_step": st.sampled_from([None, 0.1]),
+        "axis.elbow.zero": st.just("3 deg"),
+        "axis.elbow.unit": st.just("rad"),
+        "axis.slide.high": st.just("200 mm"),
+        "axis.wrist": st.sampled_from([{"device": "arm#3"}, {"device": "gimbal#1", "travel": 1}]),
+        "bus.third": st.just({"address": "x:y"}),
+        "group.right": st.just({"axes": ["elbow"]}),
+        "group.left": st.just({"axes": ["slide"]}),
+        "pose.ready": st.sampled_from([{"slide": "1 mm"}, None]),
+        "pose.rest": st.just({"elbow": 0, "slide": 0}),
+    },
+)
+
+
+MAY_GO = {
+    '-name = "bench"',
+    '-zero = "180 deg"                # measured by hand',
+    '-max_step = "10 deg"',
+    '-high = "120 mm"',
+    f"-{LEFT}",
+    "-[pose.ready]",
+    SHOULDER,
+    '-elbow = "-20 deg"',
+    '-slide = "30 mm"',
+}
+"""Lines that one of these changes is about; what is behind a comment sign on them stays where the line does."""
+
+
+@given(CHANGES)
+def test_whatever_changes_the_rest_stays(changes: dict[str, Any]) -> None:
+    after = edited(GOOD, changes)
+    taken = [line for line in changed(after) if line.startswith("-")]
+    comments = [line for line in GOOD.splitlines() if line.startswith("#")]
+    assert [line for line in after.splitlines() if line.startswith("#")] == comments
+    assert set(taken) <= MAY_GO
+    assert edited(after, {key: value for key, value in changes.items() if value is not None}) == after
+    for comment, head in (("# The shoulder was", "[axis.shoulder]"), ("# Handle with care.", "[axis.elbow]")):
+        lines = after.splitlines()
+        place = next(number for number, line in enumerate(lines) if line.startswith(comment))
+        assert (lines[place - 1], lines[place + 1]) == ("", head)
+
+
+def test_a_first_name_comes_before_the_tables() -> None:
+    text = GOOD.replace('name = "bench"\n', "")
+    assert changed(edited(text, {"name": "bench"}), text) == ['+name = "bench"']
+
+
 def test_comments_stay_with_what_they_are_about() -> None:
     after = edited(GOOD, {"axis.shoulder.park": "1 deg", "bus.third": {"address": "x:y"}})
     assert 'torque = 0.5\npark = "1 deg"\n\n# Handle with care.\n[axis.elbow]\n' in after

@@ -52,11 +52,28 @@ def test_no_value_of_any_key_gives_anything_but_a_machine_or_our_error(line: int
 @given(st.integers(0, len(GOOD)), st.integers(0, 40), st.text(max_size=10))
 def test_no_text_gives_anything_but_a_machine_or_our_error(start: int, length: int, instead: str) -> None:
     text = GOOD[:start] + instead + GOOD[start + length :]
+    refusal, machine = "", Machine()
     try:
         machine = Machine.parse(text)
-    except RequestError:
-        return
+    except RequestError as error:
+        refusal = error.summary
+    assert "\n" not in refusal
+    assert len(refusal) < 300
     assert Machine.parse(machine.text()) == machine
+
+
+def test_a_long_complaint_about_toml_keeps_its_line() -> None:
+    with pytest.raises(RequestError) as caught:
+        read(f"[axis.{'x' * 5000}]\n[axis.{'x' * 5000}]")
+    assert len(caught.value.summary) < 200
+    assert "(at line 2, column 5007)" in caught.value.summary
+
+
+def test_a_value_of_a_pose_is_explained_as_one() -> None:
+    with pytest.raises(RequestError) as caught:
+        read(GOOD.replace('"30 mm"', "true"))
+    assert caught.value.summary == "pose.ready.slide: true is no length"
+    assert caught.value.advice.startswith('write it as slide = "30 mm" (where this axis is in the pose)')
 
 
 def test_a_number_needs_no_unit_and_a_unit_no_blank() -> None:

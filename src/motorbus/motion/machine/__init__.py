@@ -29,7 +29,10 @@ NAME: Final = "motorbus.toml"
 
 
 class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A machine: `name`, and by their names `buses`, `axes`, `groups` and `poses`, in the order of the file."""
+    """A machine: `name`, and by their names `buses`, `axes`, `groups` and `poses`, in the order of the file.
+
+    One that was read fits together; one that is made of parts by hand is judged by `text`.
+    """
 
     # -- from what it is made ----------------------------------------------------------------------------------------
 

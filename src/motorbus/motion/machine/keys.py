@@ -100,3 +100,7 @@ BUS: Final = _keys(BusSpec)
 AXIS: Final = _keys(AxisSpec)
 GROUP: Final = _keys(GroupSpec)
 FILE: Final = _keys(Description)
+POSE: Final = AXIS["low"]._replace(
+    name="AXIS", says="where this axis is in the pose", example=('"10 deg"', '"30 mm"')
+)
+"""Of a pose, whose keys are the names of axes."""

@@ -25,6 +25,7 @@ from motorbus.motion.machine.refusal import listed, nearest, path, refused, said
 CheckAddress: TypeAlias = Callable[[str], object]
 LONGEST: Final = 1 << 20
 """Characters a file may have; a hundred axes with every key have a tenth of it."""
+_LINE: Final = 120
 EXAMPLES: Final = {
     "address": 'FAMILY:PORT, options after commas, as "feetech:/dev/ttyACM0,baud=1000000"',
     "device": 'BUS#ID, as "arm#1" or "arm#0x25"',
@@ -61,7 +62,7 @@ def toml(text: str) -> dict[str, Any]:
     """The plain data of a text. Raises RequestError, with line and column where they are known."""
     if len(text) > LONGEST:
         raise refused(
-            "", f"the file has {len(text)} characters", f"{LONGEST} at most", "see that it is the right one"
+            "", f"the file has more than {LONGEST} characters", "fewer", "see that it is the right one"
         )
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
@@ -72,7 +73,8 @@ def toml(text: str) -> dict[str, Any]:
         why, advice = "it is nested too deeply", "no key needs a list in a list"
     except ValueError:  # Python reads no number of more than 4300 digits
         why, advice = "a number has thousands of digits", "write fewer; 15 are enough"
-    raise refused("", f"the file is no TOML: {why}", "TOML", advice)
+    short = why if len(why) <= _LINE else f"{why[: _LINE // 2]} … {why[-_LINE // 2 :]}"
+    raise refused("", f"the file is no TOML: {short}", "TOML", advice)
 
 
 def _format(data: Mapping[str, Any]) -> None:
@@ -158,7 +160,7 @@ def _group(name: str, table: Mapping[str, Any]) -> GroupSpec:
 
 def _pose(name: str, table: Mapping[str, Any], axes: Mapping[str, AxisSpec]) -> dict[str, float]:
     _axes_of(table, axes, "pose", name)
-    rows = {axis: keys.AXIS["low"]._replace(name=axis) for axis in table}
+    rows = {axis: keys.POSE._replace(name=axis) for axis in table}
     return {axis: _value(table, rows[axis], ("pose", name), linear=axes[axis].linear) for axis in table}
 
 

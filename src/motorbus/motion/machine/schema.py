@@ -114,8 +114,7 @@ def _group(made: dict[str, Any]) -> dict[str, Any]:
 
 
 def _pose() -> dict[str, Any]:
-    low = keys.AXIS["low"]
-    ways = [{"type": "number"}, _text(low, linear=False), _text(low, linear=True)]
+    ways = [{"type": "number"}, _text(keys.POSE, linear=False), _text(keys.POSE, linear=True)]
     return {
         "title": "a pose",
         "description": keys.FILE["pose"].says,

@@ -43,7 +43,7 @@ def _lines(machine: Description) -> Iterator[str]:
     for name, pose in machine.poses.items():
         yield from ("", f"[pose.{name}]")
         for moved, position in pose.items():
-            yield f"{moved} = {_value(position, keys.AXIS['low'], machine.axes.get(moved))}"
+            yield f"{moved} = {_value(position, keys.POSE, machine.axes.get(moved))}"
 
 
 def _axis(axis: AxisSpec, told: set[str]) -> Iterator[str]:
