@@ -91,20 +91,29 @@ class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True
         return dict(self.poses[name])
 
 
-def source(path: str | PathLike[str]) -> str:
-    """The text of a file as it is on disk, with its ends of lines. Raises RequestError when it cannot be read."""
+def source(
+    path: str | PathLike[str],
+    *,
+    longest: int = reading.LONGEST,
+    kind: str = "TOML",
+    expected: str = f"a machine file, as {NAME}",
+) -> str:
+    """The text of a file as it is on disk, with its ends of lines. Raises RequestError when it cannot be read.
+
+    No more than one character above `longest` is read; `kind` and `expected` are words for what it should be.
+    """
     try:
         with Path(path).open(encoding="utf-8", newline="") as file:
-            return file.read(reading.LONGEST + 1)
+            return file.read(longest + 1)
     except UnicodeDecodeError as error:
         raise RequestError(
-            f"it is no text: {error.reason}", expected="TOML in UTF-8", advice="nothing was opened"
+            f"it is no text: {error.reason}", expected=f"{kind} in UTF-8", advice="nothing was opened"
         ) from None
     except (OSError, ValueError) as error:
         why = (getattr(error, "strerror", None) or str(error)).lower()
         raise RequestError(
             f"it cannot be read: {why}",
-            expected=f"a machine file, as {NAME}",
+            expected=expected,
             advice="see that the path is right; nothing was opened",
         ) from error
 
