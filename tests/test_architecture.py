@@ -77,6 +77,7 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
     ],
     "matplotlib-in-one-file": [{"cli/offence.py": "from matplotlib import pyplot"}],
     "tomlkit-in-one-file": [{"motion/machine/reading.py": "import tomlkit"}],
+    "ruckig-in-one-file": [{"motion/profile/following.py": "import ruckig"}],
     "nothing-names-a-family": [
         {"cli/offence.py": "from motorbus.families import feetech"},
         {"cli/offence.py": "from motorbus.families.feetech.table import TABLES"},

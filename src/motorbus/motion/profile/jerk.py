@@ -1,7 +1,7 @@
 """Following a goal with limited jerk. The only file that imports ruckig, and only when a follower is made with a jerk.
 
 ruckig works out the quickest movement from any state of motion in under a microsecond. It is an extra and never needed:
-there is no wheel of it for Linux on ARM, and there it has to be compiled.
+there is no wheel of it for Linux on ARM, as on a Raspberry Pi, and there it would have to be compiled.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from motorbus.motion.profile.following import check_elapsed
 from motorbus.motion.profile.shapes import NOTHING, Limits
 
 INSTALL: Final = "pip install 'motorbus[ruckig]'"
-ON_ARM: Final = "on Linux for ARM there is no wheel of it: pip install ruckig, which needs a C++ compiler"
+ON_ARM: Final = "on Linux for ARM there is no wheel of it, and the extra leaves it out"
 
 
 class JerkFollower:
@@ -111,6 +111,6 @@ def _ruckig() -> Any:
         raise MotorbusError(
             "ruckig is not installed, so jerk cannot be limited",
             cause=ON_ARM,
-            advice=f"{INSTALL}, or leave jerk out: then acceleration is limited, and may jump",
+            advice=f"{INSTALL} (on ARM: pip install ruckig, which needs a C++ compiler), or leave jerk out",
         ) from missing
     return ruckig

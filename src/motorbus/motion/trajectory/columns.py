@@ -176,15 +176,12 @@ def _row(line: int, cells: Sequence[str], columns: Sequence[Column]) -> list[flo
         less = len(cells) < len(columns)
         missing = ", ".join(column.name for column in columns[len(cells) :][:5])
         advice = f"add {missing}" if less else "write numbers with a point, not with a comma"
-        raise Place(line).refused(f"there are {_counted(len(cells))}", _counted(len(columns)), advice)
+        there = "is 1 column" if len(cells) == 1 else f"are {len(cells)} columns"
+        raise Place(line).refused(f"there {there}", f"{len(columns)}, as in the header", advice)
     return [
         _value(cell, line, number, column)
         for number, (cell, column) in enumerate(zip(cells, columns, strict=True), 1)
     ]
-
-
-def _counted(cells: int) -> str:
-    return "1 column" if cells == 1 else f"{cells} columns"
 
 
 def _value(cell: str, line: int, number: int, column: Column) -> float:
