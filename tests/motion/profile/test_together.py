@@ -51,7 +51,7 @@ def test_nobody_could_do_it_quicker_than_the_one_to_blame(moves: dict[str, Move]
     assert alone.duration == group.duration
     others = {name: move for name, move in moves.items() if name != blamed}
     assert synchronised(others, kind=kind).duration <= group.duration
-    # More of the limit that is named makes it quicker; more of the other one alone does not, or hardly.
+    # More of the limit that is named makes it quicker.
     start, goal, may = moves[blamed]
     more = {
         "velocity": Limits(may.velocity * 2, may.acceleration, may.deceleration),
@@ -65,9 +65,11 @@ def test_nobody_could_do_it_quicker_than_the_one_to_blame(moves: dict[str, Move]
 def test_the_reason_is_told(kind: Kind) -> None:
     far = {"lift": Move(0.0, 5.0, SLOW), "turn": Move(0.0, 5.0, QUICK)}
     near = {"lift": Move(0.0, 1e-4, SLOW), "turn": Move(0.0, 0.0, QUICK)}
+    touching = {"lift": Move(0.0, 1.0, Limits(1.0, 1.0))}
     still = {"lift": Move(1.0, 1.0, SLOW)}
     assert synchronised(far, kind=kind).limited_by == Limiting("lift", "velocity")
     assert synchronised(near, kind=kind).limited_by == Limiting("lift", "acceleration")
+    assert synchronised(touching, kind=kind).limited_by == Limiting("lift", "acceleration")
     assert synchronised(still, kind=kind).limited_by == Limiting("", "nothing")
     assert synchronised(far, kind=kind, duration=60.0).limited_by == Limiting("", "duration")
     quickest = synchronised(far, kind=kind).duration

@@ -108,8 +108,12 @@ def _lasting(quickest: Profile, duration: float) -> Profile:
 
 
 def _reason(quickest: Profile, limits: Limits) -> Reason:
-    """Which limit it runs into: one that reaches its highest velocity would gain most by more of that."""
-    return "velocity" if isclose(quickest.peak, limits.velocity, rel_tol=1e-9) else "acceleration"
+    """Which limit it runs into: a trapezoid is held by velocity while it goes at one."""
+    if isinstance(quickest, Trapezoid):
+        held = any(not phase.acceleration for phase in quickest.motion.phases)
+    else:
+        held = isclose(quickest.peak, limits.velocity, rel_tol=1e-9)
+    return "velocity" if held else "acceleration"
 
 
 def _long_enough(duration: float, shortest: float, limited_by: Limiting) -> None:

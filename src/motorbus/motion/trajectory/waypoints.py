@@ -10,7 +10,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 from motorbus.errors import RequestError
@@ -59,7 +59,7 @@ class Route:
 
     def _each(self, at: float, asked: Callable[[Profile, float], float]) -> dict[str, float]:
         place = max(0, min(bisect_right(self.times, at), len(self.times) - 1) - 1)
-        since = at - self.times[place] if at < self.duration else at
+        since = at - self.times[place] if at < self.duration else inf
         return {name: asked(profiles[place], since) for name, profiles in self.profiles.items()}
 
 
