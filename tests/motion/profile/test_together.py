@@ -99,6 +99,17 @@ def test_too_little_time_is_refused_with_what_is_needed() -> None:
     assert "velocity limit of lift" in refused.value.cause
 
 
+@given(st.floats(0.001, 1000), kinds)
+def test_the_time_that_is_said_to_be_needed_is_enough(way: float, kind: Kind) -> None:
+    moves = {"lift": Move(0.0, way, SLOW)}
+    with pytest.raises(RequestError, match="too short") as refused:
+        synchronised(moves, kind=kind, duration=0.0)
+    needed = float(refused.value.expected.split()[0])
+    shortest = synchronised(moves, kind=kind).duration
+    assert synchronised(moves, kind=kind, duration=needed).duration == max(needed, shortest)
+    assert needed <= shortest * (1 + 2e-5)
+
+
 @pytest.mark.parametrize("duration", [nan, inf, -1.0])
 def test_a_duration_is_a_time(duration: float) -> None:
     with pytest.raises(RequestError, match="duration is"):

@@ -67,23 +67,21 @@ BROKEN: dict[str, Broken] = {
     "angle-of-a-linear-axis": Broken(
         "time,slide (deg)\n0,1\n", "line 1, column 2: slide has the unit 'deg'", "give a unit"
     ),
-    "word": Broken("time,elbow\n0,up\n", "line 2, column 2 (elbow): 'up' is no number", "the unit stands"),
+    "word": Broken("time,elbow\n0,up\n", "line 2, column 2 (elbow): 'up' is no number", "in the header"),
     "unit-in-a-cell": Broken(
         "time,elbow (deg)\n0,1\n1,90 deg\n",
         "line 3, column 2 (elbow): '90 deg' is no number",
         "in the header",
     ),
     "python-number": Broken(
-        "time,elbow\n0,1_000\n", "line 2, column 2 (elbow): '1_000' is no number", "the unit stands"
+        "time,elbow\n0,1_000\n", "line 2, column 2 (elbow): '1_000' is no number", "in the header"
     ),
-    "gap": Broken(
-        "time,elbow\n0,1\n1,\n", "line 3, column 2 (elbow): the number is missing", "a gap nowhere"
-    ),
+    "gap": Broken("time,elbow\n0,1\n1,\n", "line 3, column 2 (elbow): the number is missing", "fill the gap"),
     "not-a-number": Broken("time,elbow\n0,nan\n", "line 2, column 2 (elbow): nan is out of range", "correct"),
     "infinite": Broken("time,elbow\n0,-inf\n", "line 2, column 2 (elbow): -inf is out of range", "correct"),
     "far-away": Broken("time,elbow\n0,1e7\n", "line 2, column 2 (elbow): 1e7 is out of range", "correct"),
     "time-is-a-word": Broken(
-        "time,elbow\n0,1\nlater,2\n", "line 3, column 1 (time): 'later' is no number", "the unit stands"
+        "time,elbow\n0,1\nlater,2\n", "line 3, column 1 (time): 'later' is no number", "in the header"
     ),
     "time-stands": Broken(
         "time,elbow\n0,1\n1,2\n1,3\n", "line 4, column 1 (time): 1 is not after the row", "sort the rows"

@@ -135,7 +135,7 @@ HERE = Waypoint({"lift": 0.0})
         ([HERE, Waypoint({"lift": 1.0}, speed=0.0)], "waypoint 1: its speed is 0.0"),
         ([HERE, Waypoint({"lift": 1.0}, speed=nan)], "waypoint 1: its speed is nan"),
         ([HERE, Waypoint({"lift": 0.0}, speed=1.0)], "waypoint 1: no axis moves"),
-        ([HERE, Waypoint({"turn": 0.0}, 1.0)], "waypoint 1: it differs from the first in one of lift, turn"),
+        ([HERE, Waypoint({"turn": 0.0}, 1.0)], "waypoint 1: it and the first differ in lift, turn"),
         ([Waypoint({}), Waypoint({}, 1.0)], "waypoint 0: it names no axis"),
         ([HERE, Waypoint({"lift": nan}, 1.0)], "waypoint 1: lift is at nan"),
         ([HERE, Waypoint({"lift": 1e9}, 1.0)], "waypoint 1: lift is at 1000000000.0"),

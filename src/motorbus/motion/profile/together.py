@@ -17,6 +17,8 @@ from motorbus.motion.profile.shapes import NOTHING, Limits, Profile, Trapezoid, 
 Kind: TypeAlias = Literal["trapezoid", "minimum_jerk"]
 Reason: TypeAlias = Literal["velocity", "acceleration", "duration", "nothing"]
 KINDS: Final = ("trapezoid", "minimum_jerk")
+ROUNDING: Final = 1e-9
+"""Of a duration: what was meant to be the shortest one may fall short of it by so much, and is made the shortest."""
 
 
 class Move(NamedTuple):
@@ -119,10 +121,17 @@ def _reason(quickest: Profile, limits: Limits) -> Reason:
 def _long_enough(duration: float, shortest: float, limited_by: Limiting) -> None:
     if not isfinite(duration) or duration < 0:
         raise RequestError(f"duration is {duration}", expected="a finite number of s", advice=NOTHING)
-    if duration < shortest:
+    if duration < shortest * (1 - ROUNDING):
+        needed = _rounded_up(shortest)
         raise RequestError(
-            f"{duration:.6g} s is too short: {limited_by.axis} needs {shortest:.6g} s",
-            expected=f"{shortest:.6g} s or more",
+            f"{duration:.6g} s is too short: {limited_by.axis} needs {needed} s",
+            expected=f"{needed} s or more",
             cause=f"the {limited_by.reason} limit of {limited_by.axis}",
             advice="give it more time, or leave the duration out for the quickest; nothing was sent",
         )
+
+
+def _rounded_up(duration: float) -> str:
+    """Six digits that, given back as a duration, are long enough."""
+    shown = f"{duration:.6g}"
+    return shown if float(shown) >= duration * (1 - ROUNDING) else f"{duration * (1 + 1e-5):.6g}"

@@ -190,7 +190,8 @@ def _value(cell: str, line: int, number: int, column: Column) -> float:
     if value is None:
         what = f"{shown(cell)} is no number" if cell else "the number is missing"
         unit = f" in {column.unit}" if column.unit else ""
-        raise place.refused(what, f"a number{unit}", "the unit stands in the header, and a gap nowhere")
+        advice = "write the number only; its unit stands in the header" if cell else "fill the gap"
+        raise place.refused(what, f"a number{unit}", advice)
     if not (isfinite(value) and abs(value * column.scale) <= FARTHEST):
         raise place.refused(
             f"{cell} is out of range", f"a finite number, {FARTHEST:.0f} at most in rad, m or s", "correct it"

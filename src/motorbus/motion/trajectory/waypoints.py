@@ -158,7 +158,7 @@ def _complete(number: int, waypoint: Waypoint, names: Sequence[str]) -> None:
     """Raise RequestError unless a waypoint says of each axis, and of no other one, where it is."""
     differ = sorted(set(names) ^ set(waypoint.positions))
     if differ or not names:
-        what = f"it differs from the first in {listed(differ)}" if names else "it names no axis"
+        what = f"it and the first differ in {', '.join(differ[:5])}" if names else "it names no axis"
         raise _wrong(number, what, "a position of each axis, in each waypoint")
     for name, place in waypoint.positions.items():
         if not abs(place) <= FARTHEST:
