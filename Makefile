@@ -37,6 +37,7 @@ docs: $(READY)
 	$(BIN)/python -m scripts.coverage
 	$(BIN)/python -m scripts.feetech_registers
 	$(BIN)/python -m scripts.feetech_peers
+	$(BIN)/python -m scripts.machine_file
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters

@@ -68,6 +68,7 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
         {"core/offence.py": "import numpy"},
         {"link/offence.py": "import serialx"},
         {"bus/offence.py": "import can"},
+        {"core/offence.py": "import tomlkit"},
     ],
     "serialx-in-one-file": [{"cli/offence.py": "import serialx"}],
     "python-can-in-one-file": [
@@ -75,6 +76,8 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
         {"cli/offence.py": "from can import Message"},
     ],
     "matplotlib-in-one-file": [{"cli/offence.py": "from matplotlib import pyplot"}],
+    "tomlkit-in-one-file": [{"motion/machine/reading.py": "import tomlkit"}],
+    "ruckig-in-one-file": [{"motion/profile/following.py": "import ruckig"}],
     "nothing-names-a-family": [
         {"cli/offence.py": "from motorbus.families import feetech"},
         {"cli/offence.py": "from motorbus.families.feetech.table import TABLES"},

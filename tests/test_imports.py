@@ -18,6 +18,7 @@ pytestmark = pytest.mark.quick
 
 LOADED = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 HARDWARE_AND_NUMBERS = {"serialx", "serial", "can", "canopen", "wrapt", "matplotlib", "numpy", "starlette"}
+FILES = {"msgspec", "tomlkit"}
 POSIX_ONLY = "import sys; sys.modules.update(dict.fromkeys(['termios', 'fcntl', 'pty', 'tty'])); "
 OPEN_A_SOCKET = """
 from motorbus.link.url import open_link
@@ -39,14 +40,20 @@ def run(code: str, *arguments: str) -> str:
 def test_importing_motorbus_loads_no_library() -> None:
     loaded = set(run(f"import motorbus; {LOADED}").split())
     assert "motorbus" in loaded
-    assert loaded & (HARDWARE_AND_NUMBERS | {"msgspec", "cyclopts", "rich", "asyncio"}) == set()
+    assert loaded & (HARDWARE_AND_NUMBERS | FILES | {"cyclopts", "rich", "asyncio"}) == set()
 
 
-def test_help_loads_neither_hardware_nor_numbers() -> None:
+def test_help_loads_neither_hardware_nor_numbers_nor_files() -> None:
     code = f"from motorbus.cli import main; main(['--help']); {LOADED}"
     printed = run(code)
     assert "Usage: motorbus" in printed
-    assert set(printed.splitlines()[-1].split()) & HARDWARE_AND_NUMBERS == set()
+    assert set(printed.splitlines()[-1].split()) & (HARDWARE_AND_NUMBERS | FILES) == set()
+
+
+def test_reading_a_machine_loads_no_editor_of_files() -> None:
+    code = f"from motorbus.motion.machine import Machine; Machine.parse('format = 1'); {LOADED}"
+    loaded = set(run(code).split())
+    assert loaded & (HARDWARE_AND_NUMBERS | FILES) == {"msgspec"}
 
 
 def test_what_is_promised_is_there() -> None:

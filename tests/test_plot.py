@@ -182,3 +182,48 @@ def test_a_program_is_drawn_as_its_file_names_things(tmp_path: Path, monkeypatch
     text = (tmp_path / "p.svg").read_text(encoding="utf-8")
     for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "Pick and place"):
         assert word in text
+
+
+# --- the axes of a machine --------------------------------------------------------------------------------------------
+
+NINE = {
+    f"axis-{number}": plot.Track(GOALS[0], PRESENTS[number % 2], "mm" if number == 8 else "deg")
+    for number in range(9)
+}
+
+
+def test_nine_axes_have_a_panel_each_with_its_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    plot.tracks(tmp_path / "nine.svg", TIMES, NINE, title="Bench", remark="simulated")
+    text = (tmp_path / "nine.svg").read_text(encoding="utf-8")
+    for number in range(8):
+        assert f"axis-{number} (deg)" in text
+    for word in ("axis-8 (mm)", "goal", "present", "error: present − goal", "Bench", "simulated"):
+        assert word in text
+    assert text.count("time (s)") == 3  # below each column, and nowhere else
+
+
+@pytest.mark.parametrize(("count", "across", "down"), [(1, 1, 1), (2, 2, 1), (4, 2, 2), (5, 3, 2), (9, 3, 3)])
+def test_a_picture_grows_with_its_axes(tmp_path: Path, count: int, across: int, down: int) -> None:
+    plot.tracks(tmp_path / "some.png", TIMES, dict(list(NINE.items())[:count]))
+    data = (tmp_path / "some.png").read_bytes()
+    size = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    assert size == (round((1.5 + 3.6 * across) * 160), round((0.9 + 2.35 * down) * 160))
+
+
+def test_an_axis_that_never_answered_has_its_panel_too(tmp_path: Path) -> None:
+    plot.tracks(tmp_path / "mute.png", TIMES, {"mute": plot.Track(GOALS[0], [None, None, None])})
+    plot.tracks(tmp_path / "one.png", [0.0], {"one": plot.Track([1.0], [1.0], "")})
+    assert (tmp_path / "mute.png").stat().st_size > 1000
+    assert (tmp_path / "one.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "tracks", [{}, {"a": plot.Track([0.0], [0.0, 1.0, 2.0])}, {"a": plot.Track([0.0] * 3, [])}]
+)
+def test_tracks_that_do_not_fit_together_are_refused(tmp_path: Path, tracks: dict[str, plot.Track]) -> None:
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.tracks(tmp_path / "x.png", TIMES, tracks)
+    assert list(tmp_path.iterdir()) == []

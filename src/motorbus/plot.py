@@ -5,6 +5,7 @@ It draws with the Agg canvas and no global state, so it needs no display and dis
 
 from __future__ import annotations
 
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.errors import MotorbusError, RequestError
@@ -68,6 +69,87 @@ def _saved(figure: Any, path: Path | str) -> None:
             advice="nothing was drawn",
         )
     figure.savefig(path)
+
+
+class Track(NamedTuple):
+    """An axis over time: its goals and where it was, in `unit`; None where there was no reading."""
+
+    goal: Sequence[float]
+    present: Sequence[float | None]
+    unit: str = "rad"
+
+
+def tracks(
+    path: Path | str,
+    times: Sequence[float],
+    axes: Mapping[str, Track],
+    *,
+    title: str = "",
+    remark: str = "",
+) -> None:
+    """Draw each axis of a machine in a panel of its own: goal (dashed) and present (solid), and below it the error.
+
+    `times` in s, and every track has one value for each. Units may differ from axis to axis, as an arm has degrees and
+    a slide millimetres. The suffix of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data
+    do not fit together and MotorbusError when matplotlib is not installed.
+    """
+    if not axes or any(len(row) != len(times) for track in axes.values() for row in track[:2]):
+        raise RequestError(
+            "the data do not fit together",
+            expected="at least one axis, and one goal and one present for each time",
+        )
+    across = min(3, ceil(sqrt(len(axes))))
+    down = -(-len(axes) // across)
+    figure = _blank(title, remark, (1.5 + 3.6 * across, 0.9 + 2.35 * down))
+    heights = {"height_ratios": [2.6, 1.0] * down}
+    cells = figure.subplots(2 * down, across, sharex=True, squeeze=False, gridspec_kw=heights)
+    for number in range(down * across):
+        row, column = divmod(number, across)
+        pair = cells[2 * row][column], cells[2 * row + 1][column]
+        if number < len(axes):
+            name = list(axes)[number]
+            _draw_track(*pair, times, axes[name], name, lowest=number + across >= len(axes))
+        else:
+            for empty in pair:
+                empty.set_axis_off()
+    _draw_key(figure)
+    _saved(figure, path)
+
+
+def _draw_track(
+    position: Any, error: Any, times: Sequence[float], track: Track, name: str, *, lowest: bool
+) -> None:
+    present = [float("nan") if value is None else value for value in track.present]
+    apart = [was - goal for was, goal in zip(present, track.goal, strict=True)]
+    for one in (position, error):
+        _style(one)
+        one.locator_params(axis="y", nbins=4 if one is position else 2)
+        one.margins(y=0.15)
+    position.plot(times, present, color=_COLOURS[0], linewidth=1.8)
+    position.plot(times, track.goal, color=_INK, linewidth=1.1, dashes=(3, 2))
+    heading = f"{name} ({track.unit})" if track.unit else name
+    position.set_title(heading, loc="left", fontsize=10, fontweight="bold", color=_INK, pad=4)
+    position.tick_params(labelbottom=False)
+    error.axhline(0, color=_FAINT, linewidth=0.8)
+    error.plot(times, apart, color=_COLOURS[1], linewidth=1.2)
+    error.tick_params(labelbottom=lowest)
+    if lowest:
+        error.set_xlabel("time (s)", fontsize=9, color=_INK)
+    if len(times) > 1:
+        error.set_xlim(times[0], times[-1])
+
+
+def _draw_key(figure: Any) -> None:
+    from matplotlib.lines import Line2D
+
+    lines = [
+        Line2D([], [], color=_INK, linewidth=1.1, dashes=(3, 2), label="goal"),
+        Line2D([], [], color=_COLOURS[0], linewidth=1.8, label="present"),
+        Line2D([], [], color=_COLOURS[1], linewidth=1.2, label="error: present − goal"),
+    ]
+    figure.legend(
+        handles=lines, loc="outside lower center", ncols=3, frameon=False, fontsize=9, labelcolor=_INK
+    )
 
 
 class Span(NamedTuple):
@@ -161,13 +243,7 @@ def _sheet(title: str, simulated: bool) -> tuple[Any, Any]:
 def _figure(
     title: str, remark: str, heights: Sequence[float], height: float, pad: int = 12
 ) -> tuple[Any, Any]:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise MotorbusError(_MISSING, advice="pip install 'motorbus[plot]'") from missing
-    figure = Figure(figsize=(9.0, height), dpi=160, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = _canvas((9.0, height))
     axes = figure.subplots(
         len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
     )
@@ -178,6 +254,26 @@ def _figure(
     if remark:
         axes[0].set_title(remark, loc="right", fontsize=11, fontstyle="italic", color=_FAINT, pad=pad)
     return figure, axes
+
+
+def _blank(title: str, remark: str, size: tuple[float, float]) -> Any:
+    """A page for panels of their own, with the words above them all."""
+    figure = _canvas(size)
+    figure.get_layout_engine().set(h_pad=0.05, w_pad=0.1, hspace=0.02)
+    figure.suptitle(title or " ", x=0.01, ha="left", fontsize=13, fontweight="bold", color=_INK)
+    figure.text(0.99, 0.988, remark, ha="right", va="top", fontsize=11, fontstyle="italic", color=_FAINT)
+    return figure
+
+
+def _canvas(size: tuple[float, float]) -> Any:
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as missing:
+        raise MotorbusError(_MISSING, advice="pip install 'motorbus[plot]'") from missing
+    figure = Figure(figsize=size, dpi=160, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def _style(axes: Any) -> None:

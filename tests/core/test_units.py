@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.units import QUANTITIES, SCALES, parse, rate, raw, show
+from motorbus.core.units import QUANTITIES, SCALES, parse, rate, raw, show, written
 from motorbus.errors import RequestError
 
 
@@ -32,6 +32,15 @@ from motorbus.errors import RequestError
         ("10rad/s²", "acceleration", 10.0),
         ("10rad/s^2", "acceleration", 10.0),
         ("180deg/s2", "acceleration", pi),
+        ("30 mm", "length", 0.03),
+        ("-1.5cm", "length", -0.015),
+        ("250um", "length", 0.00025),
+        ("250 µm", "length", 0.00025),
+        ("0.2", "length", 0.2),
+        ("50 mm/s", "linear velocity", 0.05),
+        ("600mm/min", "linear velocity", 0.01),
+        ("200 mm/s2", "linear acceleration", 0.2),
+        ("1 m/s²", "linear acceleration", 1.0),
         ("150mA", "current", 0.15),
         ("7.4V", "voltage", 7.4),
         ("70°C", "temperature", 70.0),
@@ -61,6 +70,10 @@ def test_a_number_with_or_without_a_unit(text: str, quantity: str, value: float)
         ("90grad", "position", "'grad', which is not known"),
         ("30rpm", "position", "measures velocity and not position"),
         ("90deg", "velocity", "measures position and not velocity"),
+        ("30 mm", "position", "measures length and not position"),
+        ("90 deg", "length", "measures position and not length"),
+        ("50 mm/s", "velocity", "measures linear velocity and not velocity"),
+        ("3 inch", "length", "'inch', which is not known"),
         ("1,5", "position", "decimal comma"),
         ("100raw", "position", "raw value"),
         ("1 2", "position", "'2', which is not known"),
@@ -95,6 +108,9 @@ def test_raw_that_is_no_whole_number_is_refused(text: str) -> None:
         (pi / 2, "position", "1.5708 rad (90.0°)"),
         (pi, "velocity", "3.142 rad/s (30.0 rpm)"),
         (8.789, "acceleration", "8.79 rad/s²"),
+        (0.0305, "length", "30.500 mm"),
+        (0.05, "linear velocity", "50.000 mm/s"),
+        (0.2, "linear acceleration", "200.000 mm/s²"),
         (0.15, "current", "0.150 A"),
         (7.4, "voltage", "7.4 V"),
         (31.0, "temperature", "31 °C"),
@@ -112,6 +128,32 @@ def test_values_for_people(value: float, quantity: str, text: str) -> None:
 def test_every_unit_of_the_api_has_a_quantity_whose_unit_it_is() -> None:
     for unit, quantity in QUANTITIES.items():
         assert SCALES[quantity][unit] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("value", "quantity", "unit", "text"),
+    [
+        (pi / 2, "position", "deg", "90 deg"),
+        (-pi, "position", "turn", "-0.5 turn"),
+        (200 * pi, "position", "deg", "36000 deg"),
+        (0.0, "position", "deg", "0 deg"),
+        (1.25, "position", "rad", "1.25 rad"),
+        (-2.0, "position", "deg", "-2 rad"),
+        (0.123456789012345, "length", "mm", "123.456789012345 mm"),
+        (0.03, "length", "mm", "30 mm"),
+        (0.5, "load", "%", "50 %"),
+    ],
+)
+def test_a_value_is_written_as_people_would(value: float, quantity: str, unit: str, text: str) -> None:
+    assert written(value, quantity, unit) == text
+
+
+@given(
+    st.floats(-1e6, 1e6), st.sampled_from([(kind, unit) for kind in sorted(SCALES) for unit in SCALES[kind]])
+)
+def test_what_is_written_is_read_as_the_same_number(value: float, said: tuple[str, str]) -> None:
+    quantity, unit = said
+    assert parse(written(value, quantity, unit), quantity) == value
 
 
 @given(st.text(max_size=12), st.sampled_from(sorted(SCALES)))

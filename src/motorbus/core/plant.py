@@ -120,25 +120,37 @@ def move(
     velocity: float = 0.0,
     speed: float,
     acceleration: float = inf,
+    deceleration: float | None = None,
 ) -> Motion:
     """Go to `goal` and stop there: a trapezoid, or a triangle where the way is short.
 
     It may begin with a `velocity`. When that is too high to stop in time it overshoots and comes back; when it
-    points away from the goal it brakes first; when it exceeds `speed` it brakes down to it. `acceleration` may
-    be infinite: then velocity changes in no time. `speed` 0 brakes to a halt wherever that is. Raises
-    ValueError for a negative or missing figure, and for an infinite speed with an infinite acceleration.
+    points away from the goal it brakes first; when it exceeds `speed` it brakes down to it. It brakes with
+    `deceleration`, or with `acceleration` where none is given. `acceleration` may be infinite: then velocity changes
+    in no time. `speed` 0 brakes to a halt wherever that is. Raises ValueError for a negative or missing figure, for
+    an infinite speed with an infinite acceleration, and where only one of the accelerations is infinite.
     """
+    braking = acceleration if deceleration is None else deceleration
     _check(speed, acceleration, position, goal, velocity)
+    _check(speed, braking)
+    if (braking == inf) != (acceleration == inf):
+        raise ValueError("acceleration and deceleration are both infinite, or none is")
     if not speed:
-        return run(at, position, 0.0, velocity=velocity, acceleration=acceleration)
+        return run(at, position, 0.0, velocity=velocity, acceleration=braking)
     if acceleration == inf:
         return _dash(at, position, goal, speed)
-    halt = position + velocity * abs(velocity) / (2 * acceleration)
+    halt = position + velocity * abs(velocity) / (2 * braking)
     if goal == halt:
-        return _braked(at, position, velocity, goal, acceleration)
+        return _braked(at, position, velocity, goal, braking)
     way = copysign(1.0, goal - halt)
-    peak = min(speed, sqrt(max(0.0, acceleration * way * (goal - position) + 0.5 * velocity**2)))
-    return _trapezoid(at, position, velocity, goal, way * peak, acceleration, cruises=peak == speed)
+    if way * velocity < 0 and braking != acceleration:  # the ramp has a corner where the direction turns
+        first = _braked(at, position, velocity, halt, braking)
+        back = move(at, halt, goal, speed=speed, acceleration=acceleration, deceleration=braking)
+        return Motion(at, first.phases + back.phases, goal)
+    square = 2 * acceleration * way * (goal - position) + velocity**2
+    peak = min(speed, sqrt(max(0.0, braking / (acceleration + braking) * square)))
+    gaining = acceleration if peak > way * velocity else braking
+    return _trapezoid(at, position, velocity, goal, way * peak, gaining, braking, cruises=peak == speed)
 
 
 def run(
@@ -227,6 +239,7 @@ def _trapezoid(
     goal: float,
     peak: float,
     acceleration: float,
+    deceleration: float,
     *,
     cruises: bool,
 ) -> Motion:
@@ -235,15 +248,15 @@ def _trapezoid(
         abs(peak - velocity) / acceleration, position, velocity, copysign(acceleration, peak - velocity)
     )
     reached = first.position_after(first.duration)
-    braking = Phase(
-        abs(peak) / acceleration,
-        goal - peak * abs(peak) / (2 * acceleration),
+    last = Phase(
+        abs(peak) / deceleration,
+        goal - peak * abs(peak) / (2 * deceleration),
         peak,
-        -copysign(acceleration, peak),
+        -copysign(deceleration, peak),
     )
     # A triangle has no cruise: there the difference is rounding, and divided by a tiny peak it would be ages.
-    cruise = Phase(max(0.0, (braking.position - reached) / peak) if cruises else 0.0, reached, peak, 0.0)
-    return Motion(at, tuple(phase for phase in (first, cruise, braking) if phase.duration), goal)
+    cruise = Phase(max(0.0, (last.position - reached) / peak) if cruises else 0.0, reached, peak, 0.0)
+    return Motion(at, tuple(phase for phase in (first, cruise, last) if phase.duration), goal)
 
 
 @dataclass(frozen=True, slots=True)

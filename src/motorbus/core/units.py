@@ -1,9 +1,9 @@
 """Quantities as people type and read them, and as the API takes them.
 
-The API knows one unit per quantity (rad, rad/s, rad/s², A, V, °C, s, and a plain fraction for load), so that
-numbers can be passed on without asking. People say `90deg` and `30rpm`; this is where the one becomes the other,
-and nowhere else. A number without a unit is in the API's unit. Raw counts are another thing than a quantity and
-are only ever taken as such: see `raw`.
+The API knows one unit per quantity (rad, rad/s, rad/s², A, V, °C, s, a plain fraction for load, and m, m/s, m/s² for
+what a linear axis does), so that numbers can be passed on without asking. People say `90deg`, `30rpm` and `5 mm`; this
+is where the one becomes the other, and nowhere else. A number without a unit is in the API's unit. Raw counts are
+another thing than a quantity and are only ever taken as such: see `raw`.
 """
 
 from __future__ import annotations
@@ -40,6 +40,16 @@ SCALES: Mapping[str, Mapping[str, float]] = {
         "turn/s²": TURN,
         "turn/s2": TURN,
     },
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
+    "linear velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "mm/min": 1e-3 / 60},
+    "linear acceleration": {
+        "m/s²": 1.0,
+        "m/s2": 1.0,
+        "m/s^2": 1.0,
+        "mm/s²": 1e-3,
+        "mm/s2": 1e-3,
+        "mm/s^2": 1e-3,
+    },
     "current": {"A": 1.0, "mA": 1e-3},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "temperature": {"°C": 1.0, "degC": 1.0, "C": 1.0},
@@ -52,6 +62,9 @@ QUANTITIES: Mapping[str, str] = {
     "rad": "position",
     "rad/s": "velocity",
     "rad/s²": "acceleration",
+    "m": "length",
+    "m/s": "linear velocity",
+    "m/s²": "linear acceleration",
     "A": "current",
     "V": "voltage",
     "°C": "temperature",
@@ -60,6 +73,9 @@ QUANTITIES: Mapping[str, str] = {
 }
 """Which quantity a unit of the API (the unit of a table row) measures."""
 
+_MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
+_LONG = 16
+"""Characters; a number with its unit that has as many is no number that a person wrote."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
 _FACTORS = {"k": 1000, "M": 1_000_000}
@@ -112,8 +128,34 @@ def show(value: float, quantity: str) -> str:
         return f"{value * 100:.1f} %"
     if quantity == "time":
         return _show_time(value)
+    if quantity in _MILLIMETRES:
+        return f"{value * 1000:.3f} {_MILLIMETRES[quantity]}"
     decimals = {"acceleration": 2, "current": 3, "voltage": 1, "temperature": 0}[quantity]
     return f"{value:.{decimals}f} {next(iter(SCALES[quantity]))}"
+
+
+def written(value: float, quantity: str, unit: str) -> str:
+    """A value in the API's unit, for a file: the fewest digits in `unit` that `parse` reads as the same number.
+
+    In the API's own unit where that is shorter by far, as 2 rad is, or where no digits in `unit` do. Raises KeyError
+    for a unit that is none of `quantity`.
+    """
+    api = next(name for name, scale in SCALES[quantity].items() if scale == 1.0)
+    own, plain = _fewest(value, quantity, unit), f"{_plain(value)} {api}"
+    return own if own and (len(own) < _LONG or len(own) <= len(plain)) else plain
+
+
+def _fewest(value: float, quantity: str, unit: str) -> str:
+    number = value / SCALES[quantity][unit]
+    for digits in range(1, 18):
+        text = f"{_plain(float(f'{number:.{digits}g}'))} {unit}"
+        if parse(text, quantity) == value:
+            return text
+    return ""
+
+
+def _plain(number: float) -> str:
+    return repr(number).removesuffix(".0")
 
 
 def _show_time(value: float) -> str:

@@ -1,0 +1,49 @@
+"""How a file is refused: one message that names the place in the file, what may stand there, and what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+from motorbus.core.entry import shown
+from motorbus.errors import RequestError
+
+_BARE = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_KINDS = {dict: "a table", list: "a list", bool: "true or false", str: "text"}
+
+
+def path(*keys: str) -> str:
+    """`axis.shoulder.low`, and `axis."a b"` where a key needs quotes; no longer than a line."""
+    return ".".join(key if _BARE.fullmatch(key) else shown(key).replace("'", '"') for key in keys)
+
+
+def refused(where: str, what: str, expected: str, advice: str) -> RequestError:
+    """The error for what stands at `where`; `advice` is what to do about it."""
+    summary = f"{where}: {what}" if where else what
+    return RequestError(summary, expected=expected, advice=f"{advice}; nothing was opened")
+
+
+def said(value: Any) -> str:
+    """What somebody wrote, for reading eyes: text in quotes, a table or a list only by that word."""
+    if isinstance(value, dict | list):
+        return _KINDS[type(value)]
+    if isinstance(value, bool):
+        return str(value).lower()
+    return shown(value) if isinstance(value, str | int | float) else shown(str(value))
+
+
+def nearest(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """`did you mean shoulder?`, or `otherwise` when nothing is near."""
+    near = get_close_matches(word.lower()[:80], sorted(known), n=1)
+    return f"did you mean {near[0]}?" if near else otherwise
+
+
+def listed(words: Iterable[str], otherwise: str = "none") -> str:
+    """`one of a, b, c`; the first twelve where there are many."""
+    found = list(words)
+    if not found:
+        return otherwise
+    more = f" and {len(found) - 12} more" if len(found) > 12 else ""
+    return f"{'one of ' if len(found) > 1 else ''}{', '.join(found[:12])}{more}"

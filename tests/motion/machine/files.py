@@ -1,0 +1,216 @@
+"""A good machine file, what is wrong with others that are nearly it, and any machine that a file can describe.
+
+Each broken file has one thing wrong. `says` is how its message begins (the place in the file and what is there), `fix`
+what it must offer, and `schema` whether a JSON Schema can see it too.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, get_args
+
+from hypothesis import strategies as st
+
+from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine
+from motorbus.motion.machine.model import Exit
+
+GOOD = """\
+# The bench in the cellar.
+format = 1
+name = "bench"
+
+[bus.arm]                       # behind the left adapter
+address = "feetech:/dev/ttyACM0,baud=1000000"
+[bus.gimbal]
+address = "kst:can://slcan/dev/ttyACM1,bitrate=500000"
+
+# The shoulder was replaced in March.
+[axis.shoulder]
+device = "arm#1"
+zero = "180 deg"                # measured by hand
+sign = -1
+gear = 3.0
+unit = "deg"
+low = "-90 deg"
+high = "90 deg"
+max_velocity = "120 deg/s"
+max_acceleration = "500 deg/s2"
+max_step = "10 deg"
+exit = "hold"
+torque = 0.5
+
+# Handle with care.
+[axis.elbow]
+device = "arm#2"
+low = -2
+high = "2 rad"
+exit = "park"
+park = "0 deg"
+current = "0.4 A"
+
+[axis.slide]
+device = "gimbal#0x25"
+travel = "5 mm"
+low = "0 mm"
+high = "120 mm"
+
+[group.left]
+axes = ["shoulder", "elbow"]    # top to bottom
+
+[pose.ready]
+shoulder = "10 deg"             # up
+elbow = "-20 deg"
+slide = "30 mm"
+"""
+
+
+class Broken(NamedTuple):
+    """A file that must be refused: `old` in the good one is replaced by `new`."""
+
+    old: str
+    new: str
+    says: str
+    fix: str
+    schema: bool = True
+
+    @property
+    def text(self) -> str:
+        """The whole file."""
+        assert GOOD.count(self.old) == 1, self.old
+        return GOOD.replace(self.old, self.new)
+
+
+DEEP = "zero" + ".a" * 3000 + " = 1"
+BROKEN = (
+    # the file itself
+    Broken("format = 1\n", "", "format: is missing", "make it the first line"),
+    Broken("format = 1", "format = 2", "format: 2 is not known", "update motorbus"),
+    Broken("format = 1", 'format = "1"', "format: '1' is not known", "write format = 1"),
+    Broken('low = "-90 deg"', "low = -90 deg", "the file is no TOML: ", "stands in quotes", False),
+    Broken("sign = -1", "sign = -1\nsign = 1", "the file is no TOML: ", "each key in its table once", False),
+    Broken("[axis.elbow]", "[axis.shoulder]", "the file is no TOML: ", "each [table] stands in a file once", False),
+    Broken("gear = 3.0", "gear = " + "[" * 3000, "the file is no TOML: it is nested", "TOML", False),
+    Broken("gear = 3.0", "gear = " + "9" * 5000, "the file is no TOML: a number has thousands", "TOML", False),
+    Broken("format = 1", "format = 1\nspeed = 3", "speed: there is no such key", "one of format, name, bus"),
+    Broken("[group.left]", "[groups.left]", "groups: there is no such key", "did you mean group?"),
+    Broken('name = "bench"', "name = 7", "name: 7 is no name of a machine", "text in quotes"),
+    Broken('name = "bench"', f'name = "{"x" * 201}"', "name: 'xxx", "200 characters"),
+    # names
+    Broken("[axis.slide]", "[axis.Slide]", "axis.Slide: the name has other characters", "call it slide"),
+    Broken("[bus.gimbal]", '[bus."gim bal"]', 'bus."gim bal": the name has', "call it gim_bal"),
+    Broken("[pose.ready]", '[pose.""]', 'pose."": the name is empty', "a lower case letter"),
+    Broken("[group.left]", "[group.slide]", "group.slide: this is the name of axis.slide too", "slide_group", False),
+    # buses
+    Broken('address = "feetech:/dev/ttyACM0,baud=1000000"', "", "bus.arm.address: is missing", "FAMILY:PORT"),
+    Broken("feetech:/dev/ttyACM0,", "feetech:,", "bus.arm.address: 'feetech:,baud", "FAMILY:PORT"),
+    Broken("feetech:/dev/ttyACM0,", "/dev/ttyACM0,", "bus.arm.address: '/dev/ttyACM0,baud", "FAMILY:PORT"),
+    Broken(",baud=1000000", "#3", "bus.arm.address: 'feetech:/dev/ttyACM0#3'", "it stands in an axis"),
+    Broken("address = \"kst", "adress = \"kst", "bus.gimbal.adress: there is no such key", "did you mean address?"),
+    Broken('[bus.gimbal]\naddress', 'bus.gimbal', "bus.arm.bus: there is no such key", "address"),
+    Broken("[bus.gimbal]\naddress", "[bus]\ngimbal", "bus.gimbal: 'kst:can:", "a table [bus.gimbal]"),
+    # devices
+    Broken('device = "arm#2"', "", "axis.elbow.device: is missing", "BUS#ID"),
+    Broken('"arm#2"', "2", "axis.elbow.device: 2 is no device", "BUS#ID"),
+    Broken("arm#2", "arm2", "axis.elbow.device: 'arm2' is no device", 'as "arm#1"'),
+    Broken("arm#2", "arms#2", "axis.elbow.device: there is no bus arms", "did you mean arm?", False),
+    Broken("arm#2", "arm#0x1", "axis.elbow.device: arm#0x1 moves axis.shoulder already", "change the id", False),
+    Broken("arm#2", "arm#4294967295", "axis.elbow.device: 4294967295 is no id", "0 to 2147483647", False),
+    # keys and values of axes
+    Broken("max_velocity", "max_velocty", "axis.shoulder.max_velocty: there is no", "did you mean max_velocity?"),
+    Broken("sign = -1", "sign = 0", "axis.shoulder.sign: 0 is not possible", "one of 1, -1"),
+    Broken("sign = -1", "sign = true", "axis.shoulder.sign: true is not possible", "one of 1, -1"),
+    Broken("gear = 3.0", "gear = 0", "axis.shoulder.gear: 0 is out of range", "1e-06 to 1000"),
+    Broken("gear = 3.0", 'gear = "3:1"', "axis.shoulder.gear: '3:1' is no finite number", "a number"),
+    Broken("gear = 3.0", "gear = nan", "axis.shoulder.gear: nan is no finite number", "a number", False),
+    Broken('unit = "deg"', 'unit = "grad"', "axis.shoulder.unit: 'grad' is not possible", "did you mean rad?"),
+    Broken('unit = "deg"', 'unit = "mm"', "axis.shoulder.unit: 'mm' is not possible", "when it has travel"),
+    Broken('zero = "180 deg"', 'zero = "180 grd"', "axis.shoulder.zero: position '180 grd' has", "deg"),
+    Broken('zero = "180 deg"', 'zero = ""', "axis.shoulder.zero: position '' is empty", "a number"),
+    Broken('zero = "180 deg"', 'zero = "2048 raw"', "axis.shoulder.zero: position '2048 raw'", "with one of rad"),
+    Broken('zero = "180 deg"', DEEP, "axis.shoulder.zero: a table is no position", "a finite number in rad"),
+    Broken('zero = "180 deg"', "zero = {deg = 180}", "axis.shoulder.zero: a table is no position", 'zero = "180 deg"'),
+    Broken("low = -2", "low = inf", "axis.elbow.low: inf is no position", "a finite number in rad"),
+    Broken("low = -2", "low = 2024-05-01", "axis.elbow.low: '2024-05-01' is no position", "a finite number"),
+    Broken("low = -2", 'low = "-20 mm"', "axis.elbow.low: position '-20 mm' has the unit", 'has travel = "5 mm"'),
+    Broken('low = "0 mm"', 'low = "0 deg"', "axis.slide.low: length '0 deg' has the unit", "leave travel out"),
+    Broken('low = "0 mm"', 'low = "1,5 mm"', "axis.slide.low: length '1,5 mm' has a decimal comma", "point"),
+    Broken('travel = "5 mm"', 'travel = "0 mm"', "axis.slide.travel: '0 mm' is out of range", "1e-06 to 1000", False),
+    Broken('"120 deg/s"', '"120 deg"', "axis.shoulder.max_velocity: velocity '120 deg' has", "deg/s"),
+    Broken('"120 deg/s"', '"-120 deg/s"', "axis.shoulder.max_velocity: '-120 deg/s' is out", "above 0"),
+    Broken('"500 deg/s2"', "0", "axis.shoulder.max_acceleration: 0 is out of range", "above 0"),
+    Broken('exit = "hold"', 'exit = "torque-off"', "axis.shoulder.exit: 'torque-off' is", "did you mean torque_off?"),
+    Broken("torque = 0.5", "torque = 50", "axis.shoulder.torque: 50 is out of range", 'write "50 %"'),
+    Broken('"0.4 A"', '"0.4 V"', "axis.elbow.current: current '0.4 V' has the unit", "A, mA"),
+    Broken('"0.4 A"', "[0.4]", "axis.elbow.current: a list is no current", "a finite number in A"),
+    Broken("[axis.slide]", "[[axis.slide]]", "axis.slide: a list is no table", "a table [axis.slide]"),
+    # limits
+    Broken('low = "-90 deg"', 'low = "91 deg"', "axis.shoulder.low: 91.0 deg is above high", "exchange the two", False),
+    Broken('low = "-90 deg"', 'low = "90 deg"', "axis.shoulder.high: it is 90.0 deg like low", "more than 90", False),
+    Broken('low = "0 mm"\n', "", "axis.slide.low: is missing, and high is there", "both, or none"),
+    Broken('park = "0 deg"\n', "", 'axis.elbow.park: is missing, and exit is "park"', 'park = "0 deg"'),
+    Broken('park = "0 deg"', 'park = "1 turn"', "axis.elbow.park: 360.0 deg is outside", "-114.6 deg to 114.6", False),
+    Broken('current = "0.4 A"', 'current = 1\ntorque = 1', "axis.elbow.current: torque is there too", "take one"),
+    # groups and poses
+    Broken('["shoulder", "elbow"]', '"shoulder"', "group.left.axes: 'shoulder' is no list", 'axes = ["shoulder"'),
+    Broken('["shoulder", "elbow"]', "[]", "group.left.axes: it names no axis", 'axes = ["shoulder"'),
+    Broken('["shoulder", "elbow"]', "[1]", "group.left.axes[0]: 1 is no name", "names stand in quotes"),
+    Broken('["shoulder", "elbow"]', '["sholder"]', "group.left.axes[0]: there is no axis", "mean shoulder?", False),
+    Broken('"shoulder", "elbow"', '"elbow", "elbow"', "group.left.axes[1]: elbow is named twice", "take one of them"),
+    Broken('axes = ["sh', 'axis = ["sh', "group.left.axis: there is no such key", "axes"),
+    Broken('elbow = "-20 deg"', 'elbo = "-20 deg"', "pose.ready.elbo: there is no axis 'elbo'", "mean elbow?", False),
+    Broken('"30 mm"', '"130 mm"', "pose.ready.slide: 130.00 mm is outside the limits", "0.00 mm to 120.00 mm", False),
+    Broken('"30 mm"', '"30 deg"', "pose.ready.slide: length '30 deg' has the unit", "leave travel out", False),
+)  # fmt: skip
+
+
+def axis(**other: Any) -> AxisSpec:
+    """A plain axis that turns, where nothing else is said."""
+    usual = {"device": "arm#1", "unit": "deg", "max_velocity": 1.5, "max_acceleration": 6.0}
+    return AxisSpec(**{**usual, **other})
+
+
+def _positions(linear: bool) -> st.SearchStrategy[float]:
+    farthest = 10.0 if linear else 1000.0
+    return st.floats(-farthest, farthest)
+
+
+@st.composite
+def axes(draw: st.DrawFn, device: str = "arm#1") -> AxisSpec:
+    """Any axis that a file can describe."""
+    linear = draw(st.booleans())
+    positions = _positions(linear)
+    low, high = sorted(draw(st.lists(positions, min_size=2, max_size=2, unique=True)))
+    limits = draw(st.sampled_from([{}, {"low": low, "high": high}]))
+    inside = st.floats(low, high)
+    exit_: Exit = draw(st.sampled_from(get_args(Exit)))
+    caps = [{}, {"torque": draw(st.floats(1e-3, 1))}, {"current": draw(st.floats(1e-3, 100))}]
+    return AxisSpec(
+        device=device,
+        zero=draw(_positions(False)),
+        sign=draw(st.sampled_from([1, -1])),
+        gear=draw(st.floats(1e-3, 1e3)),
+        travel=draw(st.floats(1e-4, 10)) if linear else None,
+        unit=draw(st.sampled_from(["mm", "m"] if linear else ["deg", "rad", "turn"])),
+        max_velocity=draw(st.floats(1e-3, 1e3)),
+        max_acceleration=draw(st.floats(1e-3, 1e3)),
+        max_step=draw(st.none() | st.floats(1e-3, 1e3)),
+        exit=exit_,
+        park=draw(inside) if exit_ == "park" else None,
+        **limits,
+        **draw(st.sampled_from(caps)),
+    )
+
+
+@st.composite
+def machines(draw: st.DrawFn) -> Machine:
+    """Any machine that a file can describe, of at most four axes."""
+    count = draw(st.integers(0, 4))
+    moved = {f"axis-{number}": draw(axes(f"arm#{number}")) for number in range(count)}
+    some = draw(st.lists(st.sampled_from(sorted(moved)), unique=True)) if moved else []
+    pose = {name: moved[name].low or 0.0 for name in some if moved[name].allows(moved[name].low or 0.0)}
+    return Machine(
+        name=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=20)),
+        buses={"arm": BusSpec(address="feetech:/dev/ttyACM0,baud=1M")},
+        axes=moved,
+        groups={"some": GroupSpec(axes=tuple(some))} if some else {},
+        poses={"rest": pose} if pose else {},
+    )
