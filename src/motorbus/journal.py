@@ -106,7 +106,7 @@ class BusJournal:
             change = self.unfinished()
         except MotorbusError as error:
             return f"{error.summary}; {error.advice}"
-        return f"{_described(change)} is unfinished; {_ADVICE.format(change.bus)}" if change else ""
+        return f"{_described(change)} is unfinished; {_advice(change)}" if change else ""
 
     # -- the file -------------------------------------------------------------------------------------------------
 
@@ -258,7 +258,6 @@ def _belongs(event: Journal, change: Change) -> bool:
     )
 
 
-_ADVICE: Final = "`motorbus recover {}` finishes it or takes it back"
 _FORGET: Final = (
     "when every device of that bus is as it should be, `motorbus recover {} --forget` gives it up"
 )
@@ -269,11 +268,18 @@ def _described(change: Change) -> str:
     return f"{what}, begun {change.begun},"
 
 
+def _advice(change: Change) -> str:
+    ends = (
+        "gives it back" if change.what else "finishes it or takes it back"
+    )  # what has words of its own is a loan
+    return f"`motorbus recover {change.bus}` {ends}"
+
+
 def _unfinished(change: Change) -> RequestError:
     return RequestError(
         f"{_described(change)} is unfinished on this bus",
         cause="the program that made the change was ended, or the device lost its supply, in the middle of it",
-        advice=f"{_ADVICE.format(change.bus)}; nothing was sent",
+        advice=f"{_advice(change)}; nothing was sent",
     )
 
 

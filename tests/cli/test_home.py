@@ -27,7 +27,7 @@ def homed(
 
 def test_it_ends_at_its_switch(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     code, said, orders, turning = homed(run, monkeypatch, "wired", "--yes")
-    assert (code, orders, turning) == (0, ["home", "stop_project", "stop_motor"], 0)
+    assert (code, orders, turning) == (0, ["home", "stop_motor", "stop_project"], 0)
     assert "input 5 was active" in said
 
 
@@ -47,7 +47,14 @@ def test_it_asks_first(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["stepper:sim", "feetech:sim#1", "stepper:sim#1 --deadline never", "stepper:sim#1 --deadline 0"]
+    "words",
+    [
+        "stepper:sim#2",
+        "feetech:sim",
+        "feetech:sim#1",
+        "stepper:sim#1 --deadline never",
+        "stepper:sim#1 --deadline 0",
+    ],
 )
 def test_bad_input_ends_with_2(words: str, run: Run) -> None:
     ran = run("home", *words.split(), "--yes")

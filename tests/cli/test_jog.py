@@ -57,7 +57,7 @@ def test_a_dry_run_moves_nothing(run: Run, line: Line) -> None:
         "BUS#1=60rpm --seconds 61",
         "BUS#1=0 --seconds 1",
         "BUS#1=60rpm",
-        "BUS=60rpm --seconds 1",
+        "BUS --seconds 1",
         "BUS#2=60rpm --seconds 1",
         "feetech:sim#1=60rpm --seconds 1",
         "=60rpm --seconds 1",

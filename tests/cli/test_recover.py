@@ -229,6 +229,7 @@ def lent() -> Iterator[Simulation]:
             "what": "the borrow of project 1 (for jog)",
             "image": image.hex(),
             "order": "little",
+            "motor": 3,
             "wanted": {"step_1_speed": 60},
         }
         assert bus.journal is not None
@@ -259,12 +260,13 @@ def test_a_borrowed_project_is_called_by_its_name(run: Run, lent: Simulation) ->
 def test_what_was_borrowed_is_given_back_and_not_finished(run: Run, lent: Simulation) -> None:
     ran = run("recover", lent.url, "--yes")
     assert ran.out.splitlines() == ["simulated", "given back: the borrow of project 1 (for jog)"]
+    assert f"`motorbus recover {lent.url}` gives it back" in ran.err
 
 
 def test_a_dry_run_of_giving_back_shows_the_stop_first(run: Run, lent: Simulation) -> None:
     ran = run("recover", lent.url, "--dry-run")
     assert ran.code == 0, ran.err
-    assert ran.out.index("FF AA 5E") < ran.out.index("FF AA 03 0D") < ran.out.index("FF AA 03 05")
+    assert ran.out.index("FF AA 03 0D") < ran.out.index("FF AA 5E") < ran.out.index("FF AA 03 05")
     assert run("recover", lent.url, "--forget", "--yes").out.endswith(
         "forgotten: the borrow of project 1 (for jog)\n"
     )

@@ -10,7 +10,7 @@ from tests.cli.stepper.conftest import Line, line_of
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 
-STOPPED = ["stop_project", "stop_motor"]
+STOPPED = ["stop_motor", "stop_project"]
 
 
 @pytest.mark.parametrize(("name", "sign"), [("jog_forward", 1), ("jog_reverse", -1)])
@@ -48,7 +48,7 @@ def test_homing_by_its_name_in_the_manual(run: Run, monkeypatch: pytest.MonkeyPa
 
 def test_a_dry_run_shows_the_stop_too(run: Run, line: Line) -> None:
     ran = run("stepper", "jog-forward", line.url, "--seconds", "9", "--dry-run", "--json")
-    assert [one["data"][6:11] for one in ran.document["withheld"]] == ["03 0A", "5E 00", "03 0D"]
+    assert [one["data"][6:11] for one in ran.document["withheld"]] == ["03 0A", "03 0D", "5E 00"]
     assert line.orders() == []
 
 

@@ -101,14 +101,12 @@ def test_at_every_line(verb: str, rounds: Rounds) -> None:
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("later", [1, 3, 8, 21, 55, 89])
-@pytest.mark.parametrize("verb", ["jog", "home that finds nothing"])
-def test_twice(verb: str, later: int, rounds: Rounds) -> None:
-    works: dict[str, Work] = {"jog": jogged, "home that finds nothing": homed}
+def test_twice(later: int, rounds: Rounds) -> None:
     at, notes = 0, START
     while notes is not None:
         at += apart(rounds, 211)
-        line = Line1(home_switch="never")
-        notes = interrupted(line, works[verb], Interrupt(at, later))
+        line = Line1()
+        notes = interrupted(line, jogged, Interrupt(at, later))
         check(line, notes, at)
 
 

@@ -132,7 +132,7 @@ def test_an_input_that_there_is_not_is_refused(ports: Any) -> None:
 @pytest.mark.parametrize("seconds", [0, -1, float("nan"), float("inf"), "5", None, True])
 def test_a_time_that_is_none_is_refused(seconds: Any) -> None:
     with bench() as there:
-        with pytest.raises(RequestError, match="no time to watch for"):
+        with pytest.raises(RequestError, match="seconds: "):
             there.device.watch_inputs((1,), seconds)
         with pytest.raises(RequestError, match="no input is named"):
             there.device.watch_inputs((), 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import tau
@@ -213,7 +214,7 @@ def leave(device: Controller) -> Moved:
 
 def test_what_was_left_to_itself_is_not_forgotten() -> None:
     """It takes ten seconds and more: nothing else begins meanwhile, but a stop."""
-    for second in (
+    others: tuple[Callable[[Controller], object], ...] = (
         leave,
         lambda device: device.jog(-tau, 1.0),
         lambda device: device.home(),
@@ -221,13 +222,15 @@ def test_what_was_left_to_itself_is_not_forgotten() -> None:
         lambda device: device.run(1),
         lambda device: device.start_project(1),
         lambda device: device.characterise(),
-    ):
+    )
+    for other in others:
         line = Line1(LEFT)
-        failed(
-            line.run(lambda device, then=second: (leave(device), then(device))),
-            RequestError,
-            "a move may not be",
-        )
+
+        def both(device: Controller, other: Callable[[Controller], object] = other) -> object:
+            leave(device)
+            return other(device)
+
+        failed(line.run(both), RequestError, "a move may not be over")
         assert len(line.sent) == 3
         line.later()
         assert line.simulated.position == 16000

@@ -22,6 +22,7 @@ from motorbus.families.stepper.driver.waiting import Outcome, Ran
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Bar, Output
@@ -103,9 +104,7 @@ def run(
         what=f"project {project}", consent=agreed, dry_run=dry_run,
         rehearse=verb("start_project", project, **chosen), hear=partial(heard, progress, output),
     )  # fmt: skip
-    if told is None:
-        return Exit.OK
-    return _ended(project, told._replace(predicted=settled(told.predicted, profile)), output)
+    return Exit.OK if told is None else _ended(project, told, profile, output)
 
 
 @app.command(
@@ -192,12 +191,13 @@ def _where(event: Estimated) -> str:
     return f"estimated:{through} pass {event.round}{passes}, {step}{waits}, {place} from the start"
 
 
-def _ended(project: int, told: Ran, output: Output) -> Exit:
+def _ended(project: int, told: Ran, profile: Path | None, output: Output) -> Exit:
     """Print what came of it. Raises Interrupted, NoReply or OutcomeUnknown for what is not `completed`."""
     facts = {"project": project, "outcome": told.outcome.value, "seconds": told.seconds, "why": told.why}
-    output.document("motorbus.stepper.run/1", {**facts, "predicted": plain(told.predicted.data())})
+    predicted = settled(told.predicted, profile)
+    output.document("motorbus.stepper.run/1", {**facts, "predicted": plain(predicted.data())})
     took = "" if told.seconds is None else f" in {told.seconds:.3f} s"
-    output.text(f"project {project} {told.outcome.value}{took}: {told.why}\npredicted: {told.predicted}")
+    output.text(f"project {project} {told.outcome.value}{took}: {told.why}\npredicted: {predicted}")
     if (kind := _ENDS.get(told.outcome)) is not None:
         raise kind(
             f"project {project}: {told.outcome.value}: {told.why}",

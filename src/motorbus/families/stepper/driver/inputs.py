@@ -7,13 +7,14 @@ agree on it. What is shorter than two rounds is not seen, and nothing tells that
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import isfinite
+from math import inf
 from typing import Final, NamedTuple
 
 from motorbus.core.operation import Operation, Pause, Report
 from motorbus.errors import FramingError, RequestError
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import READINGS, read_input
+from motorbus.families.stepper.driver.turning import within
 from motorbus.families.stepper.table import INPUTS
 
 PORTS: Final = tuple(range(1, INPUTS + 1))
@@ -103,7 +104,7 @@ def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0
     chosen = checked(ports)
     if not chosen:
         raise RequestError("no input is named", expected="some of 1 to 5", advice="nothing was sent")
-    _check_seconds(seconds)
+    within(seconds, inf, "seconds")
     levels = Levels((yield from inputs(node, chosen)))
     changes: list[InputChanged] = []
     rounds, began = 0, (yield from Pause(0))
@@ -133,17 +134,3 @@ def checked(ports: Iterable[int]) -> Sequence[int]:
                 advice="nothing was sent",
             )
     return found
-
-
-def _check_seconds(seconds: float) -> None:
-    if (
-        isinstance(seconds, bool)
-        or not isinstance(seconds, int | float)
-        or not isfinite(seconds)
-        or seconds <= 0
-    ):
-        raise RequestError(
-            f"{seconds!r} is no time to watch for",
-            expected="seconds, more than 0",
-            advice="nothing was sent",
-        )

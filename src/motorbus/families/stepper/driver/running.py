@@ -196,7 +196,7 @@ def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
         )
 
 
-# -- the start: all of it alone, so that nothing of this bus moves or edits between the reading and the order -----------
+# -- the start: all of it alone, so that nothing of this bus moves or edits between the reading and the order ----------
 
 
 def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
