@@ -38,7 +38,20 @@ class Change(NamedTuple):
     @property
     def what(self) -> str:
         """What is unfinished, in words; "" when its facts do not say, and its verb has to."""
-        said = self.facts.get("what")
+        return self._words("what")
+
+    @property
+    def cause(self) -> str:
+        """Why it is unfinished, in words; "" when its facts do not say."""
+        return self._words("cause")
+
+    @property
+    def advice(self) -> str:
+        """What ends it, in words; "" when its facts do not say: then recover does."""
+        return self._words("advice").replace("{bus}", self.bus)
+
+    def _words(self, name: str) -> str:
+        said = self.facts.get(name)
         return said if isinstance(said, str) else ""
 
     @property
@@ -269,16 +282,17 @@ def _described(change: Change) -> str:
 
 
 def _advice(change: Change) -> str:
-    ends = (
-        "gives it back" if change.what else "finishes it or takes it back"
-    )  # what has words of its own is a loan
+    if change.advice:
+        return change.advice
+    ends = "gives it back" if change.what else "finishes it or takes it back"  # what has words is a loan
     return f"`motorbus recover {change.bus}` {ends}"
 
 
 def _unfinished(change: Change) -> RequestError:
     return RequestError(
         f"{_described(change)} is unfinished on this bus",
-        cause="the program that made the change was ended, or the device lost its supply, in the middle of it",
+        cause=change.cause
+        or "the program that made the change was ended, or the device lost its supply, in the middle of it",
         advice=f"{_advice(change)}; nothing was sent",
     )
 

@@ -213,6 +213,8 @@ def _facts(change: Change) -> dict[str, object]:
 
 def _ending(change: Change) -> str:
     """What is about to be done. What a family calls by its own words is a loan, which nobody can finish."""
+    if change.what and change.advice:
+        return f"end {change.what}: stop the device"
     if change.what:
         return f"end {change.what}: stop the device, and give back what was there"
     return f"finish {_called(change)}, or take it back"

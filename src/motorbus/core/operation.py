@@ -329,7 +329,7 @@ class Journal(NamedTuple):
     `state`   ASKED: it is wanted, and its conditions are about to be checked; nothing is kept, but a bus on which
               another change is unfinished refuses. INTENT: from the next step on something may be changed; `facts` are
               all that is needed to finish it or to take it back, as plain data, the id of the device as "node", and
-              where the verb alone would not tell people, what is unfinished as "what": "the borrow of project 1".
+              for people, where the verb tells too little, "what" is unfinished, its "cause", and "advice" ({bus}).
               Any other word: a step that has been reached. OUTCOME: it is over, `facts["outcome"]` says how
     """
 

@@ -127,7 +127,7 @@ def test_kill_9(request_: int, served: Simulated, watched: Watched) -> None:
     assert borrowed is (request_ > 2)
     code, told, _ = watched.run(f"recover {served.bus} --yes")
     assert code == 0, told
-    assert ("taken back: the borrow of project 1 (for jog)" in told) is borrowed, told
+    assert ("given back: the borrow of project 1 (for jog)" in told) is borrowed, told
     assert stored(served.bus) == before
     assert main(f"jog {served.bus}#1{JOG}".split()) == 0
     assert stored(served.bus) == before

@@ -99,7 +99,8 @@ def test_a_stop_goes_between_two_readings() -> None:
         stopped: list[object] = []
 
         def stop(event: object) -> None:
-            stopped.append(there.device.stop())
+            if isinstance(event, InputChanged):
+                stopped.append(there.device.stop())
 
         there.simulator.press(1, True, 1.0)
         there.bus.report = stop

@@ -16,6 +16,7 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper.driver import characterising, reading
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.owing import RUN, settled
 from motorbus.families.stepper.driver.stopping import BY_HAND, ended
 from motorbus.families.stepper.table import PROJECTS, Project, decode_image, differences
 
@@ -26,13 +27,18 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     """Give project 1 back that was borrowed when the host was cut off: `change` its verb, `facts` as the journal says.
 
     Stops the motor first. Gives "old" when project 1 reads as it was. May be called again at any point. `alone` makes
-    no difference: there is one controller on a line. A `characterise` that was cut off is ended likewise.
+    no difference: there is one controller on a line. A `characterise` that was cut off is ended likewise, and a run of
+    which nobody knows whether it has ended is stopped: "stopped".
 
     Raises RequestError, with nothing sent, for facts of something else, or of a bus that was opened with another order
     of bytes or another motor; RequestError, with nothing but the stop sent, when somebody has written project 1 since;
     OutcomeUnknown when the stop is not accepted, for nothing is edited while the motor may turn; whatever writing and
     reading raise. The journal stays open then.
     """
+    if change == RUN:
+        yield from ended(node)
+        yield from settled(node, "stopped")
+        return "stopped"
     if change == characterising.VERB:
         return (yield from characterising.recovered(node, facts))
     loan = loan_of(change, facts)

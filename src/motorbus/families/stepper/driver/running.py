@@ -38,6 +38,7 @@ from motorbus.families.stepper.driver.commands import motion
 from motorbus.families.stepper.driver.exchanges import timed
 from motorbus.families.stepper.driver.inputs import Levels, checked, inputs
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.owing import RUN, owed, settled
 from motorbus.families.stepper.driver.progress import Twin
 from motorbus.families.stepper.driver.turning import Watch, refuse_unless_idle, slowing, within
 from motorbus.families.stepper.driver.waiting import Outcome, Ran, Wait
@@ -102,7 +103,7 @@ def run(
     What no host can tell: a notice that comes when it might be true is taken for true, also where two bytes of noise
     look like one, where a project that a button started ends, and where a device says it after a stop by a button that
     nobody watches. A project that a timeout or an unknown leaves behind may still run, so the next is refused until
-    `stop`, or `stop_first`.
+    `stop`, or `stop_first`; the journal of the bus remembers it when this program has ended.
 
     `watch` names inputs, 1 to 5, that are read all the while: they tell the model when a wait is over. About every
     0.25 s an `Estimated` is reported, and an `InputChanged` for each watched input that changes. Refusals are those of
@@ -126,6 +127,8 @@ def run(
         raise
     assert course.wait is not None, "a start that fails raises"
     assert course.wait.ran is not None, "a wait ends with an outcome"
+    if not node.memory.owed:
+        yield from settled(node, course.wait.ran.outcome.value)
     return course.wait.ran
 
 
@@ -161,11 +164,12 @@ def _check_timeout(timeout: float | None, endless: bool) -> None:
 
 def _ready(node: Node, asked: _Asked) -> Operation[Plan]:
     """Whether it may be started: its plan."""
-    yield from Report(Journal("run", ASKED, {"node": node.node}))
     if asked.stop_first:
         yield from stopping.ended(node)
+        yield from settled(node, "stopped")
     else:
         yield from refuse_unless_idle(node, f"starting project {asked.project}")
+    yield from Report(Journal(RUN, ASKED, {"node": node.node}))
     program = yield from reading.read_project(node, asked.project)
     plan = program.plan(asked.how)
     _judge(program, plan, asked.endless, asked.expert)
@@ -207,7 +211,7 @@ def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
 
 def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
     """Send it; when it was acknowledged (s). It may run from the moment it leaves."""
-    memory, number, left = node.memory, plan.project.number, True
+    number, left = plan.project.number, True
 
     def overtaken(_: Stops) -> MotorbusError | None:
         nonlocal left
@@ -216,15 +220,13 @@ def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
 
     where = goals.of_project(node, plan.project, plan.how)
     said = motion(node, "start_project", where, overtaken, project=number)
-    memory.owed = True
+    yield from owed(node, number)
     outputs.forget(node)
     try:
         return (yield from timed(said))
-    except (LimitExceeded, RequestError):
-        memory.owed = False
-        raise
-    except Interrupted:
-        memory.owed = memory.owed and left
+    except (LimitExceeded, RequestError, Interrupted) as error:
+        if not (isinstance(error, Interrupted) and left):
+            yield from settled(node, "not started")
         raise
 
 

@@ -18,6 +18,7 @@ from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.owing import settled
 
 STOPS: Final = ("stop_project", "stop_motor")
 BY_HAND: Final = ("stop_motor", "stop_project")
@@ -44,7 +45,9 @@ def stop(node: Node) -> Operation[Promise]:
     been heard all the same, and the motor may be turning as well; LinkError when the port is gone.
     """
     node.memory.wanted += 1
-    return (yield from ended(node))
+    promise = yield from ended(node)
+    yield from settled(node, "stopped")
+    return promise
 
 
 def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:

@@ -1,0 +1,105 @@
+"""A project that was started and may still run is known to the next program that opens the line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+import motorbus
+from motorbus import session
+from motorbus.core.operation import INTENT, Journal
+from motorbus.errors import RequestError
+from motorbus.families.stepper import Controller
+from motorbus.families.stepper.driver import Outcome
+from motorbus.simulation.named import Simulation
+from tests.families.stepper.runs import A, B, STOPS, TURN, made
+
+
+@contextmanager
+def opened(simulation: Simulation) -> Iterator[Controller]:
+    with motorbus.open(simulation.url) as bus:
+        yield Controller(bus)
+
+
+@contextmanager
+def started(project: int = 2) -> Iterator[Simulation]:
+    """A program has started a project and gone; it runs 41 s, project 1 takes 1.7 s."""
+    with motorbus.simulate("stepper") as simulation:
+        simulation[1].put(1, A)
+        simulation[1].put(2, replace(B, number=2, steps=tuple(replace(s, start_input=0) for s in B.steps)))
+        with opened(simulation) as controller:
+            controller.start_project(project)
+        yield simulation
+
+
+def unfinished(controller: Controller) -> session.Change | None:
+    return session.unfinished(controller.bus)  # type: ignore[arg-type]
+
+
+def test_the_next_program_is_told_and_starts_nothing() -> None:
+    with started() as simulation, opened(simulation) as controller:
+        (warning,) = controller.bus.warnings  # type: ignore[attr-defined]
+        assert warning.startswith("the run of project 2, begun 20")
+        assert warning.endswith(f"is unfinished; `motorbus stop {simulation.url}` ends it")
+        for start in (controller.run, controller.start_project):
+            with pytest.raises(RequestError, match="the run of project 2, .* is unfinished") as refused:
+                start(1)
+            assert "nothing has told that it has ended" in refused.value.cause
+        with pytest.raises(RequestError, match="the run of project 2"):
+            controller.jog(6.0, 0.5)
+        assert simulation[1].moving
+
+
+@pytest.mark.parametrize("how", ["stop", "stop_first", "recover"])
+def test_a_stop_settles_it(how: str) -> None:
+    with started() as simulation, opened(simulation) as controller:
+        if how == "stop":
+            controller.stop()
+        change = unfinished(controller)
+        if how == "recover":
+            assert change is not None
+            assert controller.recover(change.verb, change.facts) == "stopped"
+        ran = controller.run(1, stop_first=how == "stop_first")
+        assert ran.outcome is Outcome.COMPLETED
+        assert unfinished(controller) is None
+
+
+def test_a_run_whose_end_came_leaves_nothing_behind() -> None:
+    with motorbus.simulate("stepper") as simulation:
+        with opened(simulation) as controller:
+            assert controller.run(1).outcome is Outcome.COMPLETED
+            assert unfinished(controller) is None
+        with opened(simulation) as controller:
+            assert controller.bus.warnings == ()  # type: ignore[attr-defined]
+
+
+def test_a_timeout_is_remembered_and_a_start_that_never_left_is_not() -> None:
+    with motorbus.simulate("stepper") as simulation:
+        simulation[1].put(2, made(replace(TURN, start_input=1), number=2))
+        with opened(simulation) as controller:
+            with pytest.raises(RequestError, match="has no steps"):
+                controller.run(3)
+            assert unfinished(controller) is None
+            assert controller.run(2, timeout=1.0).outcome is Outcome.TIMEOUT
+        with opened(simulation) as controller:
+            change = unfinished(controller)
+            assert change is not None
+            assert (change.verb, change.facts["project"]) == ("run", 2)
+            assert controller.run(1, stop_first=True).outcome is Outcome.COMPLETED
+
+
+def test_a_stop_goes_through_whatever_else_is_unfinished() -> None:
+    """The journal of a borrow is none of its business."""
+    with motorbus.simulate("stepper") as simulation, opened(simulation) as controller:
+        journal = controller.bus.journal  # type: ignore[attr-defined]
+        journal(Journal("jog", INTENT, {"node": 1, "image": "00"}))
+        trace = controller.bus.trace.subscribe()  # type: ignore[attr-defined]
+        controller.stop()
+        sent = [r.data.hex(" ").upper() for r in trace if r.direction == "tx"]
+        assert sent == STOPS
+        change = unfinished(controller)
+        assert change is not None
+        assert change.verb == "jog"
