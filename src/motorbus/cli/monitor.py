@@ -254,13 +254,13 @@ def _row(
 
 
 def _word(value: object) -> object:
-    """yes or nothing for what is so or not so; else the value."""
-    return ("yes" if value else "") if isinstance(value, bool) else value
+    """yes or no for what is so or not so; else the value."""
+    return ("yes" if value else "no") if isinstance(value, bool) else value
 
 
 def _told(state: State, name: str) -> str:
     if name == "moving":
-        return str(_word(bool(state.moving)))
+        return "yes" if state.moving else ""
     return _value(getattr(state, name), name)
 
 

@@ -14,8 +14,9 @@ from motorbus.core.operation import INTENT, Journal
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import Outcome
+from motorbus.journal import Change
 from motorbus.simulation.named import Simulation
-from tests.families.stepper.runs import A, B, STOPS, TURN, made
+from tests.families.stepper.runs import STOPS, TURN, A, B, made
 
 
 @contextmanager
@@ -35,7 +36,7 @@ def started(project: int = 2) -> Iterator[Simulation]:
         yield simulation
 
 
-def unfinished(controller: Controller) -> session.Change | None:
+def unfinished(controller: Controller) -> Change | None:
     return session.unfinished(controller.bus)  # type: ignore[arg-type]
 
 

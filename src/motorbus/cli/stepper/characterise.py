@@ -73,7 +73,7 @@ def characterise(
     do = verb("characterise", scratch=scratch, travel=travel)
     if file is not None and file.exists():
         consent_to(f"replace {file}", output, yes=yes or dry_run)
-    question = f"turn the motor by up to {travel:g} turns each way for about a minute and a half, with its load taken off"
+    question = f"turn the motor, its load taken off, by up to {travel:g} turns each way for about a minute and a half"
     found: Profile | None = carried_out(
         bus,
         options,
