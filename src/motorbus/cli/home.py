@@ -21,11 +21,12 @@ app = App(
     usage="Usage: motorbus home BUS#ID [OPTIONS]",
     help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the
 switch is not met before the deadline it is stopped, and the command ends with
-exit code 8. Ctrl-C stops it too. But the controller knows no end of it: if this
-program is killed, it goes on homing; keep a switch in the supply within reach.
+exit code 8. Ctrl-C stops it too. But the controller knows no end of it: when
+this program is killed it goes on homing, so keep a switch in the supply within
+reach.
 
-A stepper controller homes in reverse, with the speed of step 1 of its project
-1, until its input 5 is active. Is it active beforehand, then it stands on the
+A stepper controller homes in reverse, with the speed of step 1 of project 1,
+until its input 5 is active. If that is active beforehand, it stands on the
 switch or the switch is stuck, and nothing moves.
 
 Examples:

@@ -26,7 +26,8 @@ a form cannot hold is told on stderr.
 Examples:
 
     motorbus stepper convert examples/pick_and_place.toml --to frames
-    motorbus stepper convert examples/pick_and_place.toml --to dump --output pick.bin
+    motorbus stepper convert examples/pick_and_place.toml \\
+        --to dump --output pick.bin
     motorbus stepper convert pick.bin > pick.toml""",
 )
 def convert(
