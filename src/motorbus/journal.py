@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, Journal
+from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, READABLE, Journal
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.link.lock import journals
 
@@ -87,8 +87,7 @@ class BusJournal:
         """
         assert isinstance(event, Journal)
         open_change = self.unfinished()
-        begins = event.state in (ASKED, INTENT)
-        if open_change is not None and (begins or not _belongs(event, open_change)):
+        if open_change is not None and _hinders(open_change, event):
             raise _unfinished(open_change)
         if event.state == ASKED or (event.state == OUTCOME and open_change is None):
             return
@@ -262,6 +261,13 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def _hinders(change: Change, event: Journal) -> bool:
+    """Must this event not be, while that change is open?"""
+    if event.state == ASKED:
+        return not (event.facts.get(READABLE) and change.facts.get(READABLE))
+    return event.state == INTENT or not _belongs(event, change)
 
 
 def _belongs(event: Journal, change: Change) -> bool:

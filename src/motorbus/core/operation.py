@@ -1,8 +1,8 @@
 """How work is said, so that it can be said once and run blocking or async.
 
-A driver function is a generator (an `Operation`) that yields *steps* and returns its answer. There are seven
-steps and no others. A step is a plain value: whoever runs the operation (`bus/pump.py`, `bus/aio.py`) decides
-when and how. A function that needs one exchange returns the `Exchange` itself, which may be kept and run again.
+A driver function is a generator (an `Operation`) that yields *steps* and returns its answer. There are seven steps and
+no others. A step is a plain value: whoever runs the operation (`bus/pump.py`, `bus/aio.py`) decides when and how. One
+that needs a single exchange returns the `Exchange` itself, which may be kept and run again.
 
 Each step is iterable so that `value = yield from step` has a type; the bare `yield` occurs in this file only.
 """
@@ -341,8 +341,10 @@ class Journal(NamedTuple):
 ASKED: Final = "asked"
 INTENT: Final = "intent"
 OUTCOME: Final = "outcome"
-REACHED: Final = "reached"
-"""Among the facts of a change that is taken up again: the states it has been recorded in, in order."""
+REACHED: Final = (
+    "reached"  # among the facts of a change that is taken up again: the states it came to, in order
+)
+READABLE: Final = "readable"  # True among the facts of a change that leaves readings true, or that only reads
 
 
 class Report:

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from motorbus.cli.stepper.events import say
 from motorbus.core.operation import CanFrame, Progress
-from motorbus.families.stepper import Sends
+from motorbus.families.stepper import EditsLost, Sends, Unrecorded
 
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"
 
 
 def test_the_frame_that_is_sent_is_told() -> None:
     assert READ_1 in say(Sends(bytes.fromhex(READ_1), 9600))
+
+
+def test_what_selecting_loses_and_what_cannot_be_recorded_is_told() -> None:
+    assert say(EditsLost(2, ())).startswith("selecting project 2 has loaded what is stored of it")
+    assert say(Unrecorded("stopped", "no space left")).startswith(
+        "stopped, but the journal could not be told: no space"
+    )
 
 
 def test_nothing_else_is() -> None:

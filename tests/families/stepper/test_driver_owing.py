@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -10,10 +10,10 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, Journal
-from motorbus.errors import RequestError
-from motorbus.families.stepper import Controller
-from motorbus.families.stepper.driver import Outcome
+from motorbus.core.operation import INTENT, OUTCOME, Journal
+from motorbus.errors import Interrupted, LinkError, OutcomeUnknown, RequestError
+from motorbus.families.stepper import Controller, driver
+from motorbus.families.stepper.driver import Outcome, Promise, Unrecorded
 from motorbus.journal import Change
 from motorbus.simulation.named import Simulation
 from tests.families.stepper.runs import STOPS, TURN, A, B, made
@@ -104,3 +104,60 @@ def test_a_stop_goes_through_whatever_else_is_unfinished() -> None:
         change = unfinished(controller)
         assert change is not None
         assert change.verb == "jog"
+
+
+def test_a_start_that_a_latched_bus_refuses_never_was() -> None:
+    with motorbus.simulate("stepper") as simulation, opened(simulation) as controller:
+        controller.ping()
+        bus = controller.bus
+        bus.estop()  # type: ignore[attr-defined]
+        for start in (controller.run, controller.start_project):
+            with pytest.raises(Interrupted):
+                start(1)
+            assert (unfinished(controller), controller.memory.owed) == (None, False)
+        bus.reset()  # type: ignore[attr-defined]
+        assert controller.run(1).outcome is Outcome.COMPLETED
+
+
+def test_reading_goes_on_beside_a_run_and_editing_does_not() -> None:
+    with started() as simulation, opened(simulation) as controller:
+        assert controller.backup().projects == (1, 2, 3, 4)
+        with pytest.raises(RequestError, match="the run of project 2"):
+            controller.write(project=1, step_1_delay=0.5)
+
+
+def test_a_journal_that_cannot_be_written_is_told_and_stops_no_stop() -> None:
+    told: list[object] = []
+    with motorbus.simulate("stepper") as simulation, opened(simulation) as controller:
+
+        def full(event: object) -> None:
+            told.append(event)
+            if isinstance(event, Journal) and event.state == OUTCOME:
+                raise LinkError("no space left")
+
+        assert controller.bus.run(driver.run(controller, 1), full).outcome is Outcome.COMPLETED  # type: ignore[call-arg]
+        assert controller.bus.run(driver.stop(controller), full) is Promise.STOP_ACCEPTED  # type: ignore[call-arg]
+    assert [one for one in told if isinstance(one, Unrecorded)] == [
+        Unrecorded("completed", "no space left"),
+        Unrecorded("stopped", "no space left"),
+    ]
+
+
+def test_a_motion_whose_stop_was_not_accepted_is_not_forgotten() -> None:
+    with motorbus.simulate("stepper", home_switch="never", deaf_while_moving=True) as simulation:
+        simulation[1].put(1, A)
+        with opened(simulation) as controller:
+            with pytest.raises(OutcomeUnknown, match="may be turning"):
+                controller.home(deadline=5.0)
+            simulation[1].switch(deaf_while_moving=False)
+            assert simulation[1].moving
+            works: tuple[Callable[[], object], ...] = (
+                lambda: controller.write(project=1, step_1_delay=0.5),
+                lambda: controller.jog(6.0, 0.5),
+                lambda: controller.select(1),
+            )
+            for work in works:
+                with pytest.raises(RequestError, match="a move may not be over"):
+                    work()
+            controller.stop()
+            controller.write(project=1, step_1_delay=0.5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from motorbus.families.stepper import EditsLost, Sends
+from motorbus.families.stepper import EditsLost, Sends, Unrecorded
 
 
 def say(event: object) -> str:
@@ -16,4 +16,6 @@ def say(event: object) -> str:
     if isinstance(event, EditsLost):
         lost = "; ".join(map(str, event.changes))
         return f"selecting project {event.project} has loaded what is stored of it; edits not saved are lost: {lost}"
+    if isinstance(event, Unrecorded):
+        return f"{event.how}, but the journal could not be told: {event.why}; say `motorbus stop` once it can"
     return ""

@@ -58,6 +58,7 @@ from motorbus.families.stepper.driver import (
     Proof,
     Ran,
     Sends,
+    Unrecorded,
     Watched,
     Written,
     line,
@@ -96,6 +97,7 @@ __all__ = [
     "Ran",
     "Sends",
     "Stepper",
+    "Unrecorded",
     "Watched",
     "Written",
 ]

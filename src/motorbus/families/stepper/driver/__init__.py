@@ -25,6 +25,7 @@ from motorbus.families.stepper.driver.jogging import (
 from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node, checked_motor
 from motorbus.families.stepper.driver.outputs import last_commanded, set_output
+from motorbus.families.stepper.driver.owing import Unrecorded
 from motorbus.families.stepper.driver.presence import identify, ping
 from motorbus.families.stepper.driver.progress import Estimated
 from motorbus.families.stepper.driver.reading import (
@@ -72,6 +73,7 @@ __all__ = [
     "Proof",
     "Ran",
     "Sends",
+    "Unrecorded",
     "Watched",
     "Written",
     "backup",

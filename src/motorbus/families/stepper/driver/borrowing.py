@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import inf
 from typing import Any, Final, TypeVar
 
 from motorbus.core.operation import (
@@ -215,6 +216,7 @@ def _lent(node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], lea
             raise _unseen(node)
         yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
     loan.restless = loan.cut = True
+    node.memory.turning = inf  # until a stop is accepted
     value = yield from motion(loan.wanted)
     loan.restless, loan.cut = not leave, False
     return value

@@ -43,7 +43,7 @@ def backup(node: Node, projects: Iterable[int] = ALL) -> Operation[Backup]:
 
 
 def _read(node: Node, numbers: tuple[int, ...]) -> Operation[Backup]:
-    yield from refuse_while_lent(node, "backup")
+    yield from refuse_while_lent(node, "backup", reads=True)
     dumps = {}
     for done, number in enumerate(numbers):
         yield from Report(Progress(done, len(numbers), f"reading project {number}"))

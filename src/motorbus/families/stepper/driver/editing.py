@@ -16,13 +16,24 @@ from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import ASKED, Exchange, Journal, Operation, Progress, Rank, Report, Runnable
+from motorbus.core.operation import (
+    ASKED,
+    READABLE,
+    Exchange,
+    Journal,
+    Operation,
+    Progress,
+    Rank,
+    Report,
+    Runnable,
+)
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import T, command
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import agreed, dump_once, readings
+from motorbus.families.stepper.driver.turning import refuse_unless_idle
 from motorbus.families.stepper.table import (
     EMPTY,
     STEPS,
@@ -141,12 +152,15 @@ def _beyond(planned: Iterable[Change], found: Iterable[Change]) -> Iterator[Chan
     return (change for change in found if change.name not in known)
 
 
-def refuse_while_lent(node: Node, verb: str) -> Operation[None]:
+def refuse_while_lent(node: Node, verb: str, *, reads: bool = False) -> Operation[None]:
     """Raise RequestError while project 1 is lent to a motion that was cut off: what was lent would be kept.
 
-    Call it inside `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
+    Unless it only `reads`, also while something may still turn: what editing does then nobody knows. Call it inside
+    `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
     """
-    yield from Report(Journal(verb, ASKED, {"node": node.node}))
+    if not reads:
+        yield from refuse_unless_idle(node, f"{verb}()")
+    yield from Report(Journal(verb, ASKED, {"node": node.node, READABLE: reads}))
 
 
 def held(node: Node, image: bytes, number: int) -> Project:

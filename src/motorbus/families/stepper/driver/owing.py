@@ -7,13 +7,21 @@ notice has come or a stop was accepted; until then the next run is refused there
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
-from motorbus.core.operation import INTENT, OUTCOME, Journal, Operation, Report, outcome
+from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal, Operation, Report, outcome
+from motorbus.errors import LinkError
 from motorbus.families.stepper.driver.node import Node
 
 RUN: Final = "run"
 """What a project that was started is called in the journal."""
+
+
+class Unrecorded(NamedTuple):
+    """An event: a run is over, `how` says in which way, and the journal goes on saying that it may not be."""
+
+    how: str
+    why: str
 
 
 def owed(node: Node, project: int) -> Operation[None]:
@@ -24,12 +32,22 @@ def owed(node: Node, project: int) -> Operation[None]:
         "what": f"the run of project {project}",
         "cause": "it was started, and nothing has told that it has ended",
         "advice": "`motorbus stop {bus}` ends it",
+        READABLE: True,
     }
-    yield from Report(Journal(RUN, INTENT, facts))
-    node.memory.owed = True
+    node.memory.owed = True  # before it is written down: another run that ends now does not settle this one
+    try:
+        yield from Report(Journal(RUN, INTENT, facts))
+    except BaseException:
+        node.memory.owed = False
+        raise
 
 
 def settled(node: Node, how: str) -> Operation[None]:
-    """It runs no longer, or never did. Where there is no journal, or that has another change open, nothing is told."""
+    """It runs no longer, or never did. Reports `Unrecorded` where the journal cannot be written.
+
+    Where there is no journal, or that has another change open, there is nothing to do.
+    """
     node.memory.owed = False
-    yield from outcome(iter(Report(Journal(RUN, OUTCOME, {"outcome": how}))))
+    told = yield from outcome(iter(Report(Journal(RUN, OUTCOME, {"outcome": how}))))
+    if isinstance(told, LinkError):
+        yield from outcome(iter(Report(Unrecorded(how, told.summary))))

@@ -44,7 +44,7 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     loan = loan_of(change, facts)
     for name, then, now in (
         ("dump_order", loan.order, node.order),
-        ("motor", facts.get("motor"), node.motor),
+        ("motor", facts.get("motor", node.motor), node.motor),
     ):
         if then != now:
             raise RequestError(

@@ -102,8 +102,8 @@ def run(
 
     What no host can tell: a notice that comes when it might be true is taken for true, also where two bytes of noise
     look like one, where a project that a button started ends, and where a device says it after a stop by a button that
-    nobody watches. A project that a timeout or an unknown leaves behind may still run, so the next is refused until
-    `stop`, or `stop_first`; the journal of the bus remembers it when this program has ended.
+    nobody watches. A project that a timeout, an unknown or a button leaves behind may still run, so the next is refused
+    until `stop`, or `stop_first`; the journal of the bus remembers it when this program has ended.
 
     `watch` names inputs, 1 to 5, that are read all the while: they tell the model when a wait is over. About every
     0.25 s an `Estimated` is reported, and an `InputChanged` for each watched input that changes. Refusals are those of
@@ -117,6 +117,16 @@ def run(
     _check_timeout(timeout, endless)
     course = _Course(timeout, checked(watch))
     branches = (_launched(node, asked, course, Watch(node)), _listening(course), _following(node, course))
+    yield from _waited(node, project, course, branches)
+    assert course.wait is not None, "a start that fails raises"
+    assert course.wait.ran is not None, "a wait ends with an outcome"
+    return course.wait.ran
+
+
+def _waited(
+    node: Node, project: int, course: _Course, branches: Iterable[Operation[None]]
+) -> Operation[None]:
+    """Carry the branches out; the journal is told of an end that is known, whatever else goes wrong."""
     try:
         yield from Together([_failing(course, branch) for branch in branches])
     except MotorbusError:
@@ -125,11 +135,9 @@ def run(
         if course.wait is not None:
             interruption.add_note(f"project {project} was started and goes on: nothing was sent to stop it")
         raise
-    assert course.wait is not None, "a start that fails raises"
-    assert course.wait.ran is not None, "a wait ends with an outcome"
-    if not node.memory.owed:
-        yield from settled(node, course.wait.ran.outcome.value)
-    return course.wait.ran
+    finally:
+        if course.wait is not None and course.wait.ran is not None and not node.memory.owed:
+            yield from settled(node, course.wait.ran.outcome.value)
 
 
 # -- before it starts --------------------------------------------------------------------------------------------------
@@ -211,7 +219,7 @@ def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
 
 def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
     """Send it; when it was acknowledged (s). It may run from the moment it leaves."""
-    number, left = plan.project.number, True
+    number, left = plan.project.number, False
 
     def overtaken(_: Stops) -> MotorbusError | None:
         nonlocal left

@@ -14,7 +14,7 @@ from typing import Final
 
 from motorbus.core.family import Stop
 from motorbus.core.operation import Answer, Exchange, Operation, Rank, outcome
-from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown
+from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.driver.node import Node
@@ -53,14 +53,16 @@ def stop(node: Node) -> Operation[Promise]:
 def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:
     """The same, as part of a longer work: what others have asked for meanwhile is not called off by it."""
     failures: dict[str, MotorbusError] = {}
+    times = 0
     node.memory.stopping += 1  # a run that waits for its notice does not take one of this stop for it
     try:
-        for _ in range(TRIES):
+        while times < TRIES:
+            times += 1
             failures = yield from _said(node, tuple(failures) or names)
-            if not failures or any(isinstance(told, LinkError) for told in failures.values()):
+            if not failures or any(isinstance(told, LinkError | Interrupted) for told in failures.values()):
                 break
         if failures:
-            raise _not_accepted(node, failures)
+            raise _not_accepted(node, failures, times)
         node.memory.stops += 1
         node.memory.owed = False
         node.memory.turning = -inf
@@ -79,16 +81,17 @@ def _said(node: Node, names: tuple[str, ...]) -> Operation[dict[str, MotorbusErr
     return failures
 
 
-def _not_accepted(node: Node, failures: Mapping[str, MotorbusError]) -> MotorbusError:
+def _not_accepted(node: Node, failures: Mapping[str, MotorbusError], times: int) -> MotorbusError:
     """The error for a stop of which so much was not accepted; that of a port that is gone stays what it is."""
     for told in failures.values():
         if isinstance(told, LinkError):
             told.add_note(f"the stop was not accepted: {MAY_TURN}")
             return told
     first = next(iter(failures.values()))
+    often = {1: "once", 2: "twice"}.get(times, f"{times} times")
     said = " and ".join(name.replace("_", " ") for name in STOPS if name in failures)
     return OutcomeUnknown(
-        f"{said} {'was' if len(failures) == 1 else 'were'} not accepted, said {TRIES} times: {MAY_TURN}",
+        f"{said} {'was' if len(failures) == 1 else 'were'} not accepted, said {often}: {MAY_TURN}",
         sent=first.sent,
         received=first.received,
         expected=first.expected,
