@@ -341,9 +341,7 @@ class Journal(NamedTuple):
 ASKED: Final = "asked"
 INTENT: Final = "intent"
 OUTCOME: Final = "outcome"
-REACHED: Final = (
-    "reached"  # among the facts of a change that is taken up again: the states it came to, in order
-)
+REACHED: Final = "reached"  # among the facts of a change that is taken up again: its states so far, in order
 READABLE: Final = "readable"  # True among the facts of a change that leaves readings true, or that only reads
 
 
