@@ -100,7 +100,7 @@ travel = "5 mm"
 gear = 2.0
 \"\"\")
 slide = machine.axes["slide"]
-assert abs(slide.to_device(0.005) - 4 * pi) < 1e-9      # 5 mm are two turns of the device
+assert abs(slide.to_device(0.005) - 4 * pi) < 1e-9  # 5 mm are two turns of the device
 assert abs(slide.from_device(4 * pi) - 0.005) < 1e-9
 ```
 """
