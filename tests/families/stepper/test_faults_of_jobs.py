@@ -151,7 +151,6 @@ ENOUGH = 5_000
 """Ten times the jobs that bring every outcome."""
 
 
-
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("share", [0.01, 0.1])
 def test_jobs_among_all_faults_are_as_they_are_told(share: float, rounds: Callable[[int], int]) -> None:
