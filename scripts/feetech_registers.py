@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from motorbus.cli.feetech.tables import database, meanings
 from motorbus.core.entry import Entry, Table
@@ -23,6 +23,7 @@ from motorbus.families.feetech.table import (
     TABLES,
     model_number,
 )
+from scripts.pages import kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 PAGE: Final = ROOT / "docs" / "reference" / "feetech-registers.md"
@@ -75,14 +76,14 @@ def _choice() -> Iterator[str]:
     for one in FIRMWARE:
         minors = f"{one.major}.{one.minors.start} to {one.major}.{one.minors.stop - 1}"
         rows.append([minors, one.order, f"[{one.table}](#{one.table})"])
-    yield from _table(("firmware", "byte order", "map"), rows)
+    yield from listed(("firmware", "byte order", "map"), rows)
 
 
 def _map(table: Table) -> Iterator[str]:
     yield f"## {table.name}\n"
     yield f"{table.title[0].upper()}{table.title[1:]}. {len(table)} registers.\n"
     columns = ("address", "register", "bytes", "in", "access", "sign", "range", "default", "unit", "effect")
-    yield from _table((*columns, "meaning", "source", "in doubt", "note"), map(_row, table.values()))
+    yield from listed((*columns, "meaning", "source", "in doubt", "note"), map(_row, table.values()))
 
 
 def _row(row: Entry) -> list[object]:
@@ -113,7 +114,7 @@ def _models() -> Iterator[str]:
         ]
         for number, model in MODELS.items()
     ]
-    yield from _table(("number", "major.minor", "model", "map", "byte order", "counts", "note"), rows)
+    yield from listed(("number", "major.minor", "model", "map", "byte order", "counts", "note"), rows)
 
 
 def _baud_codes() -> Iterator[str]:
@@ -123,7 +124,7 @@ def _baud_codes() -> Iterator[str]:
         [code, rate, ", ".join(name for name, codes in BAUD_CODES_OF.items() if code in codes) or "none"]
         for code, rate in BAUD_CODES.items()
     ]
-    yield from _table(("code", "bit/s", "maps that take it"), rows)
+    yield from listed(("code", "bit/s", "maps that take it"), rows)
 
 
 def _alarms() -> Iterator[str]:
@@ -140,25 +141,12 @@ def _phase() -> Iterator[str]:
 
 def _bits(of_maps: Mapping[str, Mapping[int, str]]) -> Iterator[str]:
     rows: list[list[object]] = [[bit, *(bits.get(bit, "") for bits in of_maps.values())] for bit in range(8)]
-    yield from _table(("bit", *of_maps), rows)
-
-
-def _table(columns: tuple[str, ...], rows: Iterable[list[Any]]) -> Iterator[str]:
-    yield f"| {' | '.join(columns)} |"
-    yield f"|{'---|' * len(columns)}"
-    for row in rows:
-        yield f"| {' | '.join(str(cell) for cell in row)} |"
-    yield ""
+    yield from listed(("bit", *of_maps), rows)
 
 
 def main() -> int:
     """Write page and database, or with --check see that those there are those that would be written."""
-    wanted = {PAGE: page(), DATABASE: text_of_database()}
-    if "--check" in sys.argv[1:]:
-        return int(any(not file.exists() or file.read_text("utf-8") != text for file, text in wanted.items()))
-    for file, text in wanted.items():
-        file.write_text(text, encoding="utf-8")
-    return 0
+    return kept({PAGE: page(), DATABASE: text_of_database()})
 
 
 if __name__ == "__main__":

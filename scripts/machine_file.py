@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ from motorbus.core import units
 from motorbus.motion.machine import keys, schema
 from motorbus.motion.machine.keys import Key
 from motorbus.motion.machine.model import EXITS
+from scripts.pages import kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 PAGE: Final = ROOT / "docs" / "reference" / "machine-file.md"
@@ -160,13 +161,13 @@ def _file() -> Iterator[str]:
     rows += [
         [f"`{key.name}`", key.says, "text" if key.kind is str else "tables"] for key in keys.FILE.values()
     ]
-    yield from _table(("key", "meaning", "is"), rows)
+    yield from listed(("key", "meaning", "is"), rows)
 
 
 def _tables() -> Iterator[str]:
     for title, (says, rows) in TABLES.items():
         yield f"## `{title}`\n\n{says}\n"
-        yield from _table(COLUMNS, map(_row, rows.values()))
+        yield from listed(COLUMNS, map(_row, rows.values()))
         if rows is keys.AXIS:
             yield AGREE
     yield '## `[pose.NAME]`\n\nA position for each axis that it names: `shoulder = "10 deg"`.\n'
@@ -200,7 +201,7 @@ def _default(key: Key, linear: bool) -> str:
 
 def _exits() -> Iterator[str]:
     yield "## `exit`\n\nWhat an axis does when the program ends: by its end, an error, a signal, or a lost lease.\n"
-    yield from _table(("exit", "means"), [[f"`{name}`", means] for name, means in EXITS.items()])
+    yield from listed(("exit", "means"), [[f"`{name}`", means] for name, means in EXITS.items()])
 
 
 def _units() -> Iterator[str]:
@@ -210,7 +211,7 @@ def _units() -> Iterator[str]:
     rows = [
         [one, keys.api_unit(one) or "a fraction of 1", ", ".join(units.SCALES[one])] for one in quantities
     ]
-    yield from _table(("quantity", "without a unit", "units"), rows)
+    yield from listed(("quantity", "without a unit", "units"), rows)
 
 
 def _both(of: Any) -> str:
@@ -219,22 +220,9 @@ def _both(of: Any) -> str:
     return str(turning) if turning == linear else f"{turning}; {linear}"
 
 
-def _table(columns: tuple[str, ...], rows: Iterable[list[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(columns)} |"
-    yield f"|{'---|' * len(columns)}"
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
-    yield ""
-
-
 def main() -> int:
     """Write page and schema, or with --check see that those there are those that would be written."""
-    wanted = {PAGE: page(), SCHEMA: text_of_schema()}
-    if "--check" in sys.argv[1:]:
-        return int(any(not file.exists() or file.read_text("utf-8") != text for file, text in wanted.items()))
-    for file, text in wanted.items():
-        file.write_text(text, encoding="utf-8")
-    return 0
+    return kept({PAGE: page(), SCHEMA: text_of_schema()})
 
 
 if __name__ == "__main__":

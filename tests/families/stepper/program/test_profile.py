@@ -10,7 +10,8 @@ import pytest
 from motorbus.errors import RequestError
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import Profile
-from motorbus.families.stepper.program.profile import KNOWN, LONGEST, MEMORY
+from motorbus.families.stepper.program.profile import KNOWN, MEMORY
+from motorbus.families.stepper.program.source import LONGEST
 from motorbus.families.stepper.simulator import Switches, simulate
 
 FULL = Profile(

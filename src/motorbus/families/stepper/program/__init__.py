@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from types import MappingProxyType
 
-from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
@@ -26,6 +25,7 @@ from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, F
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
 from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.program.schema import schema
+from motorbus.families.stepper.program.source import read
 from motorbus.families.stepper.table import BLANK, Order, Project, encode_image
 
 _NOTHING: Mapping[str, int] = MappingProxyType({})
@@ -62,21 +62,8 @@ class Program:
 
     @classmethod
     def load(cls, path: str) -> Program:
-        """From a file. Raises RequestError when it cannot be read, and for what it says.
-
-        The one place where a family opens a file: one that its caller names, and only to read it.
-        """
-        try:
-            with open(path, encoding="utf-8") as file:
-                source = file.read(text.LONGEST + 1)
-        except UnicodeDecodeError as error:
-            raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
-        except OSError as error:
-            why = (error.strerror or str(error)).lower()
-            raise RequestError(
-                f"{path} cannot be read: {why}", advice="see that the path is right"
-            ) from error
-        return cls.parse(source)
+        """From a file. Raises RequestError when it cannot be read, and for what it says."""
+        return cls.parse(read(path))
 
     @classmethod
     def from_dump(

@@ -8,7 +8,6 @@ that no experiment has separated from all others is not in it.
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
@@ -17,12 +16,10 @@ from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.entry import shown
-from motorbus.errors import RequestError
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program.quantities import refuse
+from motorbus.families.stepper.program.source import FORMAT, check_format, read, toml
 
-FORMAT: Final = 1
-LONGEST: Final = 1 << 20
 """Characters a file may have."""
 Setting: TypeAlias = str | bool | float
 MEMORY: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -69,8 +66,8 @@ class Profile:
     @classmethod
     def parse(cls, source: str) -> Profile:
         """From the text of a file. Raises RequestError, naming the field, for what cannot be."""
-        data = _toml(source)
-        _format(data)
+        data = toml(source, "TOML, as `characterise` writes it")
+        check_format(data)
         _only(data, ("format", *_TABLES), "the file")
         settled, evidence, measured, unsettled = (_table(data, name) for name in _TABLES)
         made = cls(
@@ -85,17 +82,7 @@ class Profile:
     @classmethod
     def load(cls, path: str) -> Profile:
         """From a file. Raises RequestError when it cannot be read, and for what it says."""
-        try:
-            with open(path, encoding="utf-8") as file:
-                source = file.read(LONGEST + 1)
-        except UnicodeDecodeError as error:
-            raise RequestError(f"{path} is no text: {error.reason}", expected="TOML in UTF-8") from None
-        except OSError as error:
-            why = (error.strerror or str(error)).lower()
-            raise RequestError(
-                f"{path} cannot be read: {why}", advice="see that the path is right"
-            ) from error
-        return cls.parse(source)
+        return cls.parse(read(path))
 
     def text(self) -> str:
         """The file: what `parse` makes the same profile of."""
@@ -128,29 +115,6 @@ class Profile:
         for name in self.evidence:
             if name not in self.settled:
                 raise refuse(f"evidence, {name}: it is not settled", "evidence for what is settled")
-
-
-def _toml(text: str) -> dict[str, Any]:
-    if len(text) > LONGEST:
-        raise refuse(f"the file has {len(text)} characters", f"{LONGEST} at most")
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        why = str(error)
-    except ValueError:  # Python reads no number of more than 4300 digits
-        why = "a number has thousands of digits"
-    raise refuse(f"the file is no TOML: {why}", "TOML, as `characterise` writes it")
-
-
-def _format(data: Mapping[str, Any]) -> None:
-    found = data.get("format")
-    if type(found) is not int or found != FORMAT:
-        what = "is missing" if found is None else f"{shown(found)} is not known"
-        raise RequestError(
-            f"format: {what}",
-            expected=f"format = {FORMAT}",
-            advice="a newer motorbus may read it; nothing was sent",
-        )
 
 
 def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:

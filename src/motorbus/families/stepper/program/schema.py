@@ -12,6 +12,7 @@ from typing import Any, Final
 from motorbus.core.entry import Entry
 from motorbus.families.stepper.program import names, text
 from motorbus.families.stepper.program.quantities import DISTANCES, LENGTH, SPEEDS
+from motorbus.families.stepper.program.source import FORMAT
 from motorbus.families.stepper.table import ENDLESS, INPUTS, OUTPUTS, PARAMETERS, STEPS, UNITS
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -37,7 +38,7 @@ def schema() -> dict[str, Any]:
         "required": ["format", "motor", "step"],
         "additionalProperties": False,
         "properties": {
-            "format": {"const": text.FORMAT},
+            "format": {"const": FORMAT},
             "name": {"type": "string", "description": "what people call it"},
             "project": _integer(PARAMETERS["project"]),
             "repeat": {

@@ -6,7 +6,6 @@ name the step and the field, say what was found and what may be.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -17,6 +16,7 @@ from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper.program import names, quantities
 from motorbus.families.stepper.program.quantities import Geometry, refuse
+from motorbus.families.stepper.program.source import FORMAT, check_format, toml
 from motorbus.families.stepper.program.words import HELD, range_of, within
 from motorbus.families.stepper.table import (
     BASE_NAMES,
@@ -29,8 +29,6 @@ from motorbus.families.stepper.table import (
     with_steps,
 )
 
-FORMAT: Final = 1
-LONGEST: Final = 1 << 20
 """Characters a file may have; ten steps never need more."""
 TOP: Final = (
     "format", "name", "project", "repeat", "total_steps", "expert", "motor", "loop", "inputs", "outputs", "step",
@@ -60,8 +58,8 @@ class Source(NamedTuple):
 
 def parse(text: str) -> Source:
     """The project that a file describes. Raises RequestError, naming step and field, for what cannot be."""
-    data = _toml(text)
-    _format(data)
+    data = toml(text, "TOML, as in the example of the documentation")
+    check_format(data)
     _known(data, TOP, "the file")
     expert = _boolean(data, "expert", "expert")
     inputs, outputs = (names.named(data.get(f"{kind}s", {}), kind) for kind in ("input", "output"))
@@ -126,29 +124,6 @@ def write(source: Source) -> str:
 
 
 # --- reading --------------------------------------------------------------------------------------------------------
-
-
-def _toml(text: str) -> dict[str, Any]:
-    if len(text) > LONGEST:
-        raise refuse(f"the file has {len(text)} characters", f"{LONGEST} at most")
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        why = str(error)
-    except ValueError:  # Python reads no number of more than 4300 digits
-        why = "a number has thousands of digits"
-    raise refuse(f"the file is no TOML: {why}", "TOML, as in the example of the documentation")
-
-
-def _format(data: Mapping[str, Any]) -> None:
-    found = data.get("format")
-    if type(found) is not int or found != FORMAT:
-        missing = found is None
-        raise RequestError(
-            f"format: {'is missing' if missing else f'{shown(found)} is not known'}",
-            expected=f"format = {FORMAT}",
-            advice=f"{'write that first' if missing else 'a newer motorbus may read it'}; nothing was sent",
-        )
 
 
 def _known(table: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
