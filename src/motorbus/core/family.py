@@ -7,7 +7,7 @@ A family is a folder with four rooms (`wire`, `table`, `driver`, `simulator`) wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
@@ -95,6 +95,71 @@ class State:
     moving: bool | None = None
     alarm: tuple[str, ...] = ()
     quality: Quality = Quality.FRESH
+
+
+class Positions(NamedTuple):
+    """Positions in rad by id of all who answered, the ids of those who did not, and when (s on the link's clock)."""
+
+    values: dict[int, float]
+    missing: tuple[int, ...]
+    at: float
+
+
+class Train(Protocol):
+    """Devices of one bus in a control loop, of which all is known that a cycle needs; see `Family.axis`.
+
+    Its exchanges ask nothing but what they bring. Those on different lanes may be in flight at once.
+    """
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """Their ids, in the order they were given."""
+
+    @property
+    def positions(self) -> Sequence[Exchange[Positions]]:
+        """What together brings all positions; may be kept and run again. A lone silent node raises NoReply."""
+
+    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
+        """What orders these goals (rad), for some or all of them; the gate judges them when it leaves.
+
+        Raises LimitExceeded for what is no finite number or what no device of this kind could be told.
+        """
+
+    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+        """Make these ready to be led: torque on without a jump, and each as quick in following as it can be, but not
+        quicker than its speed (rad/s) where it can be told that. Raises as `enable_torque`.
+        """
+
+
+class Timing(Protocol):
+    """How a device that moves by a profile of its own keeps time with others, which may be on other buses."""
+
+    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+        """How long (s) all take, once each has said how long it takes at least: never less than `shortest`.
+
+        `fitted` gives, for a duration that others need, the nearest one, not shorter, that this device can have.
+        Raises Interrupted when somebody cannot take part.
+        """
+
+    def start(self, lead: float) -> Operation[float]:
+        """It is ready. Comes back `lead` s before the common start, and gives that moment (s on this link's clock).
+
+        Raises Interrupted when somebody cannot take part.
+        """
+
+
+class Turned(NamedTuple):
+    """A movement that a device made by its own profile: all *estimated*, for nothing told of it.
+
+    `angle` (rad, with its sign) is the whole way, which began at the moment `start` (s on the link's clock) and took
+    `duration` (s). `way` says how much of it was done so many s after the start (rad, with its sign).
+    """
+
+    node: int
+    angle: float
+    start: float
+    duration: float
+    way: Callable[[float], float]
 
 
 class Stop(NamedTuple):
@@ -293,7 +358,23 @@ class Family(Protocol):
         """
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        """SI operations by capability name for this model; empty when it has none."""
+        """What devices of this model can do, by name, in SI units; empty when it has none. What is absent it cannot do.
+
+        Each is called with a device (what `devices` makes) and gives an operation, but `train`. They are
+
+            state position velocity load current voltage temperature    what it tells: a `State`, else a number
+            enable_torque(device, *, jump)  disable_torque(device)      without a jump; limp
+            move(device, to, *, wait)  stop(device)                     to rad; decelerate and stay, gives a promise
+            move_by(device, angle, *, velocity, wait)                   by rad from where it stands
+            jog(device, velocity, seconds)  home(device, *, deadline)   for a while; to its switch
+            run(device, number, *, timeout)                             a program that is stored in it
+            limits(device)                                              its own lowest and highest position, rad
+            cap_torque(device, fraction)  cap_current(device, ampere)   bound what it pushes with, until power-off
+            train(devices, *, rate) -> Operation[Train]                 several, to be led in a loop; rate in bit/s
+            keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]
+                by rad from where it stands, by a profile of its own, as long as others take; at most so fast (rad/s)
+                and so steep (rad/s²), where it can be told
+        """
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         """A simulated bus with these nodes; "" is the family's usual model."""

@@ -1,0 +1,89 @@
+"""Work on several buses at the same time, said once and run blocking or async.
+
+A driver function yields steps on one bus. What a machine does is one such operation on each bus that it needs, all
+begun together, and what becomes of their results. They know of each other only by what they share in memory, as a
+`Meeting`; who carries them out is `conductor`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
+
+from motorbus.core.operation import Runnable
+from motorbus.errors import MotorbusError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class Abreast(NamedTuple, Generic[T]):
+    """An operation for each bus, by its name, and what the whole comes to.
+
+    `combine` gets what each returned, or the MotorbusError that it raised; it raises what is to be raised.
+    """
+
+    operations: Mapping[str, Runnable[Any]]
+    combine: Callable[[Mapping[str, Any]], T]
+
+
+class BlockingConductor(Protocol):
+    """What a blocking machine needs to carry its work out."""
+
+    def run(self, work: Abreast[T], /) -> T: ...
+
+
+class AsyncConductor(Protocol):
+    """What an async machine needs to carry its work out."""
+
+    async def run(self, work: Abreast[T], /) -> T: ...
+
+
+class Led:
+    """Carries out its verbs at once, blocking."""
+
+    conductor: BlockingConductor
+
+
+class LedAsync:
+    """Carries out its verbs when they are awaited."""
+
+    conductor: AsyncConductor
+
+
+class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+    """Makes a method of a function that gives an `Abreast`: blocking on what is `Led`, awaitable on `LedAsync`."""
+
+    def __init__(self, function: Callable[Concatenate[Any, P], Abreast[T]]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, machine: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, machine: Led, owner: type) -> Callable[P, T]: ...
+    @overload
+    def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    def __get__(self, machine: Any, owner: type) -> Any:
+        if machine is None:
+            return self
+        function = self.function
+
+        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
+            return machine.conductor.run(function(machine, *args, **kwargs))
+
+        call.__doc__ = self.__doc__
+        return call
+
+
+def settled(results: Mapping[str, Any]) -> dict[str, Any]:
+    """What each bus returned. Raises the first error there is, with a note for each of the others."""
+    errors = [told for told in results.values() if isinstance(told, MotorbusError)]
+    if errors:
+        said = {str(errors[0])}
+        for other in errors[1:]:
+            if str(other) not in said:
+                said.add(str(other))
+                errors[0].add_note(f"also: {other}")
+        raise errors[0]
+    return dict(results)

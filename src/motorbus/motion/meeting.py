@@ -1,0 +1,96 @@
+"""Where the buses of one movement wait for each other: to agree how long it takes, and on the moment it starts.
+
+Each bus has a clock of its own and its own pump, so nobody can wait for another by an exchange. They look here every
+few milliseconds. What they agree on is a moment to come, so how often they look decides nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final, Generic, TypeVar
+
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import Interrupted, MotorbusError
+
+T = TypeVar("T")
+
+LOOK: Final = 0.002
+"""s between two looks at whether all have come."""
+NOTICE: Final = 0.01
+"""s from the moment the last one is ready to the earliest start: time for the others to look."""
+
+
+class Meeting(Generic[T]):
+    """All who take part say something and get to know what all have said. `parties` are their names."""
+
+    def __init__(self, parties: Iterable[str]) -> None:
+        self.parties: Final = frozenset(parties)
+        self._said: dict[str, T] = {}
+        self._failed: MotorbusError | None = None
+
+    def meet(self, name: str, says: T) -> Operation[Mapping[str, T]]:
+        """Say it, and wait until all have. Raises Interrupted when somebody will not come."""
+        self._said[name] = says
+        while self._said.keys() != self.parties:
+            if self._failed is not None:
+                raise _called_off(name, self._failed)
+            yield from Pause(LOOK)
+        return self._said
+
+    def fail(self, error: MotorbusError) -> None:
+        """Somebody will not come, and this is why. Who has met already goes on."""
+        self._failed = self._failed or error
+
+
+def _called_off(name: str, error: MotorbusError) -> Interrupted:
+    return Interrupted(
+        f"{name} does not move: another part of the movement cannot begin",
+        cause=str(error),
+        advice="see to that; a movement of several begins with all of them or not at all",
+    )
+
+
+class Beat:
+    """The meetings of one movement: everyone's duration, then the moment of the start in s on the robot's clock.
+
+    `origin` of a party is what its link's clock showed when the robot's clock was at 0.
+    """
+
+    def __init__(self, parties: Iterable[str]) -> None:
+        names = tuple(parties)
+        self.shortest: Final = Meeting[float](names)
+        self.fitted: Final = Meeting[float](names)
+        self.ready: Final = Meeting[float](names)
+
+    def of(self, party: str, origin: float) -> Seat:
+        """Its part in it: a `core.family.Timing`."""
+        return Seat(self, party, origin)
+
+    def fail(self, error: MotorbusError) -> None:
+        """Somebody cannot take part; all who wait, or come to wait, are told."""
+        for meeting in (self.shortest, self.fitted, self.ready):
+            meeting.fail(error)
+
+
+class Seat:
+    """What one party of a `Beat` sees of it."""
+
+    def __init__(self, beat: Beat, party: str, origin: float) -> None:
+        self._beat = beat
+        self._party = party
+        self._origin = origin
+
+    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+        """See `core.family.Timing`."""
+        needed = yield from self._beat.shortest.meet(self._party, shortest)
+        longest = max(needed.values())
+        offered = yield from self._beat.fitted.meet(self._party, fitted(longest))
+        return max(longest, *offered.values())
+
+    def start(self, lead: float) -> Operation[float]:
+        """See `core.family.Timing`."""
+        now = (yield from Pause(0)) - self._origin
+        ready = yield from self._beat.ready.meet(self._party, now + lead)
+        moment = max(ready.values()) + NOTICE + self._origin
+        yield from Pause(max(0.0, moment - lead - (yield from Pause(0))))
+        return moment
