@@ -5,17 +5,24 @@
    train in one write(), and keeps books: the present position of a servo counts how often it was read, so a stale,
    skipped or doubled reading shows in the values, and every goal that arrives is added up.
 
+   With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
+   until the line is free, and an answer is there when its last byte has passed.
+
    Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
 #define _GNU_SOURCE
+#include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { SERVOS = 30, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
+enum { BITS = 10, SECOND = 1000000000, EXACTLY = 60000, WATCHFUL = 300000 };
 enum { PING = 1, READ = 2, WRITE = 3, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
 
 typedef unsigned char byte;
@@ -27,6 +34,8 @@ struct servo {
 
 static struct servo servos[SERVOS + 1];
 static unsigned long frames, strays;
+/* Nanoseconds that a byte takes, 0 where it takes none; when the line is free again; when an answer left last. */
+static long long byte_time, line_free, answered;
 static byte answer[ROOM];
 static size_t filled;
 
@@ -129,7 +138,32 @@ static int open_terminal(void) {
     return master;
 }
 
+static long long now(void) {
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (long long)time.tv_sec * SECOND + time.tv_nsec;
+}
+
+/* These bytes pass: from now on, or from when the line is free. */
+static void pass(size_t count) {
+    long long begin = now();
+    line_free = (line_free > begin ? line_free : begin) + (long long)count * byte_time;
+}
+
+/* A system wakes nobody to the microsecond, so the last of the time is spent looking at the clock. */
+static void wait_for_line(void) {
+    long long until = line_free - EXACTLY;
+    struct timespec moment = {until / SECOND, until % SECOND};
+    if (until > now()) while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, NULL) == EINTR) continue;
+    while (now() < line_free) continue;
+}
+
 static void send_answer(int master) {
+    if (byte_time) {
+        pass(filled);
+        wait_for_line();
+        answered = now();
+    }
     for (size_t sent = 0; sent < filled;) {
         ssize_t count = write(master, answer + sent, filled - sent);
         if (count <= 0) exit(1);
@@ -146,9 +180,20 @@ static void print_books(void) {
     puts("}}");
 }
 
-int main(void) {
+/* Bytes may be there, or our input has ended. For a while after an answer the next request is near: then it looks
+   without sleeping, for a line would not have slept either. */
+static int something(struct pollfd *watched) {
+    int found = 0;
+    while (byte_time && !found && now() - answered < WATCHFUL) found = poll(watched, 2, 0);
+    return found ? found : poll(watched, 2, -1);
+}
+
+int main(int count_of_arguments, char **arguments) {
     static byte buffer[ROOM];
     size_t have = 0;
+    long baud = count_of_arguments > 1 ? atol(arguments[1]) : 0;
+    byte_time = baud > 0 ? (long long)BITS * SECOND / baud : 0;
+    prctl(PR_SET_TIMERSLACK, 1);
     int master = open_terminal();
     struct pollfd watched[] = {{.fd = master, .events = POLLIN}, {.fd = STDIN_FILENO, .events = POLLIN}};
     for (int id = 1; id <= SERVOS; id++) {
@@ -158,10 +203,11 @@ int main(void) {
     }
     puts(ptsname(master));
     fflush(stdout);
-    while (poll(watched, 2, -1) > 0) {
+    while (something(watched) > 0) {
         if (watched[0].revents & POLLIN) {
             ssize_t count = read(master, buffer + have, sizeof buffer - have);
             if (count <= 0) return 1;
+            if (byte_time) pass((size_t)count);
             have += (size_t)count;
             size_t done = take(buffer, have);
             memmove(buffer, buffer + done, have -= done);

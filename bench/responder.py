@@ -56,11 +56,13 @@ class Responder:
 
 
 @contextmanager
-def responder(program: Path) -> Iterator[Responder]:
-    """One responder on a new pseudo-terminal; afterwards its `books` are there."""
-    running = Responder(
-        subprocess.Popen([str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    )
+def responder(program: Path, baud: int = 0) -> Iterator[Responder]:
+    """One responder on a new pseudo-terminal; afterwards its `books` are there.
+
+    With a `baud` rate bytes take their time; without, it answers at once.
+    """
+    command = [str(program), str(baud)] if baud else [str(program)]
+    running = Responder(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
     try:
         yield running
     finally:

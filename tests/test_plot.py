@@ -205,6 +205,31 @@ def test_nine_axes_have_a_panel_each_with_its_unit(tmp_path: Path, monkeypatch: 
     assert text.count("time (s)") == 3  # below each column, and nowhere else
 
 
+def test_what_is_estimated_says_so_in_another_colour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {
+        "elbow": plot.Track(GOALS[0], PRESENTS[0], "deg"),
+        "slide": plot.Track(GOALS[0], PRESENTS[0], "mm", estimated=True),
+    }
+    figure = drawn(monkeypatch, lambda: plot.tracks(tmp_path / "x.png", TIMES, some))
+    elbow, slide, *_ = figure.axes
+    assert [one.get_title(loc="left") for one in (elbow, slide)] == ["elbow (deg)", "slide (mm), estimated"]
+    assert elbow.lines[0].get_color() != slide.lines[0].get_color()
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert said == ["goal", "present", "estimated: reckoned, not measured", "error: present − goal"]
+
+
+def test_a_track_may_have_times_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {
+        "elbow": plot.Track(GOALS[0], PRESENTS[0]),
+        "slide": plot.Track([0.0, 1.0], [0.0, 1.0], times=(0.2, 2.5)),
+    }
+    figure = drawn(monkeypatch, lambda: plot.tracks(tmp_path / "x.png", TIMES, some))
+    assert list(figure.axes[1].lines[0].get_xdata()) == [0.2, 2.5]
+    assert {one.get_xlim() for one in figure.axes[:4]} == {(0.0, 2.5)}
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.tracks(tmp_path / "y.png", TIMES, {"slide": plot.Track([0.0], [0.0], times=(0.2, 2.5))})
+
+
 @pytest.mark.parametrize(("count", "across", "down"), [(1, 1, 1), (2, 2, 1), (4, 2, 2), (5, 3, 2), (9, 3, 3)])
 def test_a_picture_grows_with_its_axes(tmp_path: Path, count: int, across: int, down: int) -> None:
     plot.tracks(tmp_path / "some.png", TIMES, dict(list(NINE.items())[:count]))

@@ -2,6 +2,7 @@
 
 The names a user needs are here and are loaded when first used, so that `import motorbus` costs nothing:
 
+    Robot, AsyncRobot   a machine by its file motorbus.toml          motorbus.Robot.load("motorbus.toml")
     open, open_async    a bus by its address, blocking or async     motorbus.open("feetech:/dev/ttyACM0")
     simulate            a simulated bus in this process             motorbus.simulate("feetech", ids="1-6")
     the errors          motorbus.NoReply and all others             see `motorbus.errors`
@@ -38,10 +39,12 @@ from motorbus.errors import (
 if TYPE_CHECKING:
     from motorbus.families import feetech, kst, stepper
     from motorbus.session import open, open_async, simulate
+    from motorbus.session.robot import AsyncRobot, Robot
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AsyncRobot",
     "ChecksumError",
     "DeviceError",
     "FramingError",
@@ -57,6 +60,7 @@ __all__ = [
     "PortBusy",
     "PortNotFound",
     "RequestError",
+    "Robot",
     "Stalled",
     "UnexpectedReply",
     "VerificationFailed",
@@ -69,7 +73,13 @@ __all__ = [
     "stepper",
 ]
 
-_LAZY = {"open": "motorbus.session", "open_async": "motorbus.session", "simulate": "motorbus.session"}
+_LAZY = {
+    "AsyncRobot": "motorbus.session.robot",
+    "Robot": "motorbus.session.robot",
+    "open": "motorbus.session",
+    "open_async": "motorbus.session",
+    "simulate": "motorbus.session",
+}
 
 
 def __getattr__(name: str) -> Any:

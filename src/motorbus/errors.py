@@ -30,6 +30,9 @@ from __future__ import annotations
 class MotorbusError(Exception):
     """Base of every error of this package. `summary` is one line; the other parts may be empty."""
 
+    unmoved = False
+    """True where it is certain that nothing has moved for what was asked; False: it may have, or nobody said."""
+
     def __init__(
         self,
         summary: str,

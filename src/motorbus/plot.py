@@ -72,11 +72,17 @@ def _saved(figure: Any, path: Path | str) -> None:
 
 
 class Track(NamedTuple):
-    """An axis over time: its goals and where it was, in `unit`; None where there was no reading."""
+    """An axis over time: its goals and where it was, in `unit`; None where there was no reading.
+
+    `estimated`: where it was is reckoned, for its device tells no position. `times` (s) are its own moments, () for
+    those of the picture.
+    """
 
     goal: Sequence[float]
     present: Sequence[float | None]
     unit: str = "rad"
+    estimated: bool = False
+    times: Sequence[float] = ()
 
 
 def tracks(
@@ -89,15 +95,18 @@ def tracks(
 ) -> None:
     """Draw each axis of a machine in a panel of its own: goal (dashed) and present (solid), and below it the error.
 
-    `times` in s, and every track has one value for each. Units may differ from axis to axis, as an arm has degrees and
-    a slide millimetres. The suffix of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data
-    do not fit together and MotorbusError when matplotlib is not installed.
+    `times` in s, and every track has one value for each of them, or for each of its own. Units may differ from axis to
+    axis, as an arm has degrees and a slide millimetres. What is estimated has another colour, and says so. The suffix
+    of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data do not fit together and
+    MotorbusError when matplotlib is not installed.
     """
-    if not axes or any(len(row) != len(times) for track in axes.values() for row in track[:2]):
+    moments = {name: track.times or times for name, track in axes.items()}
+    if not axes or any(len(row) != len(moments[name]) for name, one in axes.items() for row in one[:2]):
         raise RequestError(
             "the data do not fit together",
             expected="at least one axis, and one goal and one present for each time",
         )
+    ends = [at for one in moments.values() for at in (*one[:1], *one[-1:])]
     across = min(3, ceil(sqrt(len(axes))))
     down = -(-len(axes) // across)
     figure = _blank(title, remark, (1.5 + 3.6 * across, 0.9 + 2.35 * down))
@@ -108,11 +117,13 @@ def tracks(
         pair = cells[2 * row][column], cells[2 * row + 1][column]
         if number < len(axes):
             name = list(axes)[number]
-            _draw_track(*pair, times, axes[name], name, lowest=number + across >= len(axes))
+            _draw_track(*pair, moments[name], axes[name], name, lowest=number + across >= len(axes))
+            if min(ends) < max(ends):
+                pair[0].set_xlim(min(ends), max(ends))
         else:
             for empty in pair:
                 empty.set_axis_off()
-    _draw_key(figure)
+    _draw_key(figure, estimated=any(track.estimated for track in axes.values()))
     _saved(figure, path)
 
 
@@ -125,9 +136,10 @@ def _draw_track(
         _style(one)
         one.locator_params(axis="y", nbins=4 if one is position else 2)
         one.margins(y=0.15)
-    position.plot(times, present, color=_COLOURS[0], linewidth=1.8)
+    position.plot(times, present, color=_COLOURS[2 if track.estimated else 0], linewidth=1.8)
     position.plot(times, track.goal, color=_INK, linewidth=1.1, dashes=(3, 2))
     heading = f"{name} ({track.unit})" if track.unit else name
+    heading += ", estimated" if track.estimated else ""
     position.set_title(heading, loc="left", fontsize=10, fontweight="bold", color=_INK, pad=4)
     position.tick_params(labelbottom=False)
     error.axhline(0, color=_FAINT, linewidth=0.8)
@@ -135,20 +147,25 @@ def _draw_track(
     error.tick_params(labelbottom=lowest)
     if lowest:
         error.set_xlabel("time (s)", fontsize=9, color=_INK)
-    if len(times) > 1:
-        error.set_xlim(times[0], times[-1])
 
 
-def _draw_key(figure: Any) -> None:
+def _draw_key(figure: Any, *, estimated: bool) -> None:
     from matplotlib.lines import Line2D
 
+    reckoned = [Line2D([], [], color=_COLOURS[2], linewidth=1.8, label="estimated: reckoned, not measured")]
     lines = [
         Line2D([], [], color=_INK, linewidth=1.1, dashes=(3, 2), label="goal"),
         Line2D([], [], color=_COLOURS[0], linewidth=1.8, label="present"),
+        *(reckoned if estimated else []),
         Line2D([], [], color=_COLOURS[1], linewidth=1.2, label="error: present − goal"),
     ]
     figure.legend(
-        handles=lines, loc="outside lower center", ncols=3, frameon=False, fontsize=9, labelcolor=_INK
+        handles=lines,
+        loc="outside lower center",
+        ncols=len(lines),
+        frameon=False,
+        fontsize=9,
+        labelcolor=_INK,
     )
 
 

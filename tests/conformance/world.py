@@ -6,8 +6,9 @@ frame than the one sent) it does at their joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Protocol, cast
 
 from motorbus.bus.aio import AsyncBus
@@ -134,6 +135,23 @@ def moves(family: Family) -> bool:
 def has_torque_switch(family: Family) -> bool:
     """Whether devices that move can be let go; some hold whenever they have power."""
     return moves(family) and has(family, "enable_torque")
+
+
+def abilities(family: Family) -> Mapping[str, Callable[..., Any]]:
+    """What a simulated device of this family offers a machine, by the model that it says it is."""
+    return _abilities(cast("Any", family))
+
+
+@cache
+def _abilities(family: Any) -> Mapping[str, Callable[..., Any]]:
+    with world(family) as there:
+        found: Mapping[str, Callable[..., Any]] = family.axis(there.device(there.ids[0]).identify().model)
+        return found
+
+
+def leads(family: Family) -> bool:
+    """Whether devices of this family can be led in a loop."""
+    return "train" in abilities(family)
 
 
 def switch_on(device: Any) -> None:

@@ -29,6 +29,7 @@ from . import driver, wire
 from .scanning import scan
 from .simulator import Metronomes
 from .table import TABLE
+from .train import train
 
 RATE: Final = 500_000
 TURNAROUND: Final = {Timeout.REPLY: 0.005, Timeout.SCAN: 0.002, Timeout.STORE: 0.05}
@@ -72,6 +73,8 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "stop": driver.stop,
     "enable_torque": driver.enable_torque,
     "disable_torque": driver.disable_torque,
+    "limits": driver.limits,
+    "train": train,
 }
 
 

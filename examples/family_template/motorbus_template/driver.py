@@ -312,10 +312,16 @@ def _is_arrival(node: int, notice: Notice) -> bool:
 
 def _goal(node: Node, raw: int) -> Operation[Goal]:
     """What this raw goal orders, with the limits the device itself declares, for the gate to judge."""
+    known = yield from limits(node)
+    return Goal(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *known)
+
+
+def limits(node: Node) -> Operation[tuple[float, float]]:
+    """Lowest and highest position, rad, as the device itself has them; read once."""
     if node.limits is None:
-        limits = yield from read(node, "min_position", "max_position")
-        node.limits = limits["min_position"], limits["max_position"]
-    return Goal(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *node.limits)
+        found = yield from read(node, "min_position", "max_position")
+        node.limits = found["min_position"], found["max_position"]
+    return node.limits
 
 
 def telemetry(node: Node) -> Operation[State]:

@@ -1,11 +1,13 @@
 """Threads on one blocking bus: one pumps, the others wait and are woken, and whoever still waits takes over.
 
 `pumper` is the thread that pumps. An interrupt may fall between any two lines here, so a thread that finds its own
-number there has been interrupted, and `recover` gives back whatever it may still hold.
+number there has been interrupted, and `recover` gives back whatever it may still hold. A thread that works on several
+buses cannot wait on the condition of one: it leaves a bell, which is rung whenever nobody pumps any more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from threading import Condition, get_ident
 
@@ -26,12 +28,13 @@ class Relay:
         self.turns = turns
         self.changed = changed
         self.pumper: int | None = None
+        self.bells: set[Callable[[], None]] = set()
 
     def start(self, flight: Flight) -> None:
         """Send this exchange at once where the bus is idle, and take in what comes; queue it otherwise."""
         if self._launched(flight):
             take_in(self.link, self.turns, flight.deadline)
-            self._hand_over()
+            self.hand_over()
         flight.wake = self.wake
 
     def _launched(self, flight: Flight) -> bool:
@@ -56,12 +59,24 @@ class Relay:
         try:
             crank(self.link, self.turns, inf)
         finally:
-            self._hand_over()
+            self.hand_over()
 
-    def _hand_over(self) -> None:
+    def claim(self) -> bool:
+        """Become the one who pumps, unless another thread does."""
+        with self.changed:
+            if self.pumper not in (None, get_ident()):
+                return False
+            self.pumper = get_ident()
+            return True
+
+    def hand_over(self) -> None:
+        """Pump no longer: whoever waits may."""
         with self.changed:
             self.pumper = None
             self.changed.notify_all()
+        if self.bells:
+            for ring in tuple(self.bells):
+                ring()
 
     def wake(self) -> None:
         """Something has been settled."""

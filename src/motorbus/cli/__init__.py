@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from motorbus import __version__
-from motorbus.cli import faces
+from motorbus.cli import faces, machine
 from motorbus.cli.exits import Exit, exit_code
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
@@ -36,18 +36,26 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "scan": "Find the devices on a bus.",
         "ping": "Ask devices whether they are there.",
         "info": "Say what a device is: model, firmware, limits, registers.",
+        "init": "Write a machine file from what answers on the buses.",
     },
     Group("Look", sort_key=1): {
         "read": "Read registers, or the telemetry, of a device.",
         "monitor": "Watch devices: position, velocity, load, current, voltage, temperature, alarms.",
         "decode": "Explain the bytes of frames, and why a bad one is bad.",
         "budget": "Say what a control loop would load a bus with, and how fast it can be.",
+        "loop-stats": "Measure how well a loop over axes keeps its rate; nothing moves.",
     },
     Group("Act", sort_key=2): {
         "write": "Write registers of a device.",
         "move": "Move devices to positions, several of them together.",
         "jog": "Turn a device at a speed for a time, and stop.",
         "home": "Let a device find its reference.",
+        "pose": "Go to a pose of the machine, list its poses, or keep the present one.",
+        "park": "Go where the machine file says that the axes are parked.",
+        "hold": "Stay, with torque.",
+        "teach": "Lead axes by hand, and write down where they went.",
+        "replay": "Let axes carry out the movement in a file.",
+        "follow": "Let axes go where others are led by hand.",
         "torque": "Switch the power stage on or off.",
         "calibrate": "Make the present pose of a device read another position, for good.",
         "stop": "Decelerate and hold.",
@@ -95,7 +103,7 @@ def _default_shown(default: object) -> str | None:
     return str(default) if default else None
 
 
-_COMMON: Final = re.compile(r"--json|--verbose|-v+")
+_COMMON: Final = re.compile(rf"--json|--verbose|-v+|{machine.FLAG}=.*")
 _MINUS: Final = "\N{MINUS SIGN}"
 _NEGATIVE: Final = re.compile(r"-[.]?[0-9].*")
 """A negative number, with a unit or without: no flag begins with a digit."""
@@ -106,6 +114,10 @@ _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#I
     feetech:/dev/ttyACM0               feetech:COM7,baud=500000
     feetech:socket://10.0.0.7:4000     feetech:sim,ids=1-6
     kst:can://slcan/dev/ttyACM0        kst:can://socketcan/can0,bitrate=500000
+
+In a folder with a motorbus.toml, buses, axes and groups go by their names:
+
+    motorbus init feetech:/dev/ttyACM0          motorbus move shoulder=30deg
 
 `motorbus COMMAND --help` shows examples. Exit codes: 0 ok, 1 failure, 2 usage,
 3 port not found, 4 port busy, 5 no reply, 6 partial, 7 device refused,
@@ -162,6 +174,7 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
         *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
         as_json: Annotated[bool, Parameter(name="--json", negative="", group=_EVERYWHERE)] = False,
         verbose: Annotated[int, Parameter(name=["--verbose", "-v"], count=True, group=_EVERYWHERE)] = 0,
+        file: Annotated[str, Parameter(name=machine.FLAG, group=_EVERYWHERE)] = "",
     ) -> int:
         """Run one command.
 
@@ -171,12 +184,14 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
             One JSON document on stdout instead of tables; JSON Lines for streams.
         verbose
             Say on stderr what happens; -vv says more.
+        file
+            The machine file by whose names things are called, before $MOTORBUS_MACHINE, ./motorbus.toml and your own.
         """
         output.json = as_json
         _refuse_rehearsal(app, words)
         command, bound, ignored = parse(app, words)
         bound.arguments.update(dict.fromkeys(ignored, output))
-        with _logging(verbose):
+        with _logging(verbose), machine.using(file):
             result = command(*bound.args, **bound.kwargs)
         return result if isinstance(result, int) else Exit.OK
 
@@ -203,8 +218,22 @@ def _refuse_rehearsal(app: App, words: Sequence[str]) -> None:
 
 def _common_first(words: Sequence[str]) -> list[str]:
     """The flags that every command has may stand anywhere; the parser finds them for sure where they come first."""
-    common = [word for word in words if _COMMON.fullmatch(word)]
-    return [*common, *(word for word in words if not _COMMON.fullmatch(word))]
+    told = _machine_told(words)
+    common = [word for word in told if _COMMON.fullmatch(word)]
+    return [*common, *(word for word in told if not _COMMON.fullmatch(word))]
+
+
+def _machine_told(words: Sequence[str]) -> list[str]:
+    """`--machine FILE` as one word. Raises RequestError when no file follows."""
+    told: list[str] = []
+    for word in words:
+        if told and told[-1] == machine.FLAG:
+            told[-1] += f"={word}"
+        else:
+            told.append(word)
+    if any(word in (machine.FLAG, f"{machine.FLAG}=") for word in told):
+        raise RequestError(f"{machine.FLAG}: which file?", expected=f"{machine.FLAG} {machine.FILE}")
+    return told
 
 
 def parse(app: App, words: Sequence[str]) -> tuple[Any, BoundArguments, Mapping[str, Any]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.machine import axes_called
 from motorbus.cli.target import able, everyone, face, gathered, offers, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.errors import LinkError, MotorbusError
@@ -29,29 +30,54 @@ def each(
 ) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
 
-    Where a family has no such verb nothing is opened: RequestError. A dry run shows what would be sent, and sends
-    none of it.
+    Where a family has no such verb nothing is opened: RequestError. A bus that fails keeps nobody on another waiting. A
+    dry run shows what would be sent, and sends none of it.
     """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
-    wanted = gathered(devices)
+    wanted, called = gathered(devices), axes_called(devices)
     for name in wanted:
         offers(target(name).family, verb)
     for name, nodes in wanted.items():
-        with opened(name, options, output) as bus:
-            visited = everyone(name, bus, nodes, output)
-            rehearsal = DryBus(bus)
-            for node in visited:
-                carrier = rehearsal.apart() if dry_run else bus
-                results.append({"bus": name, "id": node, **_tried(carrier, node, verb, errors)})
-            if dry_run:
-                show(rehearsal, output)
+        there: list[dict[str, Any]] = []
+        try:
+            with opened(name, options, output) as bus:
+                visited = everyone(name, bus, nodes, output)
+                rehearsal = DryBus(bus)
+                for node in visited:
+                    carrier = rehearsal.apart() if dry_run else bus
+                    there.append({"bus": name, "id": node, **_tried(carrier, node, verb, errors)})
+                if dry_run:
+                    show(rehearsal, output)
+        except MotorbusError as error:
+            if len(wanted) == 1:
+                raise
+            there += _unvisited(name, nodes[len(there) :] or (None,), error, errors)
+        results += [{**one, **_named(called, name, one["id"])} for one in there]
     if dry_run:
         return _verdict(errors, len(results))
     output.document(f"motorbus.{verb}/1", {"devices": results})
-    shown = [(f"{one['bus']}#{one['id']}", one.get("error") or one.get("promise") or what) for one in results]
+    shown = [(_shown(one), one.get("error") or one.get("promise") or what) for one in results]
     output.table("", ["device", "result"], shown)
     return _verdict(errors, len(results))
+
+
+def _unvisited(
+    bus: str, nodes: tuple[int | None, ...], error: MotorbusError, errors: list[MotorbusError]
+) -> list[dict[str, Any]]:
+    """What is told of those that a bus keeps out of reach; one entry without an id where nobody knows who is there."""
+    errors += [error] * len(nodes)
+    return [{"bus": bus, "id": node, "done": False, "error": error.summary} for node in nodes]
+
+
+def _named(called: Mapping[tuple[str, int], str], bus: str, node: int | None) -> dict[str, str]:
+    """The name of the axis, where the device was named by one."""
+    return {"axis": called[bus, node]} if node is not None and (bus, node) in called else {}
+
+
+def _shown(one: Mapping[str, Any]) -> str:
+    device = one["bus"] if one["id"] is None else f"{one['bus']}#{one['id']}"
+    return f"{one['axis']} ({device})" if "axis" in one else device
 
 
 def _tried(bus: Bus | DryBus, node: int, verb: str, errors: list[MotorbusError]) -> dict[str, Any]:
@@ -71,4 +97,4 @@ def _verdict(errors: list[MotorbusError], visited: int) -> Exit:
         return Exit.OK
     if len(errors) == visited:
         raise errors[0]
-    raise Partial("; ".join(error.summary for error in errors))
+    raise Partial("; ".join(dict.fromkeys(error.summary for error in errors)))

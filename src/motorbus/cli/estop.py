@@ -9,8 +9,9 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.machine import machine_file
 from motorbus.cli.output import Output
-from motorbus.cli.target import Target, everyone, opened, said, target
+from motorbus.cli.target import Target, everyone, gathered, opened, said, target, targets
 from motorbus.core.operation import Effect
 from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
@@ -36,7 +37,8 @@ but only devices that are named (BUS#1-6), or known because they answered
 before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
 some did, 5 when nobody did. A port that a foreign program holds cannot be
 reached: the error names that program. Without BUS, every bus that a motorbus
-process of yours holds is stopped.
+process of yours holds is stopped, and those of the machine file if there is
+one. By its names, a group or an axis stops its whole buses.
 
 From here KST servos must say where they are before they can be held there. On
 a bus without ids everyone is asked who is there first, and the answers are
@@ -46,7 +48,8 @@ Examples:
 
     motorbus estop
     motorbus estop feetech:/dev/ttyACM0
-    motorbus estop feetech:/dev/ttyACM0#1-6""",
+    motorbus estop feetech:/dev/ttyACM0#1-6
+    motorbus estop arm""",
 )
 
 
@@ -63,11 +66,11 @@ def estop(
     Parameters
     ----------
     bus
-        FAMILY:PORT; every bus that a motorbus process holds when left out.
+        FAMILY:PORT or a name; every bus that a motorbus process holds, or of the machine file, when left out.
     options
         Any option of the bus string, as a flag.
     """
-    stops = [_stop(bus, options, output)] if bus else _stop_all()
+    stops = _stop_each(targets(bus), options, output) if bus else _stop_all(options, output)
     output.document("motorbus.estop/1", {"buses": stops})
     for one in stops:
         output.text("\n  ".join(_lines(one)))
@@ -81,11 +84,10 @@ def _lines(one: dict[str, Any]) -> list[str]:
     return [f"{one['bus']}: {one['error'] or heard}", *(line for line in more if line)]
 
 
-def _stop(bus: str, options: dict[str, str], output: Output) -> dict[str, Any]:
+def _stop(wanted: Target, options: dict[str, str], output: Output) -> dict[str, Any]:
     from motorbus import session
     from motorbus.link.lock import PortLock
 
-    wanted = target(bus)
     port = session.lock_name(wanted.bus, said(options))
     if not port:  # a channel of this process's own
         return _stop_ourselves(wanted, options, output)
@@ -149,25 +151,62 @@ def _confirms(opening: Bus, node: int) -> bool:
     return bool(answers) and all(answers)
 
 
-def _stop_all() -> list[dict[str, Any]]:
-    from motorbus.link.lock import holders
+def _stop_each(wanted: list[Target], options: dict[str, str], output: Output) -> list[dict[str, Any]]:
+    """Several buses one after the other; one that is out of reach keeps nobody waiting."""
+    if len(wanted) == 1:
+        return [_stop(wanted[0], options, output)]
+    stops = []
+    for one in wanted:
+        try:
+            stops.append(_stop(one, options, output))
+        except MotorbusError as error:
+            stops.append(_failed(one.bus, "this process", error))
+    return stops
 
-    owners = holders()
-    if not owners:
+
+def _stop_all(options: dict[str, str], output: Output) -> list[dict[str, Any]]:
+    """Every bus that a motorbus process holds, then those of the machine file that none of them holds."""
+    from motorbus.link.lock import holders, real_name
+
+    stops: list[dict[str, Any]] = []
+    held: set[str] = set()
+    for owner in holders():
+        held.add(real_name(owner.port))
+        by = f"process {owner.pid} ({owner.program})"
+        try:
+            stops.append(_facts(owner.port, by, _ask(owner.port)))
+        except MotorbusError as error:
+            stops.append(_failed(owner.port, by, error))
+    mine = [one for one in _of_machine(options, output) if one[0] not in held]
+    if not stops and not mine:
         raise RequestError(
             "no motorbus process holds a bus",
             expected="BUS, as feetech:/dev/ttyACM0",
             advice="name the bus, and it is opened and stopped from here",
         )
-    stops = []
-    for owner in owners:
-        by = f"process {owner.pid} ({owner.program})"
-        try:
-            stops.append(_facts(owner.port, by, _ask(owner.port)))
-        except MotorbusError as error:
-            heard = {"acknowledged": [], "silent": [], "promise": "", "note": ""}
-            stops.append({"bus": owner.port, "by": by, "outcome": "failed", **heard, "error": error.summary})
-    return stops
+    return stops + (_stop_each([one for _, one in mine], options, output) if mine else [])
+
+
+def _of_machine(options: dict[str, str], output: Output) -> list[tuple[str, Target]]:
+    """The buses of the machine file with the devices of its axes, each behind the name of its port."""
+    from motorbus import session
+    from motorbus.link.lock import real_name
+
+    if machine_file().path is None:
+        return []
+    try:
+        known = machine_file().machine
+        nodes = gathered(known.axes)
+    except MotorbusError as error:  # whoever is held must be stopped all the same
+        output.note(f"note: the machine file is of no help: {error.summary}")
+        return []
+    wanted = [Target(bus, target(bus).family, nodes[bus]) for bus in nodes]
+    return [(real_name(session.lock_name(one.bus, said(options))), one) for one in wanted]
+
+
+def _failed(bus: str, by: str, error: MotorbusError) -> dict[str, Any]:
+    heard = {"acknowledged": [], "silent": [], "promise": "", "note": ""}
+    return {"bus": bus, "by": by, "outcome": "failed", **heard, "error": error.summary}
 
 
 def _facts(bus: str, by: str, outcome: StopOutcome, note: str = "") -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -22,3 +24,20 @@ def usable(file: Path, what: str) -> Iterator[None]:
     except OSError as error:
         why = (error.strerror or str(error)).lower()
         raise RequestError(f"{file} cannot be {what}: {why}", advice="see that the path is right") from error
+
+
+def replaced(file: Path, text: str) -> None:
+    """Give a file that is there another text, all of it or nothing: a cut in the middle leaves the old one.
+
+    A link stays one, and who may read the file stays. Raises RequestError when it cannot be written.
+    """
+    with usable(file, "written"):
+        there = file.resolve()
+        beside = there.with_name(f".{there.name}.new")
+        try:
+            beside.write_text(text, encoding="utf-8", newline="")
+            shutil.copymode(there, beside)
+            os.replace(beside, there)
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise

@@ -8,17 +8,20 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.acting import acted
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_named, is_name
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
+from motorbus.cli.robot import able, place, rehearse, robot
 from motorbus.cli.target import device, offers, opened
 from motorbus.core import units
+from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
 
 app = App(
     name="home",
-    usage="Usage: motorbus home BUS#ID [OPTIONS]",
+    usage="Usage: motorbus home BUS#ID|AXIS... [OPTIONS]",
     help_epilogue="""Asks first, for the way to the switch may be long: --yes agrees. When the
 switch is not met before the deadline it is stopped, and the command ends with
 exit code 8. Ctrl-C stops it too. But the controller knows no end of it: when
@@ -29,8 +32,12 @@ A stepper controller homes in reverse, with the speed of step 1 of project 1,
 until its input 5 is active. If that is active beforehand, it stands on the
 switch or the switch is stuck, and nothing moves.
 
+Axes of a machine file are homed together, those of several buses at the same
+time. Nothing is remembered: `motorbus move --home` homes and goes on.
+
 Examples:
 
+    motorbus home lift --deadline 20s
     motorbus home stepper:/dev/ttyUSB0
     motorbus home stepper:/dev/ttyUSB0 --deadline 20s --velocity 30rpm --yes
     motorbus home stepper:/dev/ttyUSB0 --dry-run
@@ -40,9 +47,7 @@ Examples:
 
 @app.default
 def home(
-    device_: Annotated[str, Parameter(name="BUS#ID")],
-    /,
-    *,
+    *devices: Annotated[str, Parameter(name="BUS#ID|AXIS")],
     deadline: str = "",
     velocity: str = "",
     yes: Flag = False,
@@ -54,8 +59,8 @@ def home(
 
     Parameters
     ----------
-    device_
-        FAMILY:PORT#ID, as stepper:/dev/ttyUSB0#1
+    devices
+        FAMILY:PORT#ID, as stepper:/dev/ttyUSB0#1; or axes of the machine file.
     deadline
         How long it may take, as 20s; as the family says when left out.
     velocity
@@ -65,7 +70,15 @@ def home(
     options
         Any option of the bus string, as a flag.
     """
-    return homed(device_, deadline, velocity, options, output, yes=yes, dry_run=dry_run)
+    if devices and all(map(is_name, devices)):
+        return _axes(devices, deadline, velocity, options, output, yes=yes, dry_run=dry_run)
+    if len(devices) != 1:
+        raise RequestError(
+            "one device is homed at a time, or axes of the machine file together",
+            expected="BUS#ID, as stepper:/dev/ttyUSB0#1, or names of axes",
+            advice="nothing was sent",
+        )
+    return homed(devices[0], deadline, velocity, options, output, yes=yes, dry_run=dry_run)
 
 
 def homed(
@@ -91,4 +104,39 @@ def homed(
     if not dry_run:
         output.document("motorbus.home/1", {"id": node, "result": plain(told)})
         output.text(f"#{node}: {told}")
+    return Exit.OK
+
+
+def _axes(
+    words: tuple[str, ...],
+    deadline: str,
+    velocity: str,
+    options: dict[str, str],
+    output: Output,
+    *,
+    yes: bool,
+    dry_run: bool,
+) -> Exit:
+    """Axes of the machine file, all at the same time."""
+    names = axes_named(words)
+    seconds = units.parse(deadline, "time") if deadline else None
+    if velocity:
+        raise RequestError("axes home as fast as their devices are set to", expected="no --velocity")
+    with robot(names, options, output) as hand:
+        for name in names:
+            able(hand, name, "home")
+        if dry_run:
+            rehearse(hand, names, lambda axis: axis.home(deadline=seconds))
+            return Exit.OK
+        what = f"home {', '.join(names)}: each moves until its switch is met, as far as that takes"
+        if not yes:
+            rehearse(hand, names, lambda axis: axis.home(deadline=seconds), show=False)
+        output.consent(what, yes=yes)
+        with hand.working("homing"):
+            found = hand.robot.home(names, deadline=seconds)
+        rows = [(name, place(hand.robot, name, at)) for name, at in found.items()]
+    output.document(
+        "motorbus.home.axes/1", {"axes": [{"name": name, "at": at} for name, at in found.items()]}
+    )
+    output.table("", ["axis", ">at its switch"], rows)
     return Exit.OK

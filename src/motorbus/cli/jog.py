@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
 from motorbus.cli.acting import acted
 from motorbus.cli.consent import FAR
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_named, is_name, machine
+from motorbus.cli.moving import FAR_LINEAR
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
+from motorbus.cli.robot import able, place, rehearse, robot
 from motorbus.cli.target import device, offers, opened
 from motorbus.core import units
 from motorbus.errors import RequestError
+from motorbus.motion.machine.model import VELOCITY
+
+if TYPE_CHECKING:
+    from motorbus.cli.output import Output
 
 app = App(
     name="jog",
-    usage="Usage: motorbus jog BUS#ID=VELOCITY --seconds SECONDS [OPTIONS]",
+    usage="Usage: motorbus jog BUS#ID=VELOCITY|AXIS=VELOCITY --seconds SECONDS [OPTIONS]",
     help_epilogue="""VELOCITY is in rad/s, or with a unit: 60rpm, 90deg/s; its sign is the
 direction. A way of more than 180 degrees needs --yes. It is stopped when the
 time is over, and also when this is interrupted; keep a switch in the supply
@@ -27,8 +34,13 @@ A stepper controller jogs with the speed of step 1 of its project 1: that is
 borrowed and put back, nothing is saved, and `motorbus recover` puts it back
 when this program was killed meanwhile.
 
+An axis of a machine file goes in its own unit (a linear one in m/s, or 5mm/s),
+inside its limits, and stays where it was stopped. A way of more than 100 mm
+needs --yes, too.
+
 Examples:
 
+    motorbus jog shoulder=10deg/s --seconds 1
     motorbus jog stepper:/dev/ttyUSB0#1=60rpm --seconds 0.5
     motorbus jog stepper:/dev/ttyUSB0#1=-0.5turn/s --seconds 2s --yes
     motorbus jog stepper:sim#1=10rpm --seconds 1 --dry-run""",
@@ -37,7 +49,7 @@ Examples:
 
 @app.default
 def jog(
-    device_: Annotated[str, Parameter(name="BUS#ID=VELOCITY")],
+    device_: Annotated[str, Parameter(name="BUS#ID=VELOCITY|AXIS=VELOCITY")],
     /,
     *,
     seconds: str,
@@ -51,7 +63,7 @@ def jog(
     Parameters
     ----------
     device_
-        The device, and how fast it shall turn, as stepper:/dev/ttyUSB0#1=60rpm
+        The device or axis, and how fast it shall turn, as stepper:/dev/ttyUSB0#1=60rpm
     seconds
         How long, in s or as 500ms.
     yes
@@ -64,6 +76,8 @@ def jog(
         raise RequestError(
             f"{device_}: how fast?", expected="BUS#ID=VELOCITY, as stepper:/dev/ttyUSB0#1=60rpm"
         )
+    if is_name(where):
+        return _axis(where, speed, units.parse(seconds, "time"), options, output, yes=yes, dry_run=dry_run)
     bus, family, (node,) = device(where)
     offers(family, "jog")
     velocity, span = units.parse(speed, "velocity"), units.parse(seconds, "time")
@@ -76,4 +90,34 @@ def jog(
     facts = {"id": node, "velocity": velocity, "seconds": span, "result": plain(told)}
     output.document("motorbus.jog/1", facts)
     output.text(f"#{node}: {told}")
+    return Exit.OK
+
+
+def _axis(
+    word: str, speed: str, span: float, options: dict[str, str], output: Output, *, yes: bool, dry_run: bool
+) -> Exit:
+    """The same for an axis of the machine file."""
+    name, *more = axes_named((word,))
+    if more:
+        raise RequestError(f"{word} is several axes", expected="one axis", advice="nothing was sent")
+    spec = machine().axes[name]
+    velocity = units.parse(speed, VELOCITY.of(spec.linear))
+    if not span > 0:
+        raise RequestError(f"--seconds {span:g}: not above 0", advice="nothing was sent")
+    way = abs(velocity * span)
+    with robot([name], options, output) as hand:
+        verb = able(hand, name, "jog")
+        if dry_run:
+            rehearse(hand, [name], lambda axis: axis.jog(velocity, span))
+            return Exit.OK
+        if way > (FAR_LINEAR if spec.linear else FAR) and not yes:
+            rehearse(hand, [name], lambda axis: axis.jog(velocity, span), show=False)
+            output.consent(f"move {name} by {spec.show(way)}", yes=False)
+        with hand.working("jogging"):
+            told = verb(velocity, span)
+        present = hand.robot.positions([name])[name]
+        stands = place(hand.robot, name, present)
+    facts = {"axis": name, "velocity": velocity, "seconds": span, "present": present}
+    output.document("motorbus.jog.axes/1", {**facts, "result": plain(told)})
+    output.text(f"{name}: now at {stands}")
     return Exit.OK

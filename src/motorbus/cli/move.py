@@ -15,9 +15,11 @@ from motorbus.cli import dry, faces
 from motorbus.cli.acting import acted
 from motorbus.cli.consent import FAR, consent_to_ways
 from motorbus.cli.exits import Exit
+from motorbus.cli.moving import How, Known, go, goals_of, how_of, names_axes, positions_of
 from motorbus.cli.output import Output
-from motorbus.cli.parameters import DryRun, Flag
+from motorbus.cli.parameters import Assume, DryRun, Duration, First, Flag, Shape, Speed
 from motorbus.cli.plain import plain
+from motorbus.cli.robot import robot
 from motorbus.cli.target import Target, able, device, face, offers, opened, takes, target
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
 
 app = App(
     name="move",
-    usage="Usage: motorbus move BUS#ID=POSITION... [OPTIONS]",
+    usage="Usage: motorbus move BUS#ID=POSITION... | AXIS=POSITION... [OPTIONS]",
     help_epilogue="""Positions are in rad, or with a unit: 90deg, 0.25turn. Torque goes on by
 itself where devices do that, as FEETECH servos do, or is never off, as in KST
 servos; `motorbus torque on` first elsewhere. A way of more than 180 degrees
@@ -43,8 +45,24 @@ ends the waiting, not the motion: `motorbus stop` does.
 which do not know their position, as a stepper controller. One device at a
 time, and it is stopped at the end. What is shown then is reckoned, not read.
 
+Axes of a machine file start together and arrive together, on whatever buses
+they are, within the limits of the file; += and -= go by a way from where each
+stands. A way of more than 180 degrees, or 100 mm, needs --yes. Ctrl-C stops
+them all. --dry-run shows the plan: frames are made on the way, from what is
+read then, and cannot be shown before.
+
+An axis without feedback knows its place only while one command lasts: say
+where it stands (--assume lift=0mm) or let it look (--home).
+
+When they have arrived they stay there with their torque on, whatever `exit` of
+the file says, for a command is one step of your work and not its end:
+`motorbus park` and `motorbus torque off` end it. After an error or Ctrl-C,
+`exit` decides.
+
 Examples:
 
+    motorbus move shoulder=30deg elbow=-10deg lift+=5mm --assume lift=0mm
+    motorbus move left=0 --duration 3s --kind minimum_jerk
     motorbus move feetech:/dev/ttyACM0#3=90deg
     motorbus move feetech:/dev/ttyACM0#3=-0.5 --velocity 1.5
     motorbus move feetech:COM7#1+2=0 feetech:COM7#3=0.3 --no-wait
@@ -59,9 +77,14 @@ Goals = dict[int, float]
 
 @app.default
 def move(
-    *goals: Annotated[str, Parameter(name="BUS#ID=POSITION")],
+    *goals: Annotated[str, Parameter(name="BUS#ID=POSITION|AXIS=POSITION")],
     velocity: str = "",
     acceleration: str = "",
+    duration: Duration = "",
+    kind: Shape = "trapezoid",
+    speed: Speed = "",
+    assume: Assume = (),
+    home: First = False,
     wait: bool = True,
     yes: Flag = False,
     dry_run: DryRun = False,
@@ -73,7 +96,7 @@ def move(
     Parameters
     ----------
     goals
-        Devices and where they shall go.
+        Devices, or axes, and where they shall go.
     velocity
         At most so fast, in rad/s or as 90deg/s; the maximum of the device when left out.
     acceleration
@@ -86,6 +109,9 @@ def move(
         Any option of the bus string, as a flag.
     """
     bounds = _bounds(velocity, acceleration)
+    if _for_axes(goals, [*bounds, *([] if wait else ["no-wait"])], [duration, speed, *assume], home):
+        how = how_of(duration, kind, speed)
+        return _axes(goals, how, assume, options, output, home=home, yes=yes, dry_run=dry_run)
     if any(_is_relative(text) for text in goals):
         return _moved_by(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
     results = []
@@ -107,6 +133,49 @@ def move(
             for r in results
         ]
         output.table("", ["device", "goal", "present"], shown)
+    return Exit.OK
+
+
+def _for_axes(texts: tuple[str, ...], for_devices: list[str], for_axes: list[str], home: bool) -> bool:
+    """Whether these are goals of axes. Raises RequestError for both forms at once, and for options of the other."""
+    named = [names_axes(text) for text in texts]
+    if any(named) and not all(named):
+        raise RequestError(
+            "some goals are for axes of the machine file and some for devices",
+            expected="AXIS=POSITION... alone, or BUS#ID=POSITION... alone",
+            advice="say it in two commands; nothing was sent",
+        )
+    axes = bool(named) and all(named)
+    if axes and for_devices:
+        raise RequestError(
+            f"--{for_devices[0]} is for devices; axes go within the limits of the machine file, and are waited for",
+            expected="--speed 50%, or --duration 3s",
+            advice="nothing was sent",
+        )
+    if not axes and (any(for_axes) or home):
+        raise RequestError(
+            "--duration, --speed, --assume and --home are for axes of a machine file",
+            expected="--velocity and --acceleration, for devices",
+            advice="nothing was sent",
+        )
+    return axes
+
+
+def _axes(
+    texts: tuple[str, ...],
+    how: How,
+    assume: tuple[str, ...],
+    options: Mapping[str, str],
+    output: Output,
+    *,
+    home: bool,
+    yes: bool,
+    dry_run: bool,
+) -> Exit:
+    goals, known = goals_of(texts), Known(positions_of(assume), home)
+    axes = list(dict.fromkeys([*goals, *known.stands]))
+    with robot(axes, options, output) as hand:
+        go(hand, "move", goals, how, known, yes=yes, dry_run=dry_run)
     return Exit.OK
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -17,4 +17,19 @@ DryRun = Annotated[
         negative="",
         help="Read as usual; show the frames that would change something, and send none of those.",
     ),
+]
+Duration = Annotated[str, Parameter(help="In so long, as 2s; as quick as the axes may when left out.")]
+Shape = Annotated[
+    Literal["trapezoid", "minimum_jerk"], Parameter(help="How each axis speeds up and slows down on its way.")
+]
+Speed = Annotated[str, Parameter(help="At this share of what the machine file allows, as 50%.")]
+Assume = Annotated[
+    tuple[str, ...],
+    Parameter(
+        negative="",
+        help="AXIS=POSITION: an axis that does not know where it is stands there, as lift=0mm. May be repeated.",
+    ),
+]
+First = Annotated[
+    bool, Parameter(name="--home", negative="", help="Axes that do not know where they are home first.")
 ]

@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
-from motorbus.cli.target import face, gathered, nobody, opened, rate_word, target
+from motorbus.cli.target import face, gathered, nobody, opened, rate_word, targets
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _verdict(answers: list[dict[str, object]], devices: tuple[str, ...]) -> Exit
         return Exit.OK
     names = ", ".join(f"#{node}" for node in silent)
     if len(silent) == len(answers):
-        rate = rate_word(target(devices[0]).family)
+        rate = rate_word(targets(devices[0])[0].family)
         raise NoReply(
             f"no answer from {names}",
             cause="no power, a loose cable, another id or another rate",

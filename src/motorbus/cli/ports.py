@@ -26,17 +26,23 @@ Examples:
 @app.default
 def ports(*, output: Annotated[Output, Parameter(parse=False)]) -> None:
     """List the serial ports of this machine and what hangs on them."""
+    seen(output)
+
+
+def seen(output: Output) -> list[PortInfo]:
+    """Show the ports that there are; and those."""
     from motorbus.link import serial
 
     found = serial.ports()
     output.document("motorbus.ports/1", {"ports": [_facts(port) for port in found]})
     if not found:
         output.note("no serial port found; `motorbus demo` needs none")
-        return
+        return found
     rows = [
         (port.device, _usb(port.vid, port.pid), port.description, port.guess, port.stable) for port in found
     ]
     output.table("Serial ports", ["device", "usb", "description", "looks like", "stable name"], rows)
+    return found
 
 
 def _facts(port: PortInfo) -> dict[str, object]:

@@ -84,6 +84,7 @@ def recover(
     if not bus:
         return _listed(output, more=bool(alone or forget or of or dry_run or options))
     bus, family, _ = target(bus)
+    of = target(of).bus if of else ""
     _keeps_journals(family)
     if forget:
         return _given_up(of or bus, options, output, yes=yes)

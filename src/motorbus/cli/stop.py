@@ -8,19 +8,26 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_named, machine_file
 from motorbus.cli.output import Output
 from motorbus.errors import PortBusy
 
 app = App(
     name="stop",
-    usage="Usage: motorbus stop BUS[#ID]... [OPTIONS]",
+    usage="Usage: motorbus stop [BUS[#ID] | AXIS]... [OPTIONS]",
     help_epilogue="""The devices keep their torque and hold where they come to rest. When it must
 stop whatever happens, and may sag, say `motorbus estop`. A stepper controller
 is told to end its project and to stop its motor; that both were accepted is
 all that is ever known of it.
 
+By the names of a machine file: an axis, a group, or a bus with whoever answers
+on it; with no name at all, every axis of the machine. Every bus is visited,
+whatever happens on another.
+
 Examples:
 
+    motorbus stop
+    motorbus stop shoulder elbow
     motorbus stop feetech:/dev/ttyACM0#3
     motorbus stop feetech:/dev/ttyACM0
     motorbus stop stepper:/dev/ttyUSB0""",
@@ -39,14 +46,15 @@ def stop(
     Parameters
     ----------
     devices
-        FAMILY:PORT for every device that answers, or FAMILY:PORT#ID for some.
+        FAMILY:PORT for every device that answers, FAMILY:PORT#ID for some, or axes; all axes when left out.
     dry_run
         Read as usual; show the frames that would change something, and send none of those.
     options
         Any option of the bus string, as a flag.
     """
+    wanted = devices or (tuple(axes_named(())) if machine_file().path else ())
     try:
-        return each("stop", "stop", devices, options, output, dry_run=dry_run)
+        return each("stop", "stop", wanted, options, output, dry_run=dry_run)
     except PortBusy as error:
         # a port that a foreign program holds is out of reach for that, too
         error.advice += "; `motorbus estop BUS` reaches it where a motorbus process holds it"

@@ -1,4 +1,4 @@
-"""From the words BUS and BUS#ID to an open bus and its devices; what all commands share.
+"""From the words BUS and BUS#ID, or from names of the machine file, to an open bus and its devices; what all share.
 
 Whatever can be refused without the port is refused before the port is opened.
 """
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli import faces
+from motorbus.cli.machine import addresses
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
@@ -39,10 +40,27 @@ class Target(NamedTuple):
 
 
 def target(text: str) -> Target:
-    """BUS or BUS#ID or BUS#1-3+7. Where a line has one device only, that is named by naming the bus.
+    """BUS or BUS#ID or BUS#1-3+7, or a name of the machine file for what is on one bus.
 
-    Raises RequestError for a bad address, an unknown family or an impossible id.
+    Where a line has one device only, that is named by naming the bus. Raises RequestError for a bad address, an unknown
+    family, an impossible id, a name that is in no file, and a group on several buses.
     """
+    first, *more = targets(text)
+    if more:
+        raise RequestError(
+            f"{text} is on {len(more) + 1} buses, and this goes for one",
+            expected="a bus, or an axis",
+            advice="nothing was sent",
+        )
+    return first
+
+
+def targets(text: str) -> list[Target]:
+    """The same for what may be on several buses, as a group is. Raises RequestError as `target` does."""
+    return [_target(address) for address in addresses(text)]
+
+
+def _target(text: str) -> Target:
     from motorbus import session
 
     address = session.parse_address(text)
@@ -68,10 +86,12 @@ def device(text: str) -> Target:
 def gathered(texts: Iterable[str]) -> dict[str, tuple[int, ...]]:
     """Several targets by bus, in the order they were named, each node once. Raises RequestError for none."""
     found: dict[str, dict[int, None]] = {}
-    for one in map(target, texts):
+    for one in (one for text in texts for one in targets(text)):
         found.setdefault(one.bus, {}).update(dict.fromkeys(one.nodes))
     if not found:
-        raise RequestError("which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0#3")
+        raise RequestError(
+            "which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0#3, or a name of the machine file"
+        )
     return {bus: tuple(nodes) for bus, nodes in found.items()}
 
 

@@ -108,7 +108,9 @@ class Positions(NamedTuple):
 class Train(Protocol):
     """Devices of one bus in a control loop, of which all is known that a cycle needs; see `Family.axis`.
 
-    Its exchanges ask nothing but what they bring. Those on different lanes may be in flight at once.
+    Its exchanges ask nothing but what they bring. Those on different lanes may be in flight at once. Until `begin` is
+    carried out, or goals are sent, nothing is written. What its goals and positions are reckoned by are the settings
+    that a device has then; when some were written since, by whomever here, they raise RequestError.
     """
 
     @property
@@ -117,17 +119,25 @@ class Train(Protocol):
 
     @property
     def positions(self) -> Sequence[Exchange[Positions]]:
-        """What together brings all positions; may be kept and run again. A lone silent node raises NoReply."""
+        """What together brings all positions; may be kept and run again.
+
+        Each tells of some of the nodes, and who is silent is among its missing; one that asks a single node raises
+        NoReply then.
+        """
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
         """What orders these goals (rad), for some or all of them; the gate judges them when it leaves.
 
-        Raises LimitExceeded for what is no finite number or what no device of this kind could be told.
+        Raises LimitExceeded for what is no finite number or what no device of this kind could be told, RequestError for
+        a node that is none of these.
         """
 
     def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
         """Make these ready to be led: torque on without a jump, and each as quick in following as it can be, but not
-        quicker than its speed (rad/s) where it can be told that. Raises as `enable_torque`.
+        quicker than its speed (rad/s, above 0) where it can be told that, rounded up to what it can be told.
+
+        Who has no torque switch holds where it stands. Everyone is visited; then the first error is raised, with a note
+        for each other. Errors as `enable_torque`.
         """
 
 
@@ -363,12 +373,12 @@ class Family(Protocol):
         Each is called with a device (what `devices` makes) and gives an operation, but `train`. They are
 
             state position velocity load current voltage temperature    what it tells: a `State`, else a number
-            enable_torque(device, *, jump)  disable_torque(device)      without a jump; limp
+            enable_torque(device)  disable_torque(device)               without a jump; limp
             move(device, to, *, wait)  stop(device)                     to rad; decelerate and stay, gives a promise
             move_by(device, angle, *, velocity, wait)                   by rad from where it stands
             jog(device, velocity, seconds)  home(device, *, deadline)   for a while; to its switch
             run(device, number, *, timeout)                             a program that is stored in it
-            limits(device)                                              its own lowest and highest position, rad
+            limits(device)                      its own lowest and highest position, rad; read when not known
             cap_torque(device, fraction)  cap_current(device, ampere)   bound what it pushes with, until power-off
             train(devices, *, rate) -> Operation[Train]                 several, to be led in a loop; rate in bit/s
             keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]

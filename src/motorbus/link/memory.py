@@ -98,6 +98,11 @@ class MemoryLink:
     def fileno(self) -> int | None:
         return None
 
+    def due(self) -> float:
+        """The next moment (s) at which something happens here, if nothing is sent before; inf when nothing will."""
+        with self._changed:
+            return -inf if self._arrived else self._next()
+
     def close(self) -> None:
         with self._changed:
             while self._under_way:  # a real port sends what it was given before it closes

@@ -6,6 +6,7 @@ only the first thousand descriptors of a process.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from select import select
 
 LIMIT = 1024  # FD_SETSIZE
@@ -24,3 +25,21 @@ def wait_readable(descriptor: int, seconds: float) -> bool:
     ready = poll()
     ready.register(descriptor, POLLIN)
     return bool(ready.poll(min(seconds, LONGEST) * 1000))
+
+
+def wait_any(descriptors: Sequence[int], seconds: float) -> list[int]:
+    """Those of them that can be read, or whose other end is gone; waits for the first, as `wait_readable` does.
+
+    Raises OSError or ValueError when one of them is closed.
+    """
+    if max(descriptors) < LIMIT:
+        return select(descriptors, (), (), min(seconds, LONGEST))[0]
+    from select import POLLIN, POLLNVAL, poll
+
+    ready = poll()
+    for descriptor in descriptors:
+        ready.register(descriptor, POLLIN)
+    found = ready.poll(min(seconds, LONGEST) * 1000)
+    if any(event & POLLNVAL for _, event in found):
+        raise ValueError("a descriptor is closed")
+    return [descriptor for descriptor, _ in found]

@@ -77,13 +77,17 @@ class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verb
 
 
 def settled(results: Mapping[str, Any]) -> dict[str, Any]:
-    """What each bus returned. Raises the first error there is, with a note for each of the others."""
+    """What each bus returned. Raises the first error there is, with a note for each of the others.
+
+    One that has another among them for its cause comes after it: who waited in vain is not who is to be helped.
+    """
     errors = [told for told in results.values() if isinstance(told, MotorbusError)]
     if errors:
-        said = {str(errors[0])}
-        for other in errors[1:]:
+        first = next((error for error in errors if error.__cause__ not in errors), errors[0])
+        said = {str(first)}
+        for other in errors:
             if str(other) not in said:
                 said.add(str(other))
-                errors[0].add_note(f"also: {other}")
-        raise errors[0]
+                first.add_note(f"also: {other.summary if other.__cause__ is first else other}")
+        raise first
     return dict(results)

@@ -1,19 +1,22 @@
-"""One axis of a machine: a device, seen in rad or m, with its limits, and with no more verbs than the device has.
+"""One axis of a machine: the capabilities of its device, in the units, the zero and the direction of the axis.
 
-What a device cannot do its axis lacks: `hasattr(axis, "temperature")` tells, and no verb is there only to raise.
-`Axis` and `AsyncAxis` are two-line classes over one list of verbs.
+An axis has what its device has and lacks what it lacks: `hasattr(axis, "temperature")` tells, and no verb is there only
+to raise. `Axis` and `AsyncAxis` are two-line classes over one list of verbs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
 from motorbus.core.family import State
 from motorbus.core.operation import Operation, Runnable
 from motorbus.core.verbs import Awaiting, Blocking, verb
+from motorbus.errors import RequestError
+from motorbus.motion import moving, reckoning
 from motorbus.motion.machine import AxisSpec
+from motorbus.motion.reckoning import Reckoning, checked_place, is_reckoned
 
 if TYPE_CHECKING:
     from enum import Enum
@@ -23,28 +26,58 @@ T = TypeVar("T")
 
 Able: TypeAlias = "Mapping[str, Callable[..., Runnable[Any]]]"
 """What a device can do; see `core.family.Family.axis`."""
+FEEDBACK: Final = "feedback"
+ESTIMATED: Final = "estimated"
+"""Which of these is among the capabilities of an axis says whether its position is measured or reckoned."""
 
 
 class ability(verb[P, T]):  # noqa: N801 - reads as a word in a list of verbs
-    """A verb that an axis has only if its device has the capability that it `needs`."""
+    """A verb that an axis has only if its device has one of the capabilities that it `needs`, one or several names."""
 
-    def __init__(self, needs: str, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
+    def __init__(
+        self, needs: str | tuple[str, ...], function: Callable[Concatenate[Any, P], Runnable[T]]
+    ) -> None:
         super().__init__(function)
-        self.needs = needs
+        self.needs = (needs,) if isinstance(needs, str) else needs
+
+    def there(self, axis: AxisVerbs) -> bool:
+        """Whether this axis has it."""
+        return any(one in axis.able for one in self.needs)
 
     if not TYPE_CHECKING:
 
+        def __set_name__(self, owner: type, name: str) -> None:
+            self.name = name
+
         def __get__(self, axis: Any, owner: type) -> Any:
-            if axis is not None and self.needs not in axis.able:
-                raise AttributeError(f"{axis.name} has no {self.needs.replace('_', ' ')}")
+            if axis is not None and not self.there(axis):
+                raise AttributeError(f"{axis.name} has no {self.name}: {axis.spec.device} cannot do that")
             return super().__get__(axis, owner)
+
+
+class _Declare:
+    """Say where it stands (rad, m), having seen it: from then on its position is reckoned from there.
+
+    Nothing is sent. Raises RequestError for what is no finite number, or while it moves. An axis whose device measures
+    its position does not have it.
+    """
+
+    def __get__(self, axis: Any, owner: type) -> Any:
+        if axis is None:
+            return self
+        if axis.reckoning is None:
+            raise AttributeError(f"{axis.name} has no declare: {axis.spec.device} measures where it is")
+        return axis._declare
 
 
 class AxisVerbs:
     """What an axis can do, blocking or async. Positions are in rad (m on a linear axis).
 
-    `name` and `spec` are those of the machine file, `able` is what its device can do. `engaged` becomes true when it
-    is given torque or moved from here: then its exit policy counts.
+    `name` and `spec` are those of the machine file, `able` is what its device can do, `model` what that is. `engaged`
+    is true once it was given torque or moved from here, until it is let go: then its exit policy counts. `under_way` is
+    true from the beginning of a movement until that has come to its end. `reckoning` is there where the device does not
+    tell where it is. `orders` counts what it was told from here, to move, to hold, to stop or to let go: by that
+    whoever leads it sees whether somebody else has told it something since.
     """
 
     def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: Able) -> None:
@@ -52,18 +85,106 @@ class AxisVerbs:
         self.name = name
         self.spec = spec
         self.device = device
-        self.able = able
+        self.model = ""
         self.engaged = False
+        self.under_way = False
+        self.orders = 0
+        self._before = (False, False)
+        self.recognised(able)
+
+    def recognised(self, able: Able, model: str = "") -> None:
+        """It is known now what its device can do, and which model it is."""
+        self.able: Able = able
+        self.model = model or self.model
+        self.reckoning = Reckoning() if is_reckoned(able) else None
+
+    # -- what costs no frame -------------------------------------------------------------------------------------------
+
+    @property
+    def capabilities(self) -> frozenset[str]:
+        """The names of its verbs, and `feedback` where its device measures its position, else `estimated`."""
+        verbs = {
+            name
+            for kind in type(self).__mro__
+            for name, one in vars(kind).items()
+            if isinstance(one, ability) and one.there(self)
+        }
+        tells = (
+            {FEEDBACK} if "position" in self.able else {ESTIMATED} if self.reckoning is not None else set()
+        )
+        return frozenset(verbs | tells)
+
+    @property
+    def estimated(self) -> float | None:
+        """Where it is by dead reckoning (rad, m); None while that is not known, and on every axis that measures."""
+        return None if self.reckoning is None else self.reckoning.position
+
+    def _declare(self, position: float) -> None:
+        if self.under_way:
+            raise RequestError(
+                f"{self.name} is moving", expected="an axis at rest", advice="wait for it, or stop it first"
+            )
+        assert self.reckoning is not None
+        self.reckoning.declare(checked_place(self.name, position))
+
+    if TYPE_CHECKING:
+
+        def declare(self, position: float) -> None:
+            """See `_Declare`."""
+    else:
+        declare = _Declare()
+
+    def __repr__(self) -> str:
+        what = f" {self.model}" if self.model else ""
+        where = f", {self._shown()}" if self.reckoning is not None else ""
+        return f"<{type(self).__name__} {self.name} {self.spec.device}{what}{where}>"
+
+    def _shown(self) -> str:
+        assert self.reckoning is not None
+        at = self.reckoning.position
+        return f"position {self.reckoning}" if at is None else f"estimated at {self.spec.show(at)}"
+
+    # -- what movements tell -------------------------------------------------------------------------------------------
+
+    def departs(self) -> None:
+        """A movement begins from here. Where the position is reckoned it is not known until `arrives`."""
+        self.orders += 1
+        self._before = self.engaged, self.under_way
+        self.engaged = self.under_way = True
+        if self.reckoning is not None:
+            self.reckoning.depart()
+
+    def arrives(self, way: float | None = None) -> None:
+        """The movement came to its end; on a reckoned axis after so much `way` (rad, m, with its sign)."""
+        self.under_way = False
+        if self.reckoning is not None and way is not None:
+            self.reckoning.arrive(way)
+
+    def stays(self) -> None:
+        """The movement was refused before anything was sent: all is as it was."""
+        self.engaged, self.under_way = self._before
+        if self.reckoning is not None:
+            self.reckoning.stay()
+
+    def fails(self, why: str) -> None:
+        """The movement ended otherwise: it may be moving still, and where a reckoned axis is is not known."""
+        if self.reckoning is not None:
+            self.reckoning.forget(why)
+
+
+# -- what it tells -------------------------------------------------------------------------------------------------
 
 
 def state(axis: AxisVerbs) -> Operation[State]:
-    """One sample of everything it tells; position and velocity in rad and rad/s (m, m/s on a linear axis)."""
+    """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C."""
     found: State = yield from axis.able["state"](axis.device)
     spec = axis.spec
     return replace(
         found,
         position=None if found.position is None else spec.from_device(found.position),
         velocity=None if found.velocity is None else spec.rate_from_device(found.velocity),
+        load=None if found.load is None else found.load * spec.sign,
+        current=None if found.current is None else found.current * spec.sign,
     )
 
 
@@ -72,29 +193,99 @@ def position(axis: AxisVerbs) -> Operation[float]:
     return axis.spec.from_device((yield from axis.able["position"](axis.device)))
 
 
+def velocity(axis: AxisVerbs) -> Operation[float]:
+    """How fast it moves, as its device tells (rad/s, m/s)."""
+    return axis.spec.rate_from_device((yield from axis.able["velocity"](axis.device)))
+
+
+def load(axis: AxisVerbs) -> Operation[float]:
+    """What it pushes with: a fraction of the most that its device can, in the direction of the axis."""
+    found: float = yield from axis.able["load"](axis.device)
+    return found * axis.spec.sign
+
+
+def current(axis: AxisVerbs) -> Operation[float]:
+    """The current of its motor (A), in the direction of the axis where the device gives it a sign."""
+    found: float = yield from axis.able["current"](axis.device)
+    return found * axis.spec.sign
+
+
+def voltage(axis: AxisVerbs) -> Operation[float]:
+    """The supply of its device (V)."""
+    found: float = yield from axis.able["voltage"](axis.device)
+    return found
+
+
+def temperature(axis: AxisVerbs) -> Operation[float]:
+    """The temperature of its device (°C)."""
+    found: float = yield from axis.able["temperature"](axis.device)
+    return found
+
+
+# -- torque and rest -----------------------------------------------------------------------------------------------
+
+
 def enable_torque(axis: AxisVerbs) -> Operation[None]:
-    """Torque on without a jump, with the cap of the machine file."""
+    """Torque on without a jump; the cap of the machine file, where there is one, is set before.
+
+    Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits.
+    """
+    axis.orders += 1
+    yield from cap(axis)
     axis.engaged = True
     yield from axis.able["enable_torque"](axis.device)
 
 
+def cap(axis: AxisVerbs) -> Operation[None]:
+    """Bound what its device pushes with, as the machine file says; nothing is sent where it says nothing."""
+    spec = axis.spec
+    if spec.torque is not None:
+        yield from axis.able["cap_torque"](axis.device, spec.torque)
+    if spec.current is not None:
+        yield from axis.able["cap_current"](axis.device, spec.current)
+
+
 def disable_torque(axis: AxisVerbs) -> Operation[None]:
-    """Limp."""
+    """Limp, whatever alarms there are. Raises as the device's own verb when nobody knows whether it is."""
+    axis.orders += 1
     yield from axis.able["disable_torque"](axis.device)
+    axis.engaged = axis.under_way = False
 
 
 def stop(axis: AxisVerbs) -> Operation[Enum]:
-    """Decelerate and stay; gives what the device promises."""
+    """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
+    axis.orders += 1
     promise: Enum = yield from axis.able["stop"](axis.device)
+    axis.under_way = False
     return promise
+
+
+def hold(axis: AxisVerbs) -> Operation[None]:
+    """Stay here, with torque: torque on without a jump where there is a switch for it, else a stop."""
+    if "enable_torque" in axis.able:
+        yield from enable_torque(axis)
+    else:
+        yield from stop(axis)
+    axis.under_way = False
 
 
 class _Verbs(AxisVerbs):
     state = ability("state", state)
     position = ability("position", position)
+    velocity = ability("velocity", velocity)
+    load = ability("load", load)
+    current = ability("current", current)
+    voltage = ability("voltage", voltage)
+    temperature = ability("temperature", temperature)
     enable_torque = ability("enable_torque", enable_torque)
     disable_torque = ability("disable_torque", disable_torque)
     stop = ability("stop", stop)
+    hold = ability(("enable_torque", "stop"), hold)
+    move = ability(("train", "keep_time"), moving.move_axis)
+    move_by = ability(("train", "move_by"), moving.move_by)
+    jog = ability(("train", "jog"), moving.jog)
+    home = ability("home", reckoning.home)
+    run = ability("run", reckoning.run)
 
 
 class Axis(_Verbs, Blocking):

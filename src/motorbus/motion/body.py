@@ -44,6 +44,17 @@ class Body:
                 )
         return {name: self.axes[name] for name in found}
 
+    def axis(self, name: str) -> Any:
+        """The axis of this name. Raises RequestError when the machine has none, or it was not opened."""
+        if name in self.axes:
+            return self.axes[name]
+        found = self.chosen(name)
+        raise RequestError(
+            f"{name!r} is not an axis: it stands for {', '.join(found)}",
+            expected="the name of one axis",
+            advice="take one of them, or give the name to a verb of the robot; nothing was sent",
+        )
+
     def by_bus(self, axes: Mapping[str, AxisVerbs]) -> dict[str, list[AxisVerbs]]:
         """These axes by the name of their bus, in the order of the buses."""
         found: dict[str, list[AxisVerbs]] = {name: [] for name in self.buses}

@@ -1,14 +1,16 @@
-"""Who carries out work on several buses at once: from one thread, or on an event loop."""
+"""Who carries out work on several buses at once: from one thread, or on an event loop.
+
+Work on one bus goes straight to it, for a control loop does so thousands of times a second.
+"""
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.concert import Concert, LoopConcert
 from motorbus.bus.pump import Bus
-from motorbus.core.operation import Runnable
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
 
@@ -16,21 +18,27 @@ T = TypeVar("T")
 
 
 class Conductor:
-    """Blocking."""
+    """Blocking. `origins` are what the clock of each bus showed when the robot's was at 0 (s)."""
 
     def __init__(self, buses: Mapping[str, Bus], origins: Mapping[str, float]) -> None:
         self._buses = buses
-        self._origins = origins
+        self._concert = Concert(buses, origins)
 
     def run(self, work: Abreast[T]) -> T:
-        """Carry out everything, then combine."""
-        return work.combine({name: self._one(name, wanted) for name, wanted in work.operations.items()})
+        """Carry out everything, then combine.
 
-    def _one(self, name: str, wanted: Runnable[Any]) -> Any:
+        Raises what `combine` raises. Whatever is no MotorbusError, KeyboardInterrupt included, interrupts the work on
+        every bus and is raised when all of it has cleaned up.
+        """
+        operations = work.operations
+        if len(operations) != 1:
+            return work.combine(self._concert.run(operations))
+        ((name, wanted),) = operations.items()
         try:
-            return self._buses[name].run(wanted)
+            told = self._buses[name].run(wanted)
         except MotorbusError as error:
-            return error
+            told = error
+        return work.combine({name: told})
 
 
 class LoopConductor:
@@ -38,15 +46,16 @@ class LoopConductor:
 
     def __init__(self, buses: Mapping[str, AsyncBus], origins: Mapping[str, float]) -> None:
         self._buses = buses
-        self._origins = origins
+        self._concert = LoopConcert(buses, origins)
 
     async def run(self, work: Abreast[T]) -> T:
-        """Carry out everything, then combine."""
-        told = await asyncio.gather(*(self._one(name, wanted) for name, wanted in work.operations.items()))
-        return work.combine(dict(zip(work.operations, told, strict=True)))
-
-    async def _one(self, name: str, wanted: Runnable[Any]) -> Any:
+        """As `Conductor.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
+        operations = work.operations
+        if len(operations) != 1:
+            return work.combine(await self._concert.run(operations))
+        ((name, wanted),) = operations.items()
         try:
-            return await self._buses[name].run(wanted)
+            told = await self._buses[name].run(wanted)
         except MotorbusError as error:
-            return error
+            told = error
+        return work.combine({name: told})

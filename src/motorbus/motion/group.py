@@ -1,32 +1,113 @@
-"""What several axes of a machine do together: each is a function of a `Body` that gives the work on each bus."""
+"""What several axes of a machine do together: each is a function of a `Body` that gives the work on each bus.
+
+The buses work at the same time. Every axis is visited whatever happens to some; what went wrong is raised at the end,
+and names all whom it befell.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
+from functools import partial
+from typing import Any, TypeAlias
 
 from motorbus.core.family import State
-from motorbus.core.operation import Operation, Together
+from motorbus.core.operation import Operation
+from motorbus.errors import RequestError
 from motorbus.motion import axis as one
-from motorbus.motion.abreast import Abreast, settled
+from motorbus.motion import reckoning
+from motorbus.motion.abreast import Abreast
 from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
+from motorbus.motion.several import Act, Told, everyone, insisted, of_each, raised
+
+Names: TypeAlias = "str | Iterable[str] | None"
+"""Names of axes, groups and buses; None: all axes that are open."""
 
 
-def states(body: Body, names: str | Iterable[str] | None = None) -> Abreast[dict[str, State]]:
-    """One sample of each that tells one, by name."""
+def positions(body: Body, names: Names = None) -> Abreast[dict[str, float | None]]:
+    """Where each is (rad, m), by name, as its device measures it or, where it does not, *estimated*: see `estimated`.
+
+    None where nobody knows: a reckoned axis that was not homed. Raises what one of them raised, when all were asked.
+    """
+    axes = body.chosen(names)
+    measured = {name: axis for name, axis in axes.items() if "position" in axis.able}
+
+    def told(found: dict[str, Any]) -> dict[str, float | None]:
+        return {name: found.get(name, axis.estimated) for name, axis in axes.items()}
+
+    return _each(body, measured, one.position, told)
+
+
+def states(body: Body, names: Names = None) -> Abreast[dict[str, State]]:
+    """One sample of each that tells one, by name. Raises what one of them raised, when all were asked."""
     axes = {name: axis for name, axis in body.chosen(names).items() if "state" in axis.able}
+    return _each(body, axes, one.state, dict)
 
-    def of(there: list[AxisVerbs]) -> Operation[list[State]]:
-        return (yield from Together([one.state(axis) for axis in there]))
 
+def enable_torque(body: Body, names: Names = None) -> Abreast[None]:
+    """Torque on, without a jump, for each that has a switch for it, with the caps of the machine file.
+
+    Raises RequestError when none of them has one, else what one of them raised, when all were visited.
+    """
+    return _each(body, _able(body, names, "enable_torque"), one.enable_torque, _nothing)
+
+
+def disable_torque(body: Body, names: Names = None) -> Abreast[None]:
+    """Limp: each that has a switch for its torque, whatever happens. Raises as `enable_torque`."""
+    return _each(body, _able(body, names, "disable_torque"), one.disable_torque, _nothing, insisted)
+
+
+def stop(body: Body, names: Names = None) -> Abreast[dict[str, Enum]]:
+    """Decelerate and stay, each of them, whatever happens; gives what each device promises, by name.
+
+    An interruption, and what one of them raised, is raised when all were visited.
+    """
+    return _each(body, body.chosen(names), one.stop, dict, insisted)
+
+
+def hold(body: Body, names: Names = None) -> Abreast[None]:
+    """Stay, with torque: torque on without a jump where there is a switch for it, else a stop. Raises as `stop`."""
+    return _each(body, body.chosen(names), one.hold, _nothing)
+
+
+def home(body: Body, names: Names = None, *, deadline: float | None = None) -> Abreast[dict[str, float]]:
+    """Send each that has a switch to go to there, at most for so long (s); gives where each is then (rad, m).
+
+    Raises RequestError when none of them has one, else what one of them raised, when all have ended.
+    """
+    return _each(body, _able(body, names, "home"), partial(reckoning.home, deadline=deadline), dict)
+
+
+def _each(
+    body: Body,
+    axes: Mapping[str, AxisVerbs],
+    act: Act[Any],
+    combined: Callable[[dict[str, Any]], Any],
+    how: Callable[[list[AxisVerbs], Act[Any]], Operation[Told]] = everyone,
+) -> Abreast[Any]:
+    """Do it to each of these, and make of what came of them what is wanted; in the order of the names."""
     parts = body.by_bus(axes)
 
-    def combine(results: Mapping[str, Any]) -> dict[str, State]:
-        told = settled(results)
-        found = {
-            axis.name: s for bus, there in parts.items() for axis, s in zip(there, told[bus], strict=True)
-        }
-        return {name: found[name] for name in axes}
+    def combine(results: Mapping[str, Any]) -> Any:
+        told = of_each(parts, results)
+        return combined(raised({name: told[name] for name in axes}))
 
-    return Abreast({bus: of(there) for bus, there in parts.items()}, combine)
+    return Abreast({bus: how(there, act) for bus, there in parts.items()}, combine)
+
+
+def _able(body: Body, names: Names, needs: str) -> dict[str, AxisVerbs]:
+    """Those of these axes that can. Raises RequestError when none of them can."""
+    axes = body.chosen(names)
+    found = {name: axis for name, axis in axes.items() if needs in axis.able}
+    if not found:
+        raise RequestError(
+            f"none of {', '.join(axes)} has {needs.replace('_', ' ')}",
+            expected="an axis whose device can do that",
+            advice="`capabilities` of an axis tells what it has; nothing was sent",
+        )
+    return found
+
+
+def _nothing(_: object) -> None:
+    return None

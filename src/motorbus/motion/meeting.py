@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Operation, Pause, Runnable
 from motorbus.errors import Interrupted, MotorbusError
 
 T = TypeVar("T")
@@ -29,23 +29,31 @@ class Meeting(Generic[T]):
         self._failed: MotorbusError | None = None
 
     def meet(self, name: str, says: T) -> Operation[Mapping[str, T]]:
-        """Say it, and wait until all have. Raises Interrupted when somebody will not come."""
+        """Say it, and wait until all have. Raises Interrupted when somebody will not come.
+
+        Raises ValueError for somebody who was not asked: whoever waits for all would wait for ever.
+        """
+        if name not in self.parties:
+            raise ValueError(f"{name!r} has no part in this; those who have are {sorted(self.parties)}")
         self._said[name] = says
         while self._said.keys() != self.parties:
             if self._failed is not None:
-                raise _called_off(name, self._failed)
+                raise _called_off(name, self._failed) from self._failed
             yield from Pause(LOOK)
         return self._said
 
     def fail(self, error: MotorbusError) -> None:
-        """Somebody will not come, and this is why. Who has met already goes on."""
+        """Somebody will not come, and this is why: whoever waits is told, and whoever comes later.
+
+        Once all have come nothing is changed by this: they go on, every one of them.
+        """
         self._failed = self._failed or error
 
 
 def _called_off(name: str, error: MotorbusError) -> Interrupted:
     return Interrupted(
         f"{name} does not move: another part of the movement cannot begin",
-        cause=str(error),
+        cause=error.summary,
         advice="see to that; a movement of several begins with all of them or not at all",
     )
 
@@ -65,6 +73,17 @@ class Beat:
     def of(self, party: str, origin: float) -> Seat:
         """Its part in it: a `core.family.Timing`."""
         return Seat(self, party, origin)
+
+    def attend(self, party: str, runnable: Runnable[T]) -> Operation[T]:
+        """Carry out the part of this party. When it ends before all have come, the others are told, and why."""
+        left: MotorbusError = Interrupted(f"{party} ended before the start")
+        try:
+            return (yield from runnable)
+        except MotorbusError as error:
+            left = error
+            raise
+        finally:
+            self.fail(left)
 
     def fail(self, error: MotorbusError) -> None:
         """Somebody cannot take part; all who wait, or come to wait, are told."""

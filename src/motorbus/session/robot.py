@@ -1,92 +1,260 @@
 """A machine by its file: its buses are opened, its devices asked what they are, and its axes are there to be moved.
 
     with Robot.load("motorbus.toml") as robot:
-        robot.states()
-        robot["shoulder"].position()
+        robot.positions()
+        robot["shoulder"].enable_torque()
 
-Loading reads and writes nothing to any device.
+    async with AsyncRobot.load("motorbus.toml") as robot:
+        await robot.positions()
+
+Loading reads, and writes nothing to any device. When it is closed, however that comes, each axis that was moved from
+here does what the file says: `hold`, `torque_off`, `park` or `leave`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AsyncExitStack, ExitStack
 from os import PathLike
-from typing import Any, Self
+from types import TracebackType
+from typing import Self
 
+from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
-from motorbus.errors import RequestError
-from motorbus.motion import group
-from motorbus.motion.abreast import Led, together
-from motorbus.motion.axis import Axis
+from motorbus.bus.stop import StopOutcome
+from motorbus.errors import MotorbusError
+from motorbus.motion import group, moving
+from motorbus.motion.abreast import Led, LedAsync, together
+from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
-from motorbus.motion.conductor import Conductor
-from motorbus.motion.machine import Machine
+from motorbus.motion.budget import budget
+from motorbus.motion.conductor import Conductor, LoopConductor
+from motorbus.motion.follow import follow
+from motorbus.motion.leaving import Leaving
+from motorbus.motion.loop import awaiting_loop, blocking_loop, looped
+from motorbus.motion.machine import NAME, Machine
+from motorbus.motion.recognition import recognise
+from motorbus.motion.teach import teach
+from motorbus.session.plan import Plan, loaded
+from motorbus.session.stopping import estop, reset
+
+Notify = Callable[[object], None]
+Names = str | Iterable[str] | None
 
 
 class RobotVerbs(Body):
-    """What a robot can do, blocking or async."""
+    """What a robot can do, blocking or async. `names` are names of axes, groups and buses; None means every axis."""
 
+    positions = together(group.positions)
     states = together(group.states)
+    enable_torque = together(group.enable_torque)
+    disable_torque = together(group.disable_torque)
+    stop = together(group.stop)
+    hold = together(group.hold)
+    home = together(group.home)
+    move = together(moving.move)
+    pose = together(moving.pose)
+    park = together(moving.park)
+    replay = together(moving.replay)
+    follow = looped(follow)
+    teach = looped(teach)
+    budget = together(budget)
+
+    _said: tuple[str, ...] = ()
+
+    @property
+    def simulated(self) -> bool:
+        """Whether there is no real device behind one of its buses."""
+        return any(bus.simulated for bus in self.buses.values())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user ought to know of its buses, as a guarded change that was cut off, and of how it was left."""
+        buses = (f"{name}: {text}" for name, bus in self.buses.items() for text in bus.warnings)
+        return (*buses, *self._said)
+
+    def estop(self) -> dict[str, StopOutcome]:
+        """Emergency stop on every bus at the same time; see `motorbus.bus.face.BusFace.estop`. From any thread.
+
+        Never waits for a movement, and tells for each bus, by its name, what it achieved: a bus that is gone
+        acknowledges nothing. Motion and torque are refused afterwards until `reset`. A plain call on both kinds.
+        """
+        return estop(self)
+
+    def reset(self) -> None:
+        """Take the latch of an emergency stop off every bus. Nothing is sent and nothing moves. A plain call too."""
+        reset(self)
+
+    def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
+        """Say what leaving did not achieve: as an error, or as a note of what is being raised already."""
+        self._said = tuple(leaving.said)
+        error = leaving.error
+        if others is not None:
+            for text in (*leaving.said, *([f"leaving failed: {error}"] if error is not None else [])):
+                others.add_note(text)
+        elif error is not None:
+            for text in leaving.said:
+                error.add_note(text)
+            raise error
 
 
 class Robot(RobotVerbs, Led):
     """An open machine, blocking; use it in a `with`. Made by `load` or `of`."""
 
+    loop = blocking_loop
+
     def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
         super().__init__(machine, buses, axes)
         self.conductor = Conductor(buses, self.origins)
         self._exits = ExitStack()
+        self._closed = False
 
     @classmethod
-    def load(cls, path: str | PathLike[str], axes: str | Iterable[str] | None = None) -> Self:
-        """Open the machine that a file describes, or only what these axes, groups and buses of it need."""
-        from motorbus.session import prepare
+    def load(
+        cls, path: str | PathLike[str] = NAME, axes: Names = None, *, report: Notify | None = None
+    ) -> Self:
+        """Open the machine that a file describes, or only what these axes, groups and buses of it need.
 
-        return cls.of(Machine.load(path, check_address=lambda address: prepare(address, {})), axes)
+        `report` gets progress and early results of every bus. Raises RequestError for the file, as `Machine.load`, also
+        for an address that cannot be: before anything is opened; else as `of`.
+        """
+        return cls.of(loaded(path), axes, report=report)
 
     @classmethod
-    def of(cls, machine: Machine, axes: str | Iterable[str] | None = None) -> Self:
-        """Open a machine, or only what these axes, groups and buses of it need."""
-        from motorbus.session import open
+    def of(cls, machine: Machine, axes: Names = None, *, report: Notify | None = None) -> Self:
+        """Open a machine, or only what these axes, groups and buses of it need, and ask each device what it is.
 
-        wanted = machine.axes if axes is None else _chosen(machine, axes)
-        needed = dict.fromkeys(machine.axes[name].bus for name in wanted)
+        Raises PortNotFound, PortBusy or LinkError for a bus, naming it; NoReply, naming axis, device and address, for a
+        device that is silent; RequestError for one that cannot do what the file asks of it. Whatever was opened is
+        closed then. Only reads are sent.
+        """
+        plan = Plan.of(machine, axes)
         with ExitStack() as stack:
-            buses = {name: stack.enter_context(open(machine.buses[name].address)) for name in needed}
-            robot = cls(machine, buses, {name: _axis(machine, name, buses) for name in wanted})
+            buses = {name: stack.enter_context(plan.open(name, report)) for name in plan.buses}
+            robot = cls(machine, buses, plan.blocking(buses))
+            robot.conductor.run(recognise(robot))
             robot._exits = stack.pop_all()
         return robot
 
     def __getitem__(self, name: str) -> Axis:
-        axis: Axis = self.chosen(name)[name]
+        """The axis of this name. Raises RequestError for none, or one that was not opened."""
+        axis: Axis = self.axis(name)
         return axis
 
     def close(self) -> None:
-        """Give the ports back."""
-        self._exits.close()
+        """Leave the machine as its file says, and give the ports back. Calling it again does nothing.
+
+        Raises what leaving raised, when every axis was visited and every port is closed.
+        """
+        self._end(None)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *exc: object) -> None:
-        self.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._end(error)
+
+    def _end(self, others: BaseException | None) -> None:
+        if self._closed:
+            return
+        self._closed = True
+        with self._exits:
+            leaving = Leaving(self)
+            interruption = self._leave(leaving)
+            self._ended(leaving, others or interruption)
+            if interruption is not None:
+                raise interruption
+
+    def _leave(self, leaving: Leaving) -> BaseException | None:
+        """Carry out all of it; the first interruption that came meanwhile."""
+        first: BaseException | None = None
+        while True:
+            try:
+                work = leaving.work()
+                if work is None:
+                    return first
+                self.conductor.run(work)
+            except MotorbusError as error:
+                leaving.failed(error)
+            except BaseException as interruption:  # a second Ctrl-C: less waiting, and nobody is left out
+                first = first or interruption
+                leaving.hurry()
 
 
-def _chosen(machine: Machine, names: str | Iterable[str]) -> list[str]:
-    wanted = (names,) if isinstance(names, str) else tuple(names)
-    return list(dict.fromkeys(axis for name in wanted for axis in machine.axes_of(name)))
+class AsyncRobot(RobotVerbs, LedAsync):
+    """An open machine on the running event loop; use it in an `async with`. Made by `load` or `of`."""
 
+    loop = awaiting_loop
 
-def _axis(machine: Machine, name: str, buses: Mapping[str, Bus]) -> Axis:
-    spec = machine.axes[name]
-    bus = buses[spec.bus]
-    device: Any = bus.family.devices.blocking(bus, spec.node)
-    model = device.identify().model
-    able = bus.family.axis(model)
-    if not able:
-        raise RequestError(
-            f"{name}: {spec.device} is {model}, of which nobody has said what it can do",
-            advice="nothing was sent that changes anything",
-        )
-    return Axis(bus, name, spec, device, able)
+    def __init__(self, plan: Plan, report: Notify | None = None) -> None:
+        super().__init__(plan.machine, {}, {})
+        self._plan = plan
+        self._report = report
+        self._exits = AsyncExitStack()
+        self._closed = True
+
+    @classmethod
+    def load(
+        cls, path: str | PathLike[str] = NAME, axes: Names = None, *, report: Notify | None = None
+    ) -> Self:
+        """The machine that a file describes; it is opened when its `async with` is entered. Else as `Robot.load`."""
+        return cls.of(loaded(path), axes, report=report)
+
+    @classmethod
+    def of(cls, machine: Machine, axes: Names = None, *, report: Notify | None = None) -> Self:
+        """A machine; it is opened when its `async with` is entered, which raises what `Robot.of` raises."""
+        return cls(Plan.of(machine, axes), report)
+
+    async def __aenter__(self) -> Self:
+        async with AsyncExitStack() as stack:
+            buses: dict[str, AsyncBus] = {}
+            for name in self._plan.buses:
+                buses[name] = await stack.enter_async_context(self._plan.open_async(name, self._report))
+            Body.__init__(self, self._plan.machine, buses, self._plan.awaiting(buses))
+            self.conductor = LoopConductor(buses, self.origins)
+            await self.conductor.run(recognise(self))
+            self._exits = stack.pop_all()
+        self._closed = False
+        return self
+
+    def __getitem__(self, name: str) -> AsyncAxis:
+        """The axis of this name. Raises RequestError for none, or one that was not opened."""
+        axis: AsyncAxis = self.axis(name)
+        return axis
+
+    async def close(self) -> None:
+        """Leave the machine as its file says, and give the ports back; see `Robot.close`."""
+        await self._end(None)
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._end(error)
+
+    async def _end(self, others: BaseException | None) -> None:
+        if self._closed:
+            return
+        self._closed = True
+        async with self._exits:
+            leaving = Leaving(self)
+            interruption = await self._leave(leaving)
+            self._ended(leaving, others or interruption)
+            if interruption is not None:
+                raise interruption
+
+    async def _leave(self, leaving: Leaving) -> BaseException | None:
+        """Carry out all of it; the first cancellation that came meanwhile."""
+        first: BaseException | None = None
+        while True:
+            try:
+                work = leaving.work()
+                if work is None:
+                    return first
+                await self.conductor.run(work)
+            except MotorbusError as error:
+                leaving.failed(error)
+            except BaseException as interruption:  # cancelled once more: less waiting, and nobody is left out
+                first = first or interruption
+                leaving.hurry()

@@ -7,7 +7,7 @@ from math import tau
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.feetech.driver.pace import burst, ramp_of
+from motorbus.families.feetech.driver.pace import NO_LOAD, burst, ramp_of, speed_at_least
 from motorbus.families.feetech.table import HLS, SCS, STS
 from tests.families.feetech.maps import met
 
@@ -32,3 +32,17 @@ def test_before_the_goal_comes_the_acceleration_where_there_is_one() -> None:
     assert ramp_of(met("scs"), SCS, None) == b""
     with pytest.raises(RequestError, match="no acceleration register"):
         ramp_of(met("scs"), SCS, 1.0)
+
+
+def test_who_follows_goals_is_bound_by_no_less_than_he_was_told() -> None:
+    assert speed_at_least(met("sts"), STS, 1000 * COUNT) == 1000
+    assert speed_at_least(met("sts"), STS, 1000.2 * COUNT) == 1001
+    assert speed_at_least(met("hls"), HLS, 1001 * COUNT) == 21
+    assert speed_at_least(met("hls"), HLS, 1e-9) == 1
+
+
+def test_who_follows_goals_and_was_told_no_speed_has_the_maximum_as_his_map_says_it() -> None:
+    assert speed_at_least(met("sts", at_18=12), STS, None) == 0
+    assert speed_at_least(met("sts", at_18=4), STS, None) == NO_LOAD
+    assert speed_at_least(met("hls"), HLS, None) == NO_LOAD // 50
+    assert speed_at_least(met("sts", at_18=4), STS, 1e9) == NO_LOAD

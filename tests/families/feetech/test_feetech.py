@@ -76,7 +76,8 @@ def test_what_explains_a_frame_is_the_family_s() -> None:
 @pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()} | {"sts3215", "scs0009"}))
 def test_every_known_model_is_an_axis(model: str) -> None:
     axis = FAMILY.axis(model)
-    assert {"position", "move", "stop", "state", "enable_torque", "disable_torque"} <= set(axis)
+    everyone = {"position", "move", "stop", "state", "enable_torque", "disable_torque", "limits", "train"}
+    assert everyone <= set(axis)
     assert all(map(callable, axis.values()))
 
 
@@ -84,6 +85,32 @@ def test_a_model_whose_map_tells_no_current_lacks_that() -> None:
     assert "current" in FAMILY.axis("STS3215")
     assert "current" in FAMILY.axis("SCS15-2")
     assert "current" not in FAMILY.axis("SCS0009")
+
+
+@pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()}))
+def test_caps_are_there_where_every_map_that_the_model_can_have_has_a_register_in_ram(model: str) -> None:
+    maps = {name for known in MODELS.values() if known.name == model for name in known.maps}
+    axis = FAMILY.axis(model)
+    assert ("cap_torque" in axis) == (maps <= {"sts", "smbl", "hls"})
+    assert ("cap_current" in axis) == (maps == {"hls"})
+
+
+@pytest.mark.parametrize(
+    ("model", "caps"),
+    [
+        ("STS3215", {"cap_torque"}),
+        ("HLS3606", {"cap_torque", "cap_current"}),
+        ("SM85BLHV", {"cap_torque"}),
+        (
+            "SM100-360M",
+            set(),
+        ),  # of one major it has either of two maps, and in one of them EEPROM alone bounds it
+        ("SCS0009", set()),
+        ("SCS15-2", set()),
+    ],
+)
+def test_caps_of_a_model_of_each_map(model: str, caps: set[str]) -> None:
+    assert {name for name in FAMILY.axis(model) if name.startswith("cap_")} == caps
 
 
 @pytest.mark.parametrize("model", ["unknown model 9.99", "STS9999", ""])

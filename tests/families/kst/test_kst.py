@@ -60,7 +60,8 @@ def test_capabilities_are_those_of_the_profile(profile: str) -> None:
         model = there.servo().identify().model
     axis = FAMILY.axis(model)
     assert axis.keys() == FAMILY.axis(profile).keys()
-    assert {"state", "position", "move", "stop"} <= axis.keys()
+    assert {"state", "position", "move", "stop", "limits", "train"} <= axis.keys()
+    assert {"cap_torque", "cap_current"}.isdisjoint(axis), "they have nothing to bound it with"
     assert ("current" in axis) is ("temperature" in axis) is (profile != "kst")
     assert "enable_torque" not in axis
     assert FAMILY.axis("") == {}

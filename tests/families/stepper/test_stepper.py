@@ -38,7 +38,7 @@ def test_each_bus_has_a_memory_of_its_own() -> None:
 
 def test_it_is_an_axis_that_moves_by_and_has_no_position() -> None:
     axis = FAMILY.axis("stepper controller")
-    assert set(axis) == {"move_by", "jog", "home", "stop"}
+    assert set(axis) == {"move_by", "jog", "home", "keep_time", "run", "stop"}
     assert FAMILY.axis("") == {}
 
 

@@ -49,7 +49,7 @@ from motorbus.families.feetech.driver import (
     sync_write,
     sync_write_positions,
 )
-from motorbus.families.feetech.table import BAUD_CODES, MODELS, TABLES
+from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
 
 __all__ = [
     "FAMILY",
@@ -90,7 +90,17 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "disable_torque": driver.disable_torque,
     "move": driver.move,
     "stop": driver.stop,
+    "limits": driver.limits,
+    "cap_torque": driver.cap_torque,
+    "cap_current": driver.cap_current,
+    "train": driver.train,
 }
+_ONLY_WHERE: Final[Mapping[str, Callable[[str], object]]] = {
+    "current": lambda register_map: TABLES[register_map]["present_current"].unit,
+    "cap_torque": lambda register_map: CONTROL[register_map].limit,
+    "cap_current": lambda register_map: CONTROL[register_map].current,
+}
+"""What only servos of some maps can, and which maps these are."""
 
 
 class Feetech:
@@ -153,9 +163,9 @@ class Feetech:
         return scan(ids, rates, polls=driver.GLANCE)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        maps = next((known.maps for known in MODELS.values() if known.name == model.upper()), ())
-        tells = all(TABLES[name]["present_current"].unit for name in maps)
-        return {name: one for name, one in _AXIS.items() if tells or name != "current"} if maps else {}
+        maps = {name for known in MODELS.values() if known.name == model.upper() for name in known.maps}
+        lacks = {name for name, does in _ONLY_WHERE.items() if not all(map(does, maps))}
+        return {name: one for name, one in _AXIS.items() if name not in lacks} if maps else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.feetech.simulator import simulate

@@ -85,6 +85,8 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "position": driver.position,
     "move": driver.move,
     "stop": driver.stop,
+    "limits": driver.limits,
+    "train": driver.train,
 }
 _FELT: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "current": driver.current,

@@ -116,6 +116,8 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "move_by": driver.move_by,
     "jog": driver.jog,
     "home": driver.home,
+    "keep_time": driver.keep_time,
+    "run": driver.run,
     "stop": driver.stop,
 }
 """No position and no move to one: there is none to ask for."""

@@ -41,6 +41,9 @@ class Follower(Protocol):
         Raises RequestError, and stays as it is, for a goal that is not finite and for time that runs backwards.
         """
 
+    def halt(self) -> None:
+        """Brake from now on as hard as is allowed: the goal becomes where that ends, on the way it is on."""
+
     def reset(self, position: float) -> None:
         """Be at rest at another position: after a stop, or when it was moved by hand. Raises RequestError."""
 
@@ -94,6 +97,12 @@ class TrapezoidFollower:
             self._since = 0.0
         self._since += elapsed
         return self.position
+
+    def halt(self) -> None:
+        """Brake from now on; see `Follower`."""
+        position, velocity = self.position, self.velocity
+        end = position + velocity * abs(velocity) / (2 * self._limits.braking)
+        self._way, self._since = self._towards(position, end, velocity), 0.0
 
     def reset(self, position: float) -> None:
         """Be at rest at another position."""

@@ -76,6 +76,16 @@ class JerkFollower:
         self._state = self._now()
         return self.position
 
+    def halt(self) -> None:
+        """Brake from now on, within the jerk too; see `Follower`."""
+        self._given.control_interface = self._ruckig.ControlInterface.Velocity
+        self._given.target_velocity = [0.0]
+        try:
+            self._way = self._towards(self._goal)
+        finally:
+            self._given.control_interface = self._ruckig.ControlInterface.Position
+        self._since, self._goal = 0.0, self._way.at_time(self._way.duration)[0][0]
+
     def reset(self, position: float) -> None:
         """Be at rest at another position."""
         if not isfinite(position):

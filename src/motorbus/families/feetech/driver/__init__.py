@@ -6,10 +6,12 @@ an `Exchange`, or an operation that yields exchanges; a bus carries it out.
 
 from __future__ import annotations
 
+from motorbus.core.family import Positions
 from motorbus.families.feetech.driver.alarm import alarms
 from motorbus.families.feetech.driver.blocked import blockers
 from motorbus.families.feetech.driver.bound import Powerless
 from motorbus.families.feetech.driver.calibration import Calibration, Zero, calibrate, zero
+from motorbus.families.feetech.driver.capping import cap_current, cap_torque
 from motorbus.families.feetech.driver.copying import copyable
 from motorbus.families.feetech.driver.counting import ManyTurns, Recounted, many_turns, set_many_turns
 from motorbus.families.feetech.driver.drive import set_current, set_duty, set_velocity, step
@@ -25,7 +27,6 @@ from motorbus.families.feetech.driver.feedback import (
 from motorbus.families.feetech.driver.group import GroupResult, prepare_all, sync_read, sync_write
 from motorbus.families.feetech.driver.identity import identify, ping, prepare
 from motorbus.families.feetech.driver.loop import (
-    Positions,
     position_reads,
     read_positions,
     sync_read_positions,
@@ -45,6 +46,7 @@ from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
+from motorbus.families.feetech.driver.train import Train, limits, train
 from motorbus.families.feetech.driver.tuning import (
     Gains,
     Protection,
@@ -78,12 +80,15 @@ __all__ = [
     "Skipped",
     "Suspicion",
     "TorqueLimit",
+    "Train",
     "Zero",
     "action",
     "action_all",
     "alarms",
     "blockers",
     "calibrate",
+    "cap_current",
+    "cap_torque",
     "clear_turns",
     "copyable",
     "current",
@@ -94,6 +99,7 @@ __all__ = [
     "factory_restore",
     "gains",
     "identify",
+    "limits",
     "load",
     "many_turns",
     "mode",
@@ -132,6 +138,7 @@ __all__ = [
     "telemetry",
     "temperature",
     "torque_limit",
+    "train",
     "velocity",
     "voltage",
     "write",

@@ -7,6 +7,7 @@ Source: STS3215 memory table V3.6; HLS memory table; FEETECH notes on special by
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Final
 
 from motorbus.core.entry import Entry, Table
@@ -16,6 +17,8 @@ from motorbus.families.feetech.driver.node import Node
 
 NO_LOAD: Final = 3400
 """Counts/s that no servo exceeds much: of an STS3215 without load. Source: STS3215 memory table V3.6."""
+ROUNDING: Final = 1e-6
+"""Units of a velocity that are noise of binary arithmetic."""
 
 
 def burst(node: Node, table: Table, velocity: float | None, current: float | None) -> bytes:
@@ -46,6 +49,15 @@ def ramp_of(node: Node, table: Table, acceleration: float | None) -> bytes:
         advice="leave acceleration out; nothing was sent",
         node=node.node,
     )
+
+
+def speed_at_least(node: Node, table: Table, velocity: float | None) -> int:
+    """Raw goal velocity for one who follows goals and must not lag: rounded up; None and beyond: the maximum."""
+    row = table["goal_velocity"]
+    unit = float(node.value(row, 1))
+    if velocity is None or velocity > unit * row.high:
+        return _speed(node, table, None)
+    return max(1, ceil(velocity / unit - ROUNDING))
 
 
 def _speed(node: Node, table: Table, velocity: float | None) -> int:

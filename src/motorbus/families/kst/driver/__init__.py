@@ -55,13 +55,14 @@ from motorbus.families.kst.driver.identity import (
 )
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.listening import Heard
-from motorbus.families.kst.driver.motion import Promise, Started, move, stop
+from motorbus.families.kst.driver.motion import Promise, Started, limits, move, stop
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned, provision
 from motorbus.families.kst.driver.rates import BitRates, scan_bit_rates
 from motorbus.families.kst.driver.registers import read, read_raw, write
 from motorbus.families.kst.driver.scanning import Skipped, Suspicion, scan
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, ServoVerbs
+from motorbus.families.kst.driver.train import Train, train
 
 __all__ = [
     "ID_FORMATS",
@@ -86,6 +87,7 @@ __all__ = [
     "Started",
     "Status",
     "Suspicion",
+    "Train",
     "bit_rate",
     "broadcast_bit_rate",
     "broadcast_node_id",
@@ -95,6 +97,7 @@ __all__ = [
     "current",
     "dialect_of",
     "identify",
+    "limits",
     "move",
     "node_id",
     "ping",
@@ -118,6 +121,7 @@ __all__ = [
     "stop_reports",
     "telemetry",
     "temperature",
+    "train",
     "travel_limits",
     "version",
     "window",

@@ -21,6 +21,7 @@ from motorbus.core.operation import (
     Goal,
     Operation,
     Rank,
+    Refusal,
     Runnable,
     Timeout,
 )
@@ -121,6 +122,7 @@ def download(
     states_length: bool,
     goals: tuple[Goal, ...] = (),
     rank: Rank = Rank.CONTROL,
+    refusal: Refusal | None = None,
 ) -> Exchange[None]:
     """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more.
 
@@ -147,6 +149,7 @@ def download(
         effect=Effect.TORQUE if index in UNSETTLING else row.effect,
         goals=goals,
         repeatable=index != MID_POINT,
+        refusal=refusal,
     )
 
 

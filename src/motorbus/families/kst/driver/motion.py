@@ -67,9 +67,15 @@ def move(
 
 def goal_of(node: Node, raw: int) -> Operation[Goal]:
     """What this raw target orders, with the limits for the gate: those of the servo, else those of the profile."""
+    known = yield from limits(node)
+    return Goal(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
+
+
+def limits(node: Node) -> Operation[tuple[float, float]]:
+    """Lowest and highest position it goes to, rad: its travel limits inside the range of its profile; read once."""
     if node.limits is None:
         node.limits = yield from _limits(node)
-    return Goal(node.node, "position", float(node.table["goal_position"].to_value(raw)), *node.limits)
+    return node.limits
 
 
 def send_goal(node: Node, goal: Goal) -> Operation[None]:

@@ -22,6 +22,7 @@ from motorbus.families.stepper.driver.jogging import (
     move_by,
     run_once,
 )
+from motorbus.families.stepper.driver.keeping import keep_time, shortest
 from motorbus.families.stepper.driver.memory import Memory
 from motorbus.families.stepper.driver.node import Node, checked_motor
 from motorbus.families.stepper.driver.outputs import last_commanded, set_output
@@ -89,6 +90,7 @@ __all__ = [
     "jog",
     "jog_forward",
     "jog_reverse",
+    "keep_time",
     "last_commanded",
     "move_by",
     "ping",
@@ -104,6 +106,7 @@ __all__ = [
     "scan",
     "select",
     "set_output",
+    "shortest",
     "start_project",
     "stop",
     "vote",

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from motorbus.core.operation import (
     ASKED,
@@ -55,7 +55,7 @@ T = TypeVar("T")
 
 PROJECT: Final = 1
 """From its step 1 every motion by hand has its speed: stepper controller serial protocol manual, items 18, 19, 22."""
-VERBS: Final = ("jog", "move_by", "home")
+VERBS: Final = ("jog", "move_by", "home", "keep_time")
 """Those that may borrow."""
 BORROWED: Final = "borrowed"
 """It was read back as wanted, so reading shows what is being edited."""
@@ -65,6 +65,17 @@ TRIES: Final = 3
 """How often giving back is tried: after an emergency stop the bus itself repeats nothing."""
 LOST: Final = "the controller has lost its supply meanwhile: where the motor stands is not known"
 NOTE: Final = "project 1 may still be borrowed: recover() gives it back, and so does a power cycle"
+
+
+class Accord(NamedTuple):
+    """What is done with others before a motion begins; see `borrowed`.
+
+    `settled` makes of what is wanted what is wanted with them, before anything is edited. `ready` is carried out when
+    all is edited, just before the motion: whatever it raises, nothing was moved.
+    """
+
+    settled: Callable[[Project], Operation[Project]]
+    ready: Callable[[Project], Operation[None]]
 
 
 class Loan:
@@ -137,7 +148,7 @@ def loan_of(verb: str, facts: Mapping[str, Any]) -> Loan:
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise RequestError(
             f"these are not the facts of a borrow that can be recovered: {error!r}",
-            expected="what the journal of the bus holds of a jog(), a move_by() or a home()",
+            expected="what the journal of the bus holds of a jog(), a move_by(), a keep_time() or a home()",
             advice="nothing was sent",
         ) from error
     return loan
@@ -158,11 +169,12 @@ def borrowed(
     motion: Callable[[Project], Operation[T]],
     *,
     leave: bool = False,
+    accord: Accord | None = None,
 ) -> Operation[T]:
     """Make a motion with project 1 as `wanted` makes it of what it is, then stop, then give it back, come what may.
 
     Where it is so already nothing is edited. With `leave` it is not stopped once its order was acknowledged, and it
-    must be so already.
+    must be so already. What is refused is refused before any `accord` with others is sought.
 
     Raises RequestError, with nothing sent that changes anything, while a borrow that was cut off is unfinished on this
     bus, while a project or a move that was left may not be over, for unsaved edits of another project, which a borrow
@@ -171,7 +183,7 @@ def borrowed(
     after the stop, or when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
     still borrowed.
     """
-    return (yield from Alone(_borrowing(node, verb, wanted, motion, leave)))
+    return (yield from Alone(_borrowing(node, verb, wanted, motion, leave, accord)))
 
 
 def _borrowing(
@@ -180,6 +192,7 @@ def _borrowing(
     wanted: Callable[[Project], Operation[Project]],
     motion: Callable[[Project], Operation[T]],
     leave: bool,
+    accord: Accord | None,
 ) -> Operation[T]:
     yield from refuse_unless_idle(node, f"{verb}()")
     yield from Report(Journal(verb, ASKED, {"node": node.node}))
@@ -187,8 +200,11 @@ def _borrowing(
     loan = Loan(verb, image, node.order, (yield from wanted(decode_image(image, node.order))))
     if loan.needed:
         _refuse(node, loan, leave)
+    if accord is not None:
+        loan = Loan(verb, image, node.order, (yield from accord.settled(loan.wanted)))
+        _refuse(node, loan, leave)
     try:
-        value = yield from afterwards(_lent(node, loan, motion, leave), lambda: _ended(node, loan))
+        value = yield from afterwards(_lent(node, loan, motion, leave, accord), lambda: _ended(node, loan))
     except BaseException as error:
         _annotate(error, loan)
         raise
@@ -207,7 +223,13 @@ def _annotate(error: BaseException, loan: Loan) -> None:
         error.add_note(NOTE)
 
 
-def _lent(node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], leave: bool) -> Operation[T]:
+def _lent(
+    node: Node,
+    loan: Loan,
+    motion: Callable[[Project], Operation[T]],
+    leave: bool,
+    accord: Accord | None,
+) -> Operation[T]:
     if loan.needed:
         yield from _recorded(node, loan)
         found = yield from brought(node, loan.image, loan.wanted)
@@ -215,6 +237,8 @@ def _lent(node: Node, loan: Loan, motion: Callable[[Project], Operation[T]], lea
         if not loan.seen:
             raise _unseen(node)
         yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
+    if accord is not None:
+        yield from accord.ready(loan.wanted)
     loan.restless = loan.cut = True
     node.memory.turning = inf  # until a stop is accepted
     value = yield from motion(loan.wanted)

@@ -20,7 +20,7 @@ from motorbus.families.stepper.driver.jogging import grounded, paced, whole_rpm
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import read_input
 from motorbus.families.stepper.driver.stopping import Promise
-from motorbus.families.stepper.driver.turning import Watch, finite, refuse_unless_turning, within
+from motorbus.families.stepper.driver.turning import Watch, finite, honest, refuse_unless_turning, within
 from motorbus.families.stepper.table import HOME_INPUT, Project
 
 DEADLINE: Final = 30.0
@@ -53,6 +53,9 @@ def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = Non
     The speed is that of step 1 of project 1; with a `velocity` (rad/s, above 0, in whole RPM) project 1 is borrowed for
     it as for `move_by`. Reports `Progress` in ms.
 
+    When it returns the motor stands at the switch, *estimated*: that it stops there at once is an assumption, else it
+    is beyond. An error that is `unmoved` has moved nothing; after any other nobody knows where it stands.
+
     Raises NotHomed, with the stop accepted, when input 5 is active before (nothing was moved: it stands at the switch,
     or the switch is stuck) or not active by the deadline; RequestError, before anything is moved, when there is no
     speed, and as `borrowed`; OutcomeUnknown when the order, or the stop, was not acknowledged: where the stop was not,
@@ -72,7 +75,7 @@ def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = Non
     def motion(project: Project) -> Operation[Homed]:
         return (yield from _until_active(node, project, deadline, watch))
 
-    return (yield from borrowed(node, "home", wanted, motion))
+    return (yield from honest(watch, borrowed(node, "home", wanted, motion)))
 
 
 def _refuse_active(node: Node) -> Operation[None]:

@@ -29,6 +29,7 @@ from motorbus.families.stepper.driver.stopping import Promise
 from motorbus.families.stepper.driver.turning import (
     Watch,
     finite,
+    honest,
     longest,
     refuse_unless_turning,
     waited,
@@ -91,6 +92,10 @@ def move_by(
     it goes on when this returns: possible only when nothing had to be borrowed. Until it may be over, nothing else
     begins on this bus but a stop.
 
+    When it returns, and it was waited for, the motor has turned by `Moved.angle`, *estimated*: in whole pulses, and
+    not where steps were lost. An error that is `unmoved` has moved nothing; after any other, also an interruption,
+    nobody knows where it stands.
+
     Raises RequestError, before anything is written, for a speed that is 0 or more than 10 % off in whole RPM, an angle
     of less than a pulse or too far, and as `borrowed`; Interrupted when somebody stops it; OutcomeUnknown when the
     order was not acknowledged: it is stopped then, also without `wait`.
@@ -104,7 +109,7 @@ def jog(node: Node, velocity: float, seconds: float, *, acceleration: int | None
     """Turn at a velocity (rad/s, forward positive) for a while (s, at most 60), then stop.
 
     It is one single move of exactly velocity times seconds, see `move_by`: the motor ends by itself when this host
-    dies. It takes a little longer for its ramps, and for its speed is in whole RPM. Raises as `move_by`.
+    dies. It takes a little longer for its ramps, and for its speed is in whole RPM. Returns and raises as `move_by`.
     """
     rpm = whole_rpm(abs(finite(velocity, "velocity")))
     angle = velocity * within(seconds, LONGEST, "seconds")
@@ -124,7 +129,7 @@ def _turned(
     def motion(project: Project) -> Operation[Moved]:
         return (yield from single(node, project, watch, wait=wait))
 
-    return (yield from borrowed(node, verb, wanted, motion, leave=not wait))
+    return (yield from honest(watch, borrowed(node, verb, wanted, motion, leave=not wait)))
 
 
 def _checked_acceleration(number: int) -> int:
@@ -153,7 +158,7 @@ def run_once(node: Node) -> Operation[Moved]:
     def motion(project: Project) -> Operation[Moved]:
         return (yield from single(node, project, watch))
 
-    return (yield from borrowed(node, "run_once", wanted, motion))
+    return (yield from honest(watch, borrowed(node, "run_once", wanted, motion)))
 
 
 def jog_forward(node: Node, seconds: float) -> Operation[Moved]:
@@ -186,7 +191,7 @@ def _endless(node: Node, verb: str, sign: int, seconds: float) -> Operation[Move
         angle = sign * pulses * tau / float(project.pulses_per_turn or 1)
         return Moved(node.node, angle, sign * _velocity(project), seconds, Promise.STOP_ACCEPTED)
 
-    return (yield from borrowed(node, verb, wanted, motion))
+    return (yield from honest(watch, borrowed(node, verb, wanted, motion)))
 
 
 def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> Operation[Moved]:
@@ -201,7 +206,7 @@ def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> 
         yield from waited(watch, seconds, "moving")
     else:
         node.memory.turning = (yield from Pause(0)) + seconds
-    angle = step.sign * step.distance * tau / project.turn_distance
+    angle = step.sign * count * tau / float(project.pulses_per_turn or 1)
     promise = Promise.STOP_ACCEPTED if wait else None
     return Moved(node.node, angle, step.sign * _velocity(project), seconds, promise)
 
@@ -284,13 +289,13 @@ def paced(project: Project, rpm: int | None, acceleration: int | None) -> Projec
     return project.with_step(
         1,
         speed=speed,
-        start_frequency=_start(step, running),
+        start_frequency=start_below(step, running),
         acceleration=acceleration if acceleration is not None else step.acceleration or ACCELERATION,
     )
 
 
-def _start(step: Step, running: float) -> int:
-    """Hz: that of the step while it is below the running frequency, else half of that."""
+def start_below(step: Step, running: float) -> int:
+    """The start frequency (Hz): that of the step while it is below the running frequency (Hz), else half of that."""
     usual = step.start_frequency or START
     return usual if usual < running else max(1, int(running / 2))
 

@@ -40,7 +40,7 @@ from motorbus.families.stepper.driver.inputs import Levels, checked, inputs
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.owing import RUN, owed, settled
 from motorbus.families.stepper.driver.progress import Twin
-from motorbus.families.stepper.driver.turning import Watch, refuse_unless_idle, slowing, within
+from motorbus.families.stepper.driver.turning import Watch, honest, refuse_unless_idle, slowing, within
 from motorbus.families.stepper.driver.waiting import Outcome, Ran, Wait
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import Conditions, Plan, Program
@@ -77,7 +77,8 @@ def start_project(
     a stop has overtaken, OutcomeUnknown when the acknowledgement did not come; and as `dump` and `stop`.
     """
     asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
-    return (yield from Alone(_started(node, asked, Watch(node))))
+    watch = Watch(node)
+    return (yield from honest(watch, iter(Alone(_started(node, asked, watch)))))
 
 
 def run(
@@ -111,13 +112,17 @@ def run(
 
     A caller that is interrupted leaves the project running: nothing is sent. An emergency stop ends the wait with
     Interrupted; whether it was heard is not known, so the next run wants a `stop` first. Raises as `start_project`, and
-    LinkError when the port goes away: the project goes on.
+    LinkError when the port goes away: the project goes on. An error that is `unmoved` has started nothing.
+
+    Who reckons where the motor stands knows it no longer: also `completed` may be a button's end, and a step may have
+    been cut by its stop input.
     """
     asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
     _check_timeout(timeout, endless)
     course = _Course(timeout, checked(watch))
-    branches = (_launched(node, asked, course, Watch(node)), _listening(course), _following(node, course))
-    yield from _waited(node, project, course, branches)
+    guard = Watch(node)
+    branches = (_launched(node, asked, course, guard), _listening(course), _following(node, course))
+    yield from honest(guard, _waited(node, project, course, branches))
     assert course.wait is not None, "a start that fails raises"
     assert course.wait.ran is not None, "a wait ends with an outcome"
     return course.wait.ran
@@ -170,9 +175,10 @@ def _check_timeout(timeout: float | None, endless: bool) -> None:
     within(timeout, inf, "timeout")
 
 
-def _ready(node: Node, asked: _Asked) -> Operation[Plan]:
+def _ready(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
     """Whether it may be started: its plan."""
     if asked.stop_first:
+        watch.ended = True
         yield from stopping.ended(node)
         yield from settled(node, "stopped")
     else:
@@ -212,7 +218,7 @@ def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
 
 
 def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
-    plan = yield from _ready(node, asked)
+    plan = yield from _ready(node, asked, watch)
     yield from _begin(node, plan, watch)
     return plan
 
@@ -223,7 +229,7 @@ def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
 
     def overtaken(_: Stops) -> MotorbusError | None:
         nonlocal left
-        left = not watch.overtaken
+        left = watch.ordered = not watch.overtaken
         return None if left else _overtaken(number)
 
     where = goals.of_project(node, plan.project, plan.how)
@@ -280,7 +286,7 @@ def _launched(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Opera
 
 
 def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Operation[None]:
-    plan = yield from _ready(node, asked)
+    plan = yield from _ready(node, asked, watch)
     course.levels = Levels((yield from inputs(node, course.ports)))
     course.wait = wait = Wait(node.memory, plan, (yield from Pause(0)), course.timeout)
     try:

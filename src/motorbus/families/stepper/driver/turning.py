@@ -3,6 +3,11 @@
 A controller tells nothing of a jog, a single move or a homing but that it has heard the order. So their time is
 reckoned, by the slowest of the readings of the acceleration, and while it passes this host watches for stops: one that
 was sent by anybody on this bus ends the wait, and none of these orders leaves after one.
+
+Who reckons where the motor stands may believe a motion that returned: it was acknowledged, had its time, and nobody on
+this bus has stopped it. Where it was on the way when something ended it nobody can tell: a stop slows down or not, an
+acknowledgement that is lost says nothing, and a power cycle is noticed only where project 1 had to be edited. So after
+every error the position is not known, but for those that are `unmoved`: the order had not left.
 """
 
 from __future__ import annotations
@@ -10,15 +15,17 @@ from __future__ import annotations
 from dataclasses import replace
 from math import inf
 from sys import float_info
-from typing import Final
+from typing import Final, TypeVar
 
-from motorbus.core.operation import Operation, Pause, Progress, Report, Stops
-from motorbus.errors import Interrupted, MotorbusError, RequestError
+from motorbus.core.operation import Operation, Pause, Progress, Report, Runnable, Stops
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program.plan import READINGS
 from motorbus.families.stepper.table import Project, StopMode
+
+T = TypeVar("T")
 
 LOOK: Final = 0.1
 """s between two looks at whether somebody has stopped it."""
@@ -29,7 +36,11 @@ SPARE: Final = 0.05
 
 
 class Watch:
-    """Whether anybody has told the motor to stop since this was made: another task, another face, an emergency."""
+    """Whether anybody has told the motor to stop since this was made: another task, another face, an emergency.
+
+    `ordered` once the order to move may have left: before that nothing has moved, see `honest`, unless something else
+    was `ended` for it. `looked` is the error of `look`.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node = node.node
@@ -37,6 +48,8 @@ class Watch:
         self._before = self._memory.wanted
         self._stops: Stops | None = None
         self._left = 0
+        self.ordered = self.ended = False
+        self.looked: MotorbusError | None = None
 
     @property
     def overtaken(self) -> bool:
@@ -45,15 +58,35 @@ class Watch:
 
     def refusal(self, stops: Stops) -> MotorbusError | None:
         """For the exchange that begins the motion: it must not leave after a stop."""
-        if self.overtaken:
-            return _stopped("before it began", "the motor was not told to move")
+        if self.overtaken or self._has_left:
+            return _early()
         self._stops, self._left = stops, stops(self._node)
+        self.ordered = True
         return None
+
+    def look(self, stops: Stops) -> MotorbusError:
+        """For an exchange that never leaves: from here on every stop counts that does."""
+        self._stops, self._left = stops, stops(self._node)
+        self.looked = _early()
+        return self.looked
+
+    def check_before(self) -> None:
+        """Raise Interrupted when somebody has said stop, though the motion was not ordered yet."""
+        if self.overtaken or self._has_left:
+            raise _early()
 
     def check(self) -> None:
         """Raise Interrupted when somebody has said stop since the motion was ordered."""
-        if self.overtaken or (self._stops is not None and self._stops(self._node) != self._left):
+        if self.overtaken or self._has_left:
             raise _stopped("by somebody else", "where the motor stands now is not known")
+
+    @property
+    def _has_left(self) -> bool:
+        return self._stops is not None and self._stops(self._node) != self._left
+
+
+def _early() -> Interrupted:
+    return _stopped("before it began", "the motor was not told to move")
 
 
 def _stopped(when: str, state: str) -> Interrupted:
@@ -61,6 +94,31 @@ def _stopped(when: str, state: str) -> Interrupted:
         f"the motion was stopped {when}",
         cause="a stop was sent on this bus, by another task or as an emergency",
         advice=f"{state}; give the order again if it is still wanted",
+    )
+
+
+def honest(watch: Watch, runnable: Runnable[T]) -> Operation[T]:
+    """Carry out what may move the motor; an error from before the order has left says so, it is `unmoved`.
+
+    A RequestError is always from before: one that comes behind the order becomes OutcomeUnknown.
+    """
+    try:
+        return (yield from runnable)
+    except MotorbusError as error:
+        ordered = watch.ordered and not isinstance(error, LimitExceeded)  # of the gate, which is asked last
+        error.unmoved = not (ordered or watch.ended)
+        if ordered and isinstance(error, RequestError):
+            raise _afterwards(error) from error
+        raise
+
+
+def _afterwards(error: RequestError) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"the motion was ordered, and afterwards: {error.summary}",
+        expected=error.expected,
+        cause=error.cause,
+        advice="where the motor stands is not known",
+        node=error.node,
     )
 
 

@@ -1,0 +1,237 @@
+"""`robot.loop` against a line that takes its time: six axes at 1 Mbaud, by the public calls, in rad and seconds.
+
+    python -m bench.robot_loop [--seconds 60]
+
+The other end is the responder in C, on which bytes take as long as at that baud rate. At 80 % of the highest rate that
+the budget names there is to be no overrun in a minute, and asked for that highest rate itself the loop is to achieve 88 %
+of what the wire carries. Both are measured with goals that are followed and with goals that are sent as they are. Each
+axis counts how often it was read, so a reading that is lost, doubled or stale is found, and so is a goal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any, NamedTuple
+
+from bench.places import BUILD, ROOT, surroundings
+from bench.responder import build, responder
+from bench.workloads import COUNTS, IDS
+
+BAUD = 1_000_000
+SHARE = 0.8
+ACHIEVED = 0.88
+SECONDS = 60.0
+FLAT_OUT = 5.0
+STEP = math.tau / COUNTS
+KINDS = ("followed", "direct")
+COLUMNS = ("", "asked for, Hz", "cycles/s", "of the wire's", "overruns", "skipped", "late, µs", "cycle, µs", "processor µs")
+
+
+class Sample(NamedTuple):
+    """One loop: how goals were sent, Hz that were asked for, that the wire carries and that were achieved, overruns and
+    skipped slots; and in s how late a cycle began and how long one took on average, and the processor's part of it."""
+
+    kind: str
+    asked: float
+    wire: float
+    achieved: float
+    cycles: int
+    overruns: int
+    skipped: int
+    lateness: float
+    cycle: float
+    processor: float
+
+
+class Wrong(Exception):
+    """A reading or a goal was lost, doubled or stale."""
+
+
+def described(port: str) -> str:
+    """The machine file: six servos, each an axis that may turn a whole turn."""
+    axes = "".join(
+        f'[axis.a{node}]\ndevice = "arm#{node}"\nzero = "180 deg"\nunit = "deg"\n'
+        'max_velocity = "300 deg/s"\nmax_acceleration = "3000 deg/s2"\nexit = "leave"\n'
+        for node in IDS
+    )
+    return f'format = 1\n[bus.arm]\naddress = "feetech:{port},baud={BAUD}"\n{axes}'
+
+
+# -- in the process that is measured -----------------------------------------------------------------------------
+
+
+def course(count: int) -> list[dict[str, float]]:
+    """Ways from the first position for so many cycles, about as slow as a hand: within what every axis may do."""
+    return [
+        {f"a{node}": 0.2 - 0.2 * math.cos(number * (5 + node) / 4000) for node in IDS} for number in range(count)
+    ]
+
+
+def measured(port: str, kind: str, rate: float, seconds: float) -> dict[str, Any]:
+    """Lead six axes for so long; a rate of 0 is the highest that the budget names. Raises Wrong."""
+    import motorbus
+
+    file = BUILD / f"robot_loop-{os.getpid()}.toml"
+    file.write_text(described(port), encoding="utf-8")
+    try:
+        with motorbus.Robot.load(file) as robot:
+            wire = robot.budget().highest_rate
+            return {"wire": wire, **_led(robot, kind, rate or wire, seconds)}
+    finally:
+        file.unlink()
+
+
+def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
+    goals = course(int(rate * seconds) + 1)
+    positions: list[Any] = []
+    with robot.loop(rate, direct=kind == "direct") as loop:
+        base = dict(next(loop).position)
+        loop.goal.update(base)
+        next(loop)  # torque on, in a cycle of its own
+        before, gone = loop.statistics.cycles, loop.statistics.overruns + loop.statistics.skipped
+        goal = loop.goal
+        gc.collect()
+        gc.freeze()
+        used, began = process_time(), perf_counter()
+        for state, wanted in zip(loop, goals, strict=False):
+            positions.append(state.position)
+            for name, way in wanted.items():
+                goal[name] = base[name] + way
+            if perf_counter() - began >= seconds:
+                break
+        lasted, used = perf_counter() - began, process_time() - used
+        told = loop.statistics
+    judged(positions)
+    cycles = told.cycles - before
+    return {
+        "asked": rate,
+        "cycles": cycles,
+        "achieved": cycles / lasted,
+        "overruns": told.overruns,
+        "skipped": told.skipped,
+        "before": gone,
+        "lateness": told.lateness.mean,
+        "cycle": told.cycle.mean,
+        "processor": used / cycles,
+    }
+
+
+def judged(positions: Sequence[dict[str, float]]) -> None:
+    """Each reading shows one count more than the one before. Raises Wrong."""
+    for number in range(1, len(positions)):
+        for name, after in positions[number].items():
+            way = round((after - positions[number - 1][name]) / STEP) % COUNTS
+            if way != 1:
+                raise Wrong(f"cycle {number}: {name} shows {way} readings since the one before")
+
+
+# -- in the process that conducts --------------------------------------------------------------------------------
+
+
+def sample(program: Path, kind: str, rate: float, seconds: float) -> Sample:
+    """One loop, in a process of its own, against a fresh line. Raises Wrong."""
+    BUILD.mkdir(exist_ok=True)
+    with responder(program, BAUD) as wire:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench.robot_loop", "--port", wire.port, "--kind", kind]
+            + ["--rate", str(rate), "--seconds", str(seconds)],
+            capture_output=True,
+            text=True,
+            timeout=seconds + 60,
+            cwd=ROOT,
+            env=dict(surroundings()),
+        )
+    if done.returncode:
+        raise Wrong(f"{kind}, {rate:g} Hz: {done.stderr.strip() or done.returncode}")
+    said = json.loads(done.stdout)
+    _compare(said, wire.books)
+    names = ("asked", "wire", "achieved", "cycles", "overruns", "skipped", "lateness", "cycle", "processor")
+    return Sample(kind, *(said[name] for name in names))
+
+
+def _compare(said: dict[str, Any], books: dict[str, Any]) -> None:
+    """Every cycle wrote a goal to each servo; those before and after are few. Raises Wrong."""
+    written = [books["servos"][str(node)][1] for node in IDS]
+    if min(written) < said["cycles"] or len(set(written)) != 1 or books["strays"]:
+        raise Wrong(f"{said['cycles']} cycles, but goals that arrived: {written}, strays {books['strays']}")
+
+
+def samples(seconds: float, progress: Callable[[str], None], times: int = 1) -> list[Sample]:
+    """Each kind at 80 % for so long, and flat out, so many times. Raises Wrong, NoCompiler."""
+    program = build()
+    found: list[Sample] = []
+    for number in range(times):
+        for kind in KINDS:
+            progress(f"robot.loop, {kind}, flat out, round {number + 1} of {times}")
+            fastest = sample(program, kind, 0.0, min(FLAT_OUT, seconds))
+            progress(f"robot.loop, {kind}, at {SHARE:.0%} for {seconds:g} s, round {number + 1} of {times}")
+            found += [fastest, sample(program, kind, SHARE * fastest.wire, seconds)]
+    return found
+
+
+def verdict(found: Iterable[Sample]) -> str:
+    """Whether both were reached, in words."""
+    every = list(found)
+    steady = [one for one in every if one.asked < one.wire * (SHARE + ACHIEVED) / 2]
+    flat = [one for one in every if one not in steady]
+    overruns = sum(one.overruns + one.skipped for one in steady)
+    least = min((one.achieved / one.wire for one in flat), default=0.0)
+    return (
+        f"Overruns and skipped slots at {SHARE:.0%} of the budget's highest rate: {overruns} in "
+        f"{sum(one.cycles for one in steady)} cycles. None: {_word(not overruns)}.\n"
+        f"Achieved of what the wire carries: {least:.1%}. At least {ACHIEVED:.0%}: {_word(least >= ACHIEVED)}."
+    )
+
+
+def _word(reached: bool) -> str:
+    return "reached" if reached else "MISSED"
+
+
+def rows(found: Sequence[Sample]) -> list[tuple[str, ...]]:
+    """One for each."""
+    return [
+        (
+            one.kind,
+            f"{one.asked:.1f}",
+            f"{one.achieved:.1f}",
+            f"{one.achieved / one.wire:.1%}",
+            f"{one.overruns}",
+            f"{one.skipped}",
+            f"{one.lateness * 1e6:.0f}",
+            f"{one.cycle * 1e6:.0f}",
+            f"{one.processor * 1e6:.0f}",
+        )
+        for one in found
+    ]
+
+
+def main() -> int:
+    """Measure, or be measured."""
+    parser = argparse.ArgumentParser(prog="python -m bench.robot_loop", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=SECONDS)
+    parser.add_argument("--times", type=int, default=1)
+    parser.add_argument("--port", help="be measured on this port")
+    parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
+    parser.add_argument("--rate", type=float, default=0.0)
+    given = parser.parse_args()
+    if given.port:
+        print(json.dumps(measured(given.port, given.kind, given.rate, given.seconds)))
+        return 0
+    found = samples(given.seconds, lambda text: print(text, file=sys.stderr), given.times)
+    for row in (COLUMNS, *rows(found)):
+        print("  ".join(row))
+    print(f"{verdict(found)}\nLoad of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""`motorbus loop-stats`: how well a control loop keeps its rate on this host, with these buses. Nothing moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.ending import asked_to_end
+from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.machine import axes_named
+from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.robot import robot
+from motorbus.core import units
+from motorbus.core.operation import Progress
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from motorbus.cli.output import Output
+    from motorbus.cli.robot import InHand
+    from motorbus.motion.budget import RobotBudget
+    from motorbus.motion.grid import Statistics, Took
+
+app = App(
+    name="loop-stats",
+    usage="Usage: motorbus loop-stats [NAME...] [OPTIONS]",
+    help_epilogue="""Runs a loop over axes of the machine file and says how it kept to its grid. It
+only reads positions: nothing moves, and no torque is switched. With --hold it
+gives torque and sends each axis its own position as a goal in every cycle, as a
+loop that controls does: so they stay where they are.
+
+An overrun is a cycle that was not over when the next one was due; a slot of the
+grid that went by as a whole is skipped. Neither is ever made up for. Late is a
+cycle by the time from its slot to its first byte. Without --rate the loop is as
+quick as 80% of what the slowest bus allows; `motorbus budget` says what that
+is. Ends with exit code 6 when readings were lost.
+
+Examples:
+
+    motorbus loop-stats
+    motorbus loop-stats arm --rate 200 --seconds 10
+    motorbus loop-stats shoulder elbow --rate 100 --hold
+    motorbus loop-stats arm --rate 200 --json""",
+)
+USUAL: Final = 0.8
+"""Of the highest rate: a loop that leaves the host some air."""
+
+
+@app.default
+def loop_stats(
+    *names: Annotated[str, Parameter(name="NAME")],
+    rate: float = 0.0,
+    seconds: str = "5",
+    hold: Flag = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
+    """Measure how well a loop over axes keeps its rate.
+
+    Parameters
+    ----------
+    names
+        Axes, groups or buses of the machine file; all axes when left out.
+    rate
+        Cycles per second; 80% of the highest possible rate when left out.
+    seconds
+        For how long, in s or as 500ms; Enter or Ctrl-C end it earlier.
+    hold
+        Give torque, and send each axis its own position as a goal in every cycle.
+    options
+        Any option of the buses, as a flag.
+    """
+    axes, span = axes_named(names), units.parse(seconds, "time")
+    if not span > 0 or not rate >= 0:
+        raise RequestError(
+            "--seconds must be above 0, --rate not below 0", expected="s, and Hz", advice="nothing was sent"
+        )
+    with robot(axes, options, output) as hand:
+        budget = hand.robot.budget(rate, axes)
+        chosen = rate or (USUAL * budget.highest_rate if budget.buses else 1.0)
+        took, without, found = _run(hand, axes, chosen, span, hold=hold and not dry_run)
+    _tell(took, without, found, budget, output)
+    return Exit.OK
+
+
+def _run(
+    hand: InHand, axes: list[str], rate: float, span: float, *, hold: bool
+) -> tuple[float, tuple[str, ...], Statistics]:
+    """How long the loop went on from its first cycle to its last (s), whom it left out, and what became of it."""
+    with (
+        hand.working("looping"),
+        asked_to_end() as ended,
+        hand.robot.loop(rate, axes) as loop,
+    ):
+        first = last = None
+        for state in loop:
+            if hold and first is None:
+                loop.goal.update(state.position)
+            first, last = state.at if first is None else first, state.at
+            if loop.statistics.cycles % max(1, round(rate / 10)) == 0:
+                hand.heard(Progress(round(1000 * (last - first)), round(1000 * span), "looping"))
+            if last - first >= span or ended():
+                break
+    return (last or 0.0) - (first or 0.0), loop.without, loop.statistics
+
+
+def _tell(
+    took: float, without: Sequence[str], found: Statistics, budget: RobotBudget, output: Output
+) -> None:
+    achieved = (found.cycles - 1) / took if took > 0 else 0.0
+    lost = {name: count for name, count in found.lost.items() if count}
+    buses = {
+        name: {
+            "axes": list(budget.buses[name].axes),
+            "load": budget.buses[name].load(found.rate),
+            "highest_rate": budget.buses[name].highest_rate,
+            "cycle": _took(one),
+        }
+        for name, one in found.buses.items()
+    }
+    facts: dict[str, object] = {"rate": found.rate, "achieved_rate": achieved, "seconds": took}
+    facts |= {"cycles": found.cycles, "overruns": found.overruns, "skipped": found.skipped}
+    facts |= {"lateness": _took(found.lateness), "cycle": _took(found.cycle), "buses": buses}
+    output.document("motorbus.loop-stats/1", {**facts, "lost": lost, "without": list(without)})
+    rows = [
+        (
+            name,
+            len(budget.buses[name].axes),
+            f"{100 * budget.buses[name].load(found.rate):.1f}",
+            f"{budget.buses[name].highest_rate:.1f}",
+            _ms(one.mean),
+            _ms(one.most),
+        )
+        for name, one in found.buses.items()
+    ]
+    columns = ["bus", ">axes", ">load %", ">highest rate, Hz", ">cycle ms", ">longest ms"]
+    output.table("", columns, rows)
+    output.text(
+        f"{achieved:.1f} of {found.rate:g} cycles per second, {found.cycles} in {took:.2f} s: "
+        f"{found.overruns} overruns, {found.skipped} slots skipped"
+    )
+    output.text(
+        f"began late by {_ms(found.lateness.mean)} ms in the mean, {_ms(found.lateness.most)} ms at most"
+    )
+    if without:
+        output.note(f"note: {', '.join(without)}: not in a loop, for nobody can lead such a device")
+    if lost:
+        raise Partial(
+            f"readings lost: {', '.join(f'{name} {count}' for name, count in lost.items())}",
+            advice="see to power and cables; a lower --rate shows whether it is the wire",
+        )
+    output.text("readings lost: none")
+
+
+def _took(found: Took) -> dict[str, float]:
+    return {"mean": found.mean, "most": found.most}
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3f}"

@@ -1,0 +1,126 @@
+"""`motorbus replay`: the movement in a file, carried out by the axes that it names; judged before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from motorbus.cli.exits import Exit
+from motorbus.cli.machine import machine
+from motorbus.cli.moving import Goal, absolute, consent_to_far, tell
+from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.robot import place, robot
+from motorbus.core import units
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from motorbus.cli.robot import InHand
+    from motorbus.motion.machine import AxisSpec
+    from motorbus.motion.trajectory import Trajectory
+
+app = App(
+    name="replay",
+    usage="Usage: motorbus replay FILE.csv [OPTIONS]",
+    help_epilogue="""The file is CSV, as `motorbus teach` writes it: a column time, then one for each
+axis of the machine file, units in the header. All of it is judged by the limits
+of its axes before anything moves, and refused with exit code 8 where it goes
+beyond them. The axes go to its first point together, then along it. A way there
+of more than 180 degrees needs --yes. Ctrl-C stops them.
+
+What was taught by hand comes in steps, which are hard: --smooth 5 takes out
+what is quicker than 5 Hz. A stepper controller cannot be led along a file.
+
+Examples:
+
+    motorbus replay wave.csv
+    motorbus replay wave.csv --dry-run
+    motorbus replay wave.csv --smooth 5 --speed 0.5
+    motorbus replay wave.csv --repeat 3 --json""",
+)
+
+
+@app.default
+def replay(
+    file: Annotated[Path, Parameter(name="FILE.csv")],
+    /,
+    *,
+    speed: str = "",
+    repeat: int = 1,
+    smooth: float = 0.0,
+    yes: Flag = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: str,
+) -> Exit:
+    """Let axes carry out the movement in a file.
+
+    Parameters
+    ----------
+    file
+        The movement, as wave.csv
+    speed
+        How fast, as 0.5 or 50% for half as fast; as in the file when left out.
+    repeat
+        How many times.
+    smooth
+        Leave out what is quicker than this, in Hz, as 5; nothing is left out at 0.
+    yes
+        Do not ask before a long way to the first point.
+    options
+        Any option of the buses, as a flag.
+    """
+    from motorbus.motion.trajectory import Trajectory, check
+
+    share = units.parse(speed, "load") if speed else 1.0
+    if not share > 0 or repeat < 1 or not smooth >= 0:
+        raise RequestError(
+            "--speed must be above 0, --repeat at least 1 and --smooth not below 0", advice="nothing was sent"
+        )
+    axes = machine().axes
+    wanted = Trajectory.load(file, axes)
+    wanted = wanted.smoothed(smooth) if smooth else wanted
+    check(wanted.scaled(1 / share), axes)
+    with robot(list(wanted.axes), options, output) as hand:
+        first = wanted.positions(0.0)
+        present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
+        if dry_run:
+            return _plan(hand, wanted.scaled(1 / share), present)
+        consent_to_far(hand, present, first, yes=yes)
+        for number in range(repeat):
+            with hand.working(f"replaying {number + 1} of {repeat}" if repeat > 1 else "replaying"):
+                moved = hand.robot.replay(wanted, speed=share)
+        tell(hand, "replay", moved)
+    return Exit.OK
+
+
+def _plan(hand: InHand, wanted: Trajectory, present: dict[str, float]) -> Exit:
+    """How it would go: no frames, for those are made on the way."""
+    axes = hand.robot.machine.axes
+    facts = [
+        {"name": name, "present": present[name], "first": places[0], "low": min(places), "high": max(places)}
+        for name, places in wanted.axes.items()
+    ]
+    hand.output.document("motorbus.replay.plan/1", {"duration": wanted.duration, "axes": facts})
+    rows = [
+        (
+            name,
+            place(hand.robot, name, present[name]),
+            *(axes[name].show(at) for at in (places[0], min(places), max(places))),
+            _limits(axes[name]),
+        )
+        for name, places in wanted.axes.items()
+    ]
+    hand.output.table("", ["axis", ">present", ">first", ">lowest", ">highest", "limits"], rows)
+    hand.output.text(
+        f"would take {wanted.duration:.3g} s, and the way to its first point; within all limits; nothing was sent. "
+        "Its frames are made on the way, from what is read then, so none can be shown."
+    )
+    return Exit.OK
+
+
+def _limits(spec: AxisSpec) -> str:
+    if spec.low is None or spec.high is None:
+        return "those of its device"
+    return f"{spec.show(spec.low)} to {spec.show(spec.high)}"

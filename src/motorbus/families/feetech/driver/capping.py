@@ -1,0 +1,60 @@
+"""Caps of an axis: how hard a servo may push until power-off, whatever is ordered, and never by a write to EEPROM.
+
+Which servos can be capped is a question of the map: only where a register of RAM bounds the torque, and only on HLS one
+bounds the current. Source: `table.CONTROL`.
+"""
+
+from __future__ import annotations
+
+from motorbus.core.entry import Storage
+from motorbus.core.operation import Goal, Operation
+from motorbus.errors import RequestError
+from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
+from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.motion import ordered
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import shown_mode
+from motorbus.families.feetech.driver.rest import asked_anew
+from motorbus.families.feetech.driver.tuning import limiting, set_torque_limit
+from motorbus.families.feetech.table import Mode
+
+
+def cap_torque(node: Node, fraction: float) -> Operation[None]:
+    """Bound its torque to this fraction of the stall torque, 0 to 1, until power-off.
+
+    Raises RequestError outside 0 to 1, and for a servo whose torque is bounded by EEPROM alone; else errors as
+    `set_torque_limit`.
+    """
+    table = yield from writable(node)
+    row = limiting(table)
+    if row.storage is not Storage.RAM:
+        raise RequestError(
+            f"node {node.node} keeps what bounds its torque in EEPROM ({row.name}), which no cap is written to",
+            expected="a servo with torque_limit among its registers",
+            advice="set_torque_limit() sets it for good; nothing was sent",
+            node=node.node,
+        )
+    yield from set_torque_limit(node, fraction)
+
+
+def cap_current(node: Node, current: float) -> Operation[None]:
+    """Bound its current (A, above 0) until power-off, or until an order brings another bound.
+
+    Raises RequestError for a servo without such a register, a current that is none, or in a mode in which the register
+    is no bound.
+    """
+    table = yield from asked_anew(node)
+    refuse_current(node, current)
+    if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
+        raise RequestError(
+            f"node {node.node} is in operating mode {shown_mode(node)}, in which its goal torque bounds no current",
+            expected="operating mode position or velocity",
+            advice="set_mode('position') first; nothing was sent",
+            node=node.node,
+        )
+    row = table[node.control.current]
+    raw = raw_bound(node, row, current)
+    value = float(node.value(row, raw))
+    goal = Goal(node.node, "current", value, 0.0, float(node.value(row, row.high)))
+    yield from ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))

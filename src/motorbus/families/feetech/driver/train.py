@@ -1,0 +1,211 @@
+"""Several servos of one bus, led in a loop: all is known beforehand, and a cycle asks only what it wants to know.
+
+Small goals come so often here that they are all the movement there is. So a servo is to follow each as quickly as it
+can: no acceleration to heed, and the greatest velocity that its axis allows. In these registers 0 is a special number;
+see `pace`. A goal is reckoned by the settings that its servo has at that moment, and does not leave once they are
+others. Goal and present position have the same place in every map, so one packet serves servos of all maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from motorbus.core.entry import Entry, is_number, shown
+from motorbus.core.family import Positions
+from motorbus.core.operation import Effect, Exchange, Goal, Operation, outcome
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
+from motorbus.families.feetech.driver.group import AIR, distinct, prepare_all
+from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.loop import known_row, position_reads
+from motorbus.families.feetech.driver.motion import enable_torque
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import Order, blocks, no_limits, position_goal
+from motorbus.families.feetech.driver.pace import speed_at_least
+from motorbus.families.feetech.driver.rest import asked_anew
+
+
+def train(servos: Sequence[Node], *, rate: int, air: float = AIR) -> Operation[Train]:
+    """These servos, ready to be asked and told in a loop; those not known yet are read, and nothing is written.
+
+    `rate` is that of the bus in bit/s: replies of one exchange take at most `air` s. Raises the first error of a servo
+    that cannot be read, with a note for each other; DeviceError when a register map is unknown, RequestError in other
+    than position mode, and when both limits are 0 and nobody has published what that means.
+    """
+    nodes = distinct(servos)
+    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    raise_first(errors.values())
+    for node in nodes:
+        _refuse_unless_led_by_position(node)
+    return Train(nodes, position_reads(nodes, rate=rate, air=air))
+
+
+def limits(node: Node) -> Operation[tuple[float, float]]:
+    """Lowest and highest position it can be told, rad; read from the servo unless known.
+
+    Raises DeviceError when its map is unknown, RequestError when both are 0 and nobody has published what that means.
+    """
+    yield from writable(node)
+    if node.limits is None:
+        raise no_limits(node)
+    return node.limits
+
+
+def raise_first(errors: Iterable[MotorbusError]) -> None:
+    """Raise the first of these, with a note for each other; nothing where there is none."""
+    found = list(errors)
+    for other in found[1:]:
+        found[0].add_note(f"and: {other}")
+    if found:
+        raise found[0]
+
+
+class Train:
+    """Servos in a loop; see `core.family.Train`. Made by `train`."""
+
+    def __init__(self, servos: Sequence[Node], positions: Sequence[Exchange[Positions]]) -> None:
+        self.nodes: Final = tuple(node.node for node in servos)
+        self.positions: Final = tuple(positions)
+        self._servos: Final = {node.node: node for node in servos}
+        self._packets: tuple[_Packet, ...] = ()
+        self._ids: tuple[int, ...] = ()
+
+    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[None]]:
+        """Goal positions (rad) for some or all of them, in one packet as long as there are at most 83.
+
+        Raises LimitExceeded for what is no finite number or fits no register, RequestError for a servo that is none of
+        these, has been put into another mode, or whose settings were written since and not read again.
+        """
+        if self._ids != tuple(to) or not all(packet.holds() for packet in self._packets):
+            self._packets = tuple(_packets([self._servo(id) for id in to]))
+            self._ids = tuple(to)
+        return [packet.exchange(to) for packet in self._packets]
+
+    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+        """Torque on without a jump, one after the other, and nothing set that would hold back who follows goals.
+
+        A servo is bound by its speed (rad/s, above 0), rounded up to what its register can say; one without is as
+        quick as it can be. That stays so until power-off or the next order with a velocity. Every servo is visited;
+        the first error is raised then, with a note for each other. Errors as `enable_torque`, and RequestError for a
+        speed that is none, before anything is sent.
+        """
+        for id, speed in speeds.items():
+            _check_speed(self._servo(id), speed)
+        errors = []
+        for id, node in self._servos.items():
+            failure = yield from outcome(_begin(node, speeds.get(id)))
+            if failure is not None:
+                errors.append(failure)
+        raise_first(errors)
+
+    def _servo(self, id: int) -> Node:
+        try:
+            return self._servos[id]
+        except KeyError:
+            raise RequestError(
+                f"node {shown(id)} is none of those that are led here",
+                expected=f"one of {', '.join(map(str, self.nodes))}",
+                advice="nothing was sent",
+            ) from None
+
+
+# -- begin ---------------------------------------------------------------------------------------------------
+
+
+def _begin(node: Node, speed: float | None) -> Operation[None]:
+    """In any other than position mode the greatest velocity would be an order to turn: so that is looked at anew."""
+    table = yield from asked_anew(node)
+    _refuse_unless_led_by_position(node)
+    yield from enable_torque(node)
+    _refuse_unless_led_by_position(node)
+    orders = [Order(table["goal_velocity"], speed_at_least(node, table, speed))]
+    orders += [
+        Order(table[name], 0) for name in (node.control.acceleration, node.control.time) if name
+    ]  # 0: as quickly as it can, and not by time but by velocity
+    for block in blocks(node, orders):
+        yield from confirmed(node, block)
+
+
+def _refuse_unless_led_by_position(node: Node) -> None:
+    position_goal(node, known_row(node, "goal_position"), 0.0)
+
+
+def _check_speed(node: Node, speed: float) -> None:
+    if not (is_number(speed) and speed > 0):
+        raise RequestError(
+            f"node {node.node}: {shown(speed)} is no speed",
+            expected="a finite number above 0, in rad/s",
+            advice="leave it out for the maximum; nothing was sent",
+            node=node.node,
+        )
+
+
+# -- goals ---------------------------------------------------------------------------------------------------
+
+
+class _Seat(NamedTuple):
+    """What a goal of one servo is reckoned by; `lowest` and `highest` are what its register can say, in rad."""
+
+    id: int
+    node: Node
+    row: Entry
+    factor: float
+    scale: float
+    lowest: float
+    highest: float
+    low: float
+    high: float
+
+
+class _Packet:
+    """One SYNC WRITE of goal positions, of which all is known but the goals."""
+
+    def __init__(self, address: int, seats: Sequence[_Seat]) -> None:
+        self._address = address
+        self._seats = seats
+        self._under = [(seat.node, seat.node.settings) for seat in seats]
+        self._refusal = changed_since(self._under)
+
+    def holds(self) -> bool:
+        """Whether the settings of all are those that it was made by."""
+        return all(node.settings is settings for node, settings in self._under)
+
+    def exchange(self, to: Mapping[int, float]) -> Exchange[None]:
+        """The packet with these goals (rad)."""
+        goals, items = [], []
+        for id, node, row, factor, scale, lowest, highest, low, high in self._seats:
+            value = to[id]
+            if type(value) is float and lowest <= value <= highest:
+                raw = round(value / factor / scale)
+                goal = Goal(id, "position", raw * scale * factor, low, high)
+            else:  # a whole number, or what is none: as `position_goal` says
+                raw, goal = position_goal(node, row, value)
+            goals.append(goal)
+            items.append((id, row.encode(raw)))
+        request = wire.sync_write(self._address, items)
+        return unanswered(request, Effect.MOTION, tuple(goals), refusal=self._refusal)
+
+
+def _packets(nodes: Sequence[Node]) -> Iterator[_Packet]:
+    """As few packets as can carry a goal for each of these."""
+    places: dict[tuple[int, int], list[_Seat]] = {}
+    for node in nodes:
+        seat = _seat(node)
+        places.setdefault((seat.row.address, seat.row.size), []).append(seat)
+    for (address, size), seats in places.items():
+        capacity = wire.sync_write_capacity(size)
+        for start in range(0, len(seats), capacity):
+            yield _Packet(address, seats[start : start + capacity])
+
+
+def _seat(node: Node) -> _Seat:
+    row = known_row(node, "goal_position")
+    _, goal = position_goal(node, row, 0.0)  # raises where it heeds no goal position
+    assert node.settings is not None
+    assert goal.low is not None
+    assert goal.high is not None
+    lowest, highest = float(node.value(row, row.low)), float(node.value(row, row.high))
+    factor = node.settings.factors[row.name]
+    return _Seat(node.node, node, row, factor, row.scale, lowest, highest, goal.low, goal.high)

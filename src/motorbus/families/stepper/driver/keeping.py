@@ -1,0 +1,167 @@
+"""Moving by an angle as long as others need, and beginning when they begin: what this controller can do for a pose.
+
+It cannot be led. It makes a move by a profile of its own, which is said to it before; so the duration is agreed on
+first, project 1 is edited for a move that takes so long, which needs a second or two on the line, and then everybody
+waits until all are ready. The order leaves so much before the common start as it needs to be heard.
+
+No position comes back. When it began is known from when the order left, and where it is from a model: all of it is
+*estimated*.
+"""
+
+from __future__ import annotations
+
+from math import tau
+from typing import Final, NamedTuple
+
+from motorbus.core.family import Timing, Turned
+from motorbus.core.operation import Operation, Pause, Tune, outcome
+from motorbus.errors import MotorbusError
+from motorbus.families.stepper import wire
+from motorbus.families.stepper.driver import commands, goals
+from motorbus.families.stepper.driver.borrowing import PROJECT, Accord, borrowed
+from motorbus.families.stepper.driver.exchanges import timed
+from motorbus.families.stepper.driver.jogging import grounded
+from motorbus.families.stepper.driver.line import BITS
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.pacing import (
+    check,
+    first_pulse,
+    fitted,
+    lasts,
+    moved,
+    nearest,
+    quickest,
+)
+from motorbus.families.stepper.driver.reading import image, read_input
+from motorbus.families.stepper.driver.turning import Watch, honest, longest, waited
+from motorbus.families.stepper.table import Project, decode_image
+
+VERB: Final = "keep_time"
+READS: Final = 2
+"""How often something short is asked before, to know how fast the line is."""
+HELD: Final = 0.02
+"""s by which an acknowledgement may be late before it is taken for one of an order that left late."""
+_INPUT: Final = 1
+"""Which input is read for that; what it says is no matter."""
+
+
+def keep_time(
+    node: Node, angle: float, timing: Timing, *, velocity: float, acceleration: float | None = None
+) -> Operation[Turned]:
+    """Turn the motor by an angle (rad, forward positive) as long as others take, and begin with them.
+
+    At most at `velocity` (rad/s, in whole RPM, not above it), and at most as steep as `acceleration` (rad/s²) in every
+    reading of the controller's numbers, as far as these go: the number 1 is the gentlest, and from rest it jumps to the
+    start frequency. None is the number of step 1. Journalled, alone on the bus and given back as `move_by`.
+
+    First all is checked that can be, then it is agreed how long it takes, then project 1 is edited for a move that
+    takes so long or most nearly so long: a slow one may be much too quick, for the slowest speed is 1 RPM. The common
+    start is its first pulse, and the end its last; where the motor is meanwhile, and both of these, are *estimated*:
+    with another reading of the ramp it takes longer. So it is waited for as long as the slowest reading says, then
+    stopped.
+
+    Raises RequestError, with nothing sent that changes anything and before anything is agreed, for an angle of less
+    than a pulse or too far, a velocity below 1 RPM, an acceleration not above 0, and as `borrowed` for what it refuses;
+    Interrupted when the others do not begin or somebody has said stop before, and project 1 is given back; all of
+    these have moved nothing, and are `unmoved`. Interrupted when somebody stops it, OutcomeUnknown when the order was
+    not acknowledged, and whatever else: where the motor stands is not known then.
+    """
+    check(angle, velocity, acceleration)
+    watch = Watch(node)
+    tempo, true = Tempo(0.0, 0.0), Project()
+
+    def wanted(project: Project) -> Operation[Project]:
+        return quickest((yield from grounded(node, project, VERB, 1)), angle, velocity, acceleration)
+
+    def settled(quick: Project) -> Operation[Project]:
+        nonlocal true
+        true = quick
+        yield from _on_guard(node, quick, watch)
+        seconds = yield from timing.agreed(lasts(quick), lambda others: lasts(fitted(quick, others)))
+        watch.check_before()
+        return nearest(quick, seconds)
+
+    def ready(project: Project) -> Operation[None]:
+        nonlocal tempo
+        tempo = yield from _tempo(node)
+        watch.check_before()
+        yield from timing.start(tempo.hears + first_pulse(project))
+
+    def motion(project: Project) -> Operation[Turned]:
+        return (yield from _turned(node, project, true, watch, tempo))
+
+    return (yield from honest(watch, borrowed(node, VERB, wanted, motion, accord=Accord(settled, ready))))
+
+
+def shortest(
+    node: Node, angle: float, *, velocity: float, acceleration: float | None = None
+) -> Operation[float]:
+    """s that `keep_time` would take at least for this, *estimated*: project 1 is read, and nothing is written.
+
+    Raises RequestError for what `keep_time` refuses of these numbers and of project 1; and as `dump`.
+    """
+    check(angle, velocity, acceleration)
+    project = decode_image((yield from image(node, PROJECT)), node.order)
+    return lasts(quickest((yield from grounded(node, project, VERB, 1)), angle, velocity, acceleration))
+
+
+def _on_guard(node: Node, project: Project, watch: Watch) -> Operation[None]:
+    """From here on every stop that leaves counts, also one of an emergency that is over when the order would leave.
+
+    Only what moves may ask how many stops have left; so this is an order that never leaves.
+    """
+    told = yield from outcome(commands.motion(node, "run_once", goals.of_move(node, project), watch.look))
+    if isinstance(told, MotorbusError) and told is not watch.looked:
+        raise told
+
+
+class Tempo(NamedTuple):
+    """How fast this line is: `hears` s from handing an order over to its being heard, `answers` s to its answer."""
+
+    hears: float
+    answers: float
+
+    def heard(self, left: float, answered: float) -> float:
+        """When an order was heard (s on the link's clock) that was handed over and answered then.
+
+        One whose answer comes late has left late, behind a question of the bus. Nobody knows how late a line is that
+        answers late; so that little is put down to the answer.
+        """
+        if answered - left > self.answers + HELD:
+            return answered - (self.answers - self.hears)
+        return left + self.hears
+
+
+def _tempo(node: Node) -> Operation[Tempo]:
+    """As it is now. Where an answer is there before it can be, bytes take no time: a socket, or no line at all.
+
+    That a motion begins when the last byte of its order was heard is an assumption; an answer takes as much longer as
+    the controller thinks.
+    """
+    rate = yield from Tune(0)
+    answers: list[float] = []
+    for _ in range(READS):
+        left = yield from Pause(0)
+        answers.append((yield from timed(read_input(node, _INPUT))) - left)
+    byte = BITS / rate
+    paced = min(answers) >= byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH)
+    return Tempo(byte * wire.REQUEST_LENGTH if paced else 0.0, min(answers))
+
+
+def _turned(node: Node, project: Project, true: Project, watch: Watch, tempo: Tempo) -> Operation[Turned]:
+    """The order, and the wait until the motion is over by the slowest reading; who calls it says stop.
+
+    What `project` says of angles may be of another motor, see `pacing`; the `true` one has as many pulses.
+    """
+    move, sign = moved(project), project.step(1).sign
+    pulse = tau / float(true.pulses_per_turn or 1)
+    left = yield from Pause(0)
+    answered = yield from timed(commands.motion(node, "run_once", goals.of_move(node, true), watch.refusal))
+    yield from waited(watch, longest(project, move.pulses), "moving")
+    first = move.moment(1)
+
+    def way(seconds: float) -> float:
+        return sign * pulse * move.done(first + seconds) if seconds >= 0 else 0.0
+
+    whole = sign * pulse * (move.pulses or 0)
+    return Turned(node.node, whole, tempo.heard(left, answered) + first, lasts(project), way)

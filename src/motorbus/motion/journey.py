@@ -1,0 +1,181 @@
+"""One movement of axes on any number of buses: all of them begin it at the same moment, or none does.
+
+It comes in steps that every part of it goes through (`parts`): find out where the axes stand, meet and plan, agree on
+how long it takes, make ready, agree on the moment, go, arrive. Axes that can be led are one part for each bus; an axis
+that moves by a profile of its own is a part by itself. Whatever goes wrong before the moment, nobody moves; afterwards,
+all are stopped. Here is what the parts share, and what becomes of their results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from motorbus.core.operation import Operation, Together
+from motorbus.errors import Interrupted, MotorbusError, RequestError
+from motorbus.motion import parts
+from motorbus.motion.abreast import Abreast
+from motorbus.motion.meeting import Beat, Meeting, Seat
+from motorbus.motion.moved import Moved
+from motorbus.motion.plan import Fact, Gone, Plan, Planned
+from motorbus.motion.profile import Limiting
+from motorbus.motion.profile.shapes import NOTHING
+from motorbus.motion.stream import Fate
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+
+CLOSE: Final = 0.02
+"""Of a duration that somebody asked for: it may be longer by so much, for a device may have only some speeds."""
+ROUNDING: Final = 1e-6
+"""Of a duration; less is no difference."""
+
+
+class Journey:
+    """A movement of these `axes`, by their names; `origins` as in a `Body`. `rate` (Hz) is that of what is led."""
+
+    def __init__(
+        self,
+        axes: Mapping[str, AxisVerbs],
+        plan: Plan,
+        origins: Mapping[str, float],
+        rate: float | None = None,
+    ) -> None:
+        self.plan: Final = plan
+        self.rate: Final = rate
+        self.fate: Final = Fate()
+        self.unstopped: Final[dict[str, MotorbusError]] = {}
+        self.needs: Final[dict[str, float]] = {}
+        self.outline: Planned | None = None
+        self.duration = 0.0
+        self._axes: Final = axes
+        self._origins: Final = origins
+        self._parties: Final = _parties(axes)
+        self._facts: Final = Meeting[Mapping[str, Fact]](self._parties)
+        self._beat: Final = Beat(self._parties)
+
+    # -- as work on buses ----------------------------------------------------------------------------------------------
+
+    def abreast(self) -> Abreast[Moved]:
+        """The work on each bus, and what comes of it."""
+        buses = dict.fromkeys(axis.spec.bus for axis in self._axes.values())
+        return Abreast({bus: self.on(bus) for bus in buses}, self.combine)
+
+    def on(self, bus: str) -> Operation[list[Gone]]:
+        """All that is to do on one bus."""
+        there = {party: axes for party, axes in self._parties.items() if axes[0].spec.bus == bus}
+        return (yield from Together([parts.part(self, party, axes) for party, axes in there.items()]))
+
+    def combine(self, results: Mapping[str, Any]) -> Moved:
+        """What came of the whole. Raises what went wrong first, with a note for each axis that did not stop."""
+        errors = [told for told in results.values() if isinstance(told, MotorbusError)]
+        if errors:
+            raise self._noted(self.fate.failure or errors[0], errors)
+        gone = {bus: one for bus, told in results.items() for one in told}
+        axes = {name: one for told in results.values() for part in told for name, one in part.axes.items()}
+        tracks = {
+            name: one for told in results.values() for part in told for name, one in part.tracks.items()
+        }
+        cycles = {
+            bus: part.cycles for bus, told in results.items() for part in told if part.cycles is not None
+        }
+        assert self.outline is not None or not gone
+        return Moved(
+            self.duration,
+            {name: axes[name] for name in self._axes},
+            self._limited_by(),
+            {name: tracks[name] for name in self._axes},
+            cycles,
+        )
+
+    def _limited_by(self) -> Limiting:
+        """What the plan says, unless a device that moves by its own profile needs longer than that."""
+        if self.outline is None:
+            return Limiting("", "nothing")
+        slowest = max(self.needs, key=lambda name: self.needs[name], default="")
+        if slowest and self.needs[slowest] > self.outline.course.duration * (1 + ROUNDING):
+            return Limiting(slowest, "velocity")
+        return self.outline.limited_by
+
+    def _noted(self, error: MotorbusError, errors: list[MotorbusError]) -> MotorbusError:
+        said = {str(error)}
+        for other in errors:
+            if not isinstance(other, Interrupted) and str(other) not in said:
+                said.add(str(other))
+                error.add_note(f"also: {other}")
+        for name, failure in self.unstopped.items():
+            if not isinstance(failure, Interrupted):
+                error.add_note(f"{name} did not accept the stop that followed: {failure}")
+        return error
+
+    # -- what the parts share ------------------------------------------------------------------------------------------
+
+    def fail(self, error: BaseException) -> None:
+        """A part cannot go on: who has not begun does not begin, who is under way stops."""
+        known = error if isinstance(error, MotorbusError) else _interrupted(error)
+        self._facts.fail(known)
+        self._beat.fail(known)
+        self.fate.fail(known)
+
+    def seat(self, party: str, bus: str) -> Seat:
+        """How a part keeps time with the others."""
+        return self._beat.of(party, self._origins[bus])
+
+    def meet(self, party: str, facts: Mapping[str, Fact]) -> Operation[Mapping[str, Fact]]:
+        """Say where these axes stand, and get to know where all do."""
+        told = yield from self._facts.meet(party, facts)
+        return {name: fact for one in told.values() for name, fact in one.items()}
+
+    def outlined(self, facts: Mapping[str, Fact]) -> Planned:
+        """The movement as quick as it may be, or as long as was asked for. Raises what refuses it."""
+        self.outline = self.plan.planned(facts, self.plan.asked)
+        return self.outline
+
+    def agreed(self, facts: Mapping[str, Fact], duration: float) -> Planned:
+        """The movement in the time (s) that all have agreed on. Raises RequestError when that was not asked for."""
+        asked = self.plan.asked
+        if asked is not None and duration > max(asked, self._shortest()) * (1 + CLOSE):
+            slowest = max(self.needs, key=lambda name: self.needs[name], default="it")
+            raise RequestError(
+                f"{asked:.6g} s is too short: {slowest} needs {duration:.4g} s",
+                expected=f"{duration:.4g} s or more",
+                cause=f"how fast its device can go by its own profile, and how it speeds up: {slowest}",
+                advice=f"give it more time, or leave the duration out for the quickest; {NOTHING}",
+            )
+        self.duration = duration
+        return self.plan.planned(facts, duration)
+
+    def _shortest(self) -> float:
+        return self.outline.course.duration if self.outline is not None else 0.0
+
+    def reports(self, party: str) -> bool:
+        """Whether this part tells the progress of all."""
+        return party == next(iter(self._parties))
+
+
+def _parties(axes: Mapping[str, AxisVerbs]) -> dict[str, list[AxisVerbs]]:
+    """The parts of a movement: the axes of a bus that are led, and each axis that moves by its own profile.
+
+    Raises RequestError for an axis that can be moved in neither way.
+    """
+    found: dict[str, list[AxisVerbs]] = {}
+    for name, axis in axes.items():
+        if "train" in axis.able:
+            found.setdefault(axis.spec.bus, []).append(axis)
+        elif "keep_time" in axis.able:
+            found[name] = [axis]
+        else:
+            raise RequestError(
+                f"{name}: {axis.spec.device} cannot be moved to a position",
+                expected="a device that takes goals, or one that can keep time with others",
+                advice=f"leave it out; {NOTHING}",
+            )
+    return dict(sorted(found.items(), key=lambda one: "train" not in one[1][0].able))
+
+
+def _interrupted(error: BaseException) -> Interrupted:
+    return Interrupted(
+        "the movement was interrupted",
+        cause=str(error) or type(error).__name__,
+        advice="all its axes were told to stop; give the order again if it is still wanted",
+    )

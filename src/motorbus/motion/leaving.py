@@ -1,0 +1,162 @@
+"""How a machine is left when a program ends, however that comes: hold, torque off, park, or leave it alone.
+
+Only axes that were given torque or moved from here are concerned, and each does what the machine file says of it. What
+moves is stopped first, whatever happens to some; then what is to be limp lets go; parking comes last, for it takes its
+time. An interruption while this goes on takes the parking away and nothing else. Blocking and async robots carry out
+the same steps, so they are said as what comes next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
+from motorbus.motion import axis as one
+from motorbus.motion.abreast import Abreast
+from motorbus.motion.axis import AxisVerbs
+from motorbus.motion.body import Body
+from motorbus.motion.moving import park
+from motorbus.motion.several import Act, errors_of, gathered, insisted, of_each
+
+TRIES: Final = 3
+"""How often a step is begun again that an interruption took away before it had visited everyone."""
+
+
+class Leaving:
+    """What is to be done yet before a machine is left: ask for `work`, carry it out, and ask again until it is None.
+
+    `errors` by the names of the axes, `said` is what a person ought to know. Whoever carries it out calls `hurry` when
+    an interruption comes, and `failed` with what the work raised.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self.errors: dict[str, MotorbusError] = {}
+        self.said: list[str] = []
+        self._body = body
+        self._axes = {
+            name: axis for name, axis in body.axes.items() if axis.engaged and axis.spec.exit != "leave"
+        }
+        self._visited: set[tuple[str, str]] = set()
+        self._tries: dict[str, int] = {}
+        self._parks: list[list[str]] | None = None
+        self._parking: list[str] = []
+        self._hurried = False
+
+    def work(self) -> Abreast[Any] | None:
+        """What to do next; None when all is done."""
+        return (
+            self._visit("stop", self._to_stop(), one.stop)
+            or self._visit("let go", self._to_let_go(), one.disable_torque)
+            or self._park()
+            or self._visit("stop again", self._to_stop_again(), one.stop)
+        )
+
+    def hurry(self) -> None:
+        """Somebody does not want to wait: nothing is parked any more."""
+        skipped = [name for name in self._parked() if name not in self.errors] if self._parks != [] else []
+        if skipped and not self._hurried:
+            self.said.append(f"{', '.join(skipped)}: not parked, for it was interrupted")
+        self._hurried, self._parks = True, []
+
+    def failed(self, error: MotorbusError) -> None:
+        """The work raised this. Axes that could not park together try alone, unless something was in their way."""
+        names, self._parking = self._parking, []
+        for name in names:
+            self.errors[name] = error
+        if len(names) > 1 and not isinstance(error, Stalled | Interrupted) and self._parks is not None:
+            self._parks += [[name] for name in names]
+
+    @property
+    def error(self) -> MotorbusError | None:
+        """One error for everything that failed, None when nothing did."""
+        return gathered(self.errors) if self.errors else None
+
+    # -- who -----------------------------------------------------------------------------------------------------------
+
+    def _to_stop(self) -> list[str]:
+        """Those under way. After an emergency stop nothing moves, and a goal would be refused."""
+        moving = [name for name, axis in self._axes.items() if axis.under_way]
+        latched = [name for name in moving if self._latched(name)]
+        if latched and not self._tries:
+            self.said.append(
+                f"{', '.join(latched)}: nothing was sent, for the emergency stop is still in force"
+            )
+        return [name for name in moving if name not in latched]
+
+    def _to_let_go(self) -> list[str]:
+        return [name for name, axis in self._axes.items() if axis.spec.exit == "torque_off"]
+
+    def _parked(self) -> list[str]:
+        return [name for name, axis in self._axes.items() if axis.spec.exit == "park"]
+
+    def _to_stop_again(self) -> list[str]:
+        return [name for name in self._parked() if self._axes[name].under_way and not self._latched(name)]
+
+    def _latched(self, name: str) -> bool:
+        return bool(self._body.buses[self._axes[name].spec.bus].turns.latched)
+
+    # -- what ----------------------------------------------------------------------------------------------------------
+
+    def _visit(self, step: str, names: Iterable[str], act: Act[Any]) -> Abreast[Any] | None:
+        """Do it to each of these who has not been visited in this step; None when there is none left."""
+        axes = {name: self._axes[name] for name in names if (step, name) not in self._visited}
+        if not axes or self._tries.get(step, 0) >= TRIES:
+            return None
+        self._tries[step] = self._tries.get(step, 0) + 1
+        parts = self._body.by_bus(axes)
+
+        def combine(results: Mapping[str, Any]) -> None:
+            told = of_each(parts, results)
+            self._visited.update((step, name) for name in told)
+            self.errors.update(errors_of(told))
+
+        return Abreast(
+            {bus: insisted(there, self._noting(step, act)) for bus, there in parts.items()}, combine
+        )
+
+    def _noting(self, step: str, act: Act[Any]) -> Act[Any]:
+        """The same, which counts as visited as soon as it has ended, even when an interruption takes the result."""
+
+        def noted(axis: AxisVerbs) -> Any:
+            try:
+                told = yield from act(axis)
+            except MotorbusError as error:
+                self.errors[axis.name] = error
+                self._visited.add((step, axis.name))
+                raise
+            self._visited.add((step, axis.name))
+            return told
+
+        return noted
+
+    def _park(self) -> Abreast[Any] | None:
+        if self._parks is None:
+            self._parks = self._first_parks()
+        if not self._parks:
+            return None
+        self._parking = self._parks.pop(0)
+        for name in self._parking:
+            self.errors.pop(name, None)
+        return park(self._body, list(self._parking))
+
+    def _first_parks(self) -> list[list[str]]:
+        """All that can be parked, together: not what is latched, could not be stopped, or is nobody knows where."""
+        able: list[str] = []
+        for name in self._parked():
+            axis = self._axes[name]
+            if self._latched(name):
+                self.said.append(f"{name}: not parked, for the emergency stop is still in force")
+            elif name not in self.errors and self._known(axis):
+                able.append(name)
+        return [able] if able else []
+
+    def _known(self, axis: AxisVerbs) -> bool:
+        if axis.reckoning is None:
+            return True
+        try:
+            axis.reckoning.known(axis.name)
+        except NotHomed as error:
+            self.errors[axis.name] = error
+            return False
+        return True

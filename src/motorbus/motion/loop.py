@@ -1,0 +1,323 @@
+"""A control loop over axes of several buses: `robot.loop(rate)`, blocking and on an event loop.
+
+    with robot.loop(rate=200) as loop:
+        for state in loop:                                   # one sync read in, one sync write out
+            loop.goal["elbow"] = 0.5 * state.position["shoulder"]
+
+Entering reads and nothing else. Nothing moves before the first goal of an axis is set; it then gets torque without a jump,
+in a cycle of its own. Goals are followed within velocity and acceleration of the axis, or sent as they are with
+`direct=True`. When the `with` is left, by whatever, no goal follows any more: who follows one and is on its way brakes,
+and what was sent direct is the last that its device knows. What the axes do then is the affair of their exit policy.
+
+Whoever leaves the `for` and stays in the `with` leaves the axes at their last small goal, abruptly where they were quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Generator, Iterable, Iterator, Mapping
+from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
+
+from motorbus.bus.pump import Bus
+from motorbus.errors import MotorbusError
+from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
+from motorbus.motion.body import Body
+from motorbus.motion.budget import RobotBudget
+from motorbus.motion.cycle import straight
+from motorbus.motion.grid import Statistics
+from motorbus.motion.rounds import LoopState, Rounds
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+Names = str | Iterable[str] | None
+
+
+class Goals(Mapping[str, float]):
+    """The goals that are set, in rad (m on a linear axis) by name: `loop.goal["elbow"] = 0.5`.
+
+    One that is set stays until another one is. Setting raises RequestError for an axis that is not in the loop and for
+    what is no number; everything else about a goal is judged before it is sent.
+    """
+
+    def __init__(self, rounds: Rounds) -> None:
+        self._rounds = rounds
+
+    def __setitem__(self, name: str, goal: float) -> None:
+        self._rounds.ask(name, goal)
+
+    def __getitem__(self, name: str) -> float:
+        asked = self._rounds.places[name].asked
+        if asked is None:
+            raise KeyError(name)
+        return asked
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, place in self._rounds.places.items() if place.asked is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def update(self, goals: Mapping[str, float]) -> None:
+        """Set several; all of them are judged by name and kind before the first is set."""
+        for name, goal in goals.items():
+            self[name] = goal
+
+
+class LoopFace:
+    """What a blocking and an async loop have in common.
+
+    `goal` takes goals, `without` names the axes that cannot be in a loop, because nobody can lead their device.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        rate: float,
+        axes: Names = None,
+        *,
+        direct: bool = False,
+        jerk: float | None = None,
+        exactly: bool = False,
+    ) -> None:
+        self._rounds = Rounds(body, rate, axes, direct=direct, jerk=jerk, exactly=exactly)
+        self.goal = Goals(self._rounds)
+
+    @property
+    def rate(self) -> float:
+        """Cycles per second that it was asked for (Hz)."""
+        return self._rounds.rate
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The names of the axes that are in it."""
+        return tuple(self._rounds.places)
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """The names of those that were asked for and cannot be in it."""
+        return self._rounds.without
+
+    def allows(self, name: str, goal: float) -> bool:
+        """Whether the limits of an axis that is in it, and those of its device, allow this goal (rad, m)."""
+        return self._rounds.places[name].allows(goal)
+
+    @property
+    def statistics(self) -> Statistics:
+        """What became of it so far: cycles, overruns, slots that were skipped, readings that were lost, times."""
+        return self._rounds.statistics
+
+    @property
+    def budget(self) -> RobotBudget | None:
+        """What it loads each bus with; None before it is entered."""
+        return self._rounds.budget
+
+
+class Loop(LoopFace):
+    """A loop of a `Robot`; use it in a `with`, and in a `for` inside it. Never ends by itself.
+
+    Raises RequestError on entering for a rate that a bus cannot carry, NoReply when an axis is silent too long,
+    LimitExceeded for a goal that must not be sent (nothing was sent then, and the loop can go on), Interrupted when an
+    axis was stopped from elsewhere; see `Rounds`.
+    """
+
+    def __init__(self, body: Body, conductor: BlockingConductor, rate: float, axes: Names = None, **how: Any) -> None:
+        super().__init__(body, rate, axes, exactly=True, **how)
+        self._conductor = conductor
+        self._only: Bus | None = None
+
+    def __enter__(self) -> Self:
+        _carried(self._rounds.entering(), self._run)
+        buses = [part.bus for part in self._rounds.parts.values()]
+        self._only = buses[0] if len(buses) == 1 and isinstance(buses[0], Bus) else None
+        return self
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> LoopState:
+        return _carried(self._rounds.round(), self._run)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        try:
+            _carried(self._rounds.leaving(), self._run)
+        except MotorbusError as failure:
+            _told(failure, error)
+
+    def _run(self, work: Abreast[Any]) -> Any:
+        """On the only bus there is by the short way, else by the conductor."""
+        if self._only is None or self._rounds.parts_abreast:
+            return self._conductor.run(work)
+        ((bus, operation),) = work.operations.items()
+        try:
+            found = straight(self._only, operation)  # type: ignore[arg-type]  # the work of a loop are generators
+        except MotorbusError as failure:
+            found = failure
+        return work.combine({bus: found})
+
+
+class AsyncLoop(LoopFace):
+    """A loop of an `AsyncRobot`; use it in an `async with`, and in an `async for` inside it. Errors as `Loop` raises.
+
+    An event loop wakes up to a millisecond late, so cycles begin a little later in their slots than those of a `Loop`.
+    """
+
+    def __init__(self, body: Body, conductor: AsyncConductor, rate: float, axes: Names = None, **how: Any) -> None:
+        super().__init__(body, rate, axes, **how)
+        self._conductor = conductor
+
+    async def __aenter__(self) -> Self:
+        await _awaited(self._rounds.entering(), self._conductor.run)
+        return self
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> LoopState:
+        return await _awaited(self._rounds.round(), self._conductor.run)
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        try:
+            await _awaited(self._rounds.leaving(), self._conductor.run)
+        except MotorbusError as failure:
+            _told(failure, error)
+
+
+def blocking_loop(
+    robot: Any, rate: float, axes: Names = None, *, direct: bool = False, jerk: float | None = None
+) -> Loop:
+    """A control loop of `rate` (Hz) over these axes, for a `with` and a `for` in it; see `motorbus.motion.loop`.
+
+    `direct` sends goals as they are: one that is farther from the last than the velocity of the axis allows is refused.
+    Else they are followed, with a `jerk` (rad/s³, m/s³) also within that, by ruckig, an extra. Raises RequestError for
+    what cannot be; nothing is sent before the `with` is entered.
+    """
+    return Loop(robot, robot.conductor, rate, axes, direct=direct, jerk=jerk)
+
+
+def awaiting_loop(
+    robot: Any, rate: float, axes: Names = None, *, direct: bool = False, jerk: float | None = None
+) -> AsyncLoop:
+    """The same for an `async with` and an `async for` in it; see `blocking_loop`."""
+    return AsyncLoop(robot, robot.conductor, rate, axes, direct=direct, jerk=jerk)
+
+
+def _told(failure: MotorbusError, error: BaseException | None) -> None:
+    """What went wrong while leaving: it is raised, or goes along with what made it leave."""
+    if error is None:
+        raise failure
+    error.add_note(f"and on leaving the loop: {failure}")
+
+
+def _carried(works: Generator[Abreast[Any], Any, T], run: Callable[[Abreast[Any]], Any]) -> T:
+    """Carry out one piece of work after the other, and give what they come to."""
+    try:
+        work = next(works)
+        while True:
+            try:
+                told = run(work)
+            except MotorbusError as error:
+                work = works.throw(error)
+            else:
+                work = works.send(told)
+    except StopIteration as end:
+        found: T = end.value
+        return found
+
+
+async def _awaited(
+    works: Generator[Abreast[Any], Any, T], run: Callable[[Abreast[Any]], Coroutine[Any, Any, Any]]
+) -> T:
+    try:
+        work = next(works)
+        while True:
+            try:
+                told = await run(work)
+            except MotorbusError as error:
+                work = works.throw(error)
+            else:
+                work = works.send(told)
+    except StopIteration as end:
+        found: T = end.value
+        return found
+
+
+# -- verbs that are made of a loop ----------------------------------------------------------------------------------
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Course(Protocol[T_co]):
+    """What a verb does in a loop."""
+
+    def step(self, loop: LoopFace, state: LoopState) -> bool:
+        """One cycle has been: set goals. False when it is over."""
+
+    def result(self, loop: LoopFace) -> T_co:
+        """What it has come to, once it is over."""
+
+
+class Errand(NamedTuple, Generic[T]):
+    """A course and the loop that it needs: its rate (Hz), its axes, its `jerk`.
+
+    `before` is carried out first, where there is something. One that is `endless` has no other end than an interruption
+    of its caller, so then Ctrl-C ends it and its result is given; else it is raised as everywhere.
+    """
+
+    course: Course[T]
+    rate: float
+    axes: tuple[str, ...]
+    before: Abreast[Any] | None = None
+    jerk: float | None = None
+    endless: bool = False
+
+
+class looped(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+    """Makes a method of a function that gives an `Errand`: blocking on what is `Led`, awaitable on `LedAsync`."""
+
+    def __init__(self, function: Callable[Concatenate[Any, P], Errand[T]]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, machine: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, machine: Led, owner: type) -> Callable[P, T]: ...
+    @overload
+    def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    def __get__(self, machine: Any, owner: type) -> Any:
+        if machine is None:
+            return self
+        carry_out = _blocking if isinstance(machine, Led) else _awaiting
+        function = self.function
+
+        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
+            return carry_out(machine, function(machine, *args, **kwargs))
+
+        call.__doc__ = self.__doc__
+        return call
+
+
+def _blocking(machine: Any, errand: Errand[T]) -> T:
+    course = errand.course
+    if errand.before is not None:
+        machine.conductor.run(errand.before)
+    with Loop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
+        try:
+            for state in loop:
+                if not course.step(loop, state):
+                    break
+        except KeyboardInterrupt:
+            if not errand.endless:
+                raise
+    return course.result(loop)
+
+
+async def _awaiting(machine: Any, errand: Errand[T]) -> T:
+    course = errand.course
+    if errand.before is not None:
+        await machine.conductor.run(errand.before)
+    async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
+        async for state in loop:
+            if not course.step(loop, state):
+                break
+    return course.result(loop)

@@ -1,0 +1,321 @@
+"""Moving axes to where they shall be: several as one movement, a pose, a trajectory, or a single one.
+
+What a movement shall be is said here, and what refuses it; how it is carried out is said in `journey`. All of these
+raise what is wrong with them before anything is sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from math import copysign, isfinite
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from motorbus.core.operation import Operation, outcome
+from motorbus.errors import RequestError
+from motorbus.motion import limits, reckoning
+from motorbus.motion.abreast import Abreast
+from motorbus.motion.journey import Journey
+from motorbus.motion.moved import Moved
+from motorbus.motion.plan import Fact, Planned
+from motorbus.motion.profile import Kind, Limiting, Limits, Move, Profile, Synchronised, synchronised
+from motorbus.motion.profile.shapes import NOTHING
+from motorbus.motion.profile.together import KINDS
+from motorbus.motion.stream import USUAL
+from motorbus.motion.trajectory import Course, Trajectory, sampled
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.body import Body
+
+GRAIN: Final = 0.003
+"""rad of the device: at least one count of every servo that can be led, at most two of most (0.088 and 0.1 degrees)."""
+
+
+# -- what a movement shall be ------------------------------------------------------------------------------------------
+
+
+class Crisp(NamedTuple):
+    """A synchronised movement whose ends can be seen: what an axis is told at first and at last is more than nothing.
+
+    A gentle profile begins with less than the device can be told, so for a while nothing would move, in an axis with a
+    short way the longer. So from the first order on an axis is at least one `grain` (rad, m) on its way, and it goes
+    the last one when all the others end too.
+    """
+
+    whole: Synchronised
+    grains: Mapping[str, float]
+
+    @property
+    def duration(self) -> float:
+        """How long it takes (s)."""
+        return self.whole.duration
+
+    def positions(self, at: float) -> dict[str, float]:
+        """Where each axis shall be `at` seconds after the beginning (rad, m)."""
+        if not 0 < at < self.whole.duration:
+            return self.whole.positions(at)
+        return {
+            name: _within(profile, profile.position(at), self.grains[name])
+            for name, profile in self.whole.profiles.items()
+        }
+
+
+def _within(profile: Profile, place: float, grain: float) -> float:
+    """A place on the way that is a grain from its beginning, and from its end unless it is so short."""
+    way = profile.goal - profile.start
+    if abs(way) <= grain:
+        return profile.goal
+    done = (place - profile.start) * copysign(1.0, way)
+    done = max(grain, min(done, abs(way) - grain))
+    return profile.start + copysign(done, way)
+
+
+class PointToPoint(NamedTuple):
+    """From where the axes stand to these goals: places, or ways from there; (rad, m). See `journey.Plan`."""
+
+    axes: Mapping[str, AxisVerbs]
+    goals: Mapping[str, Callable[[float], float]]
+    limits: Mapping[str, Limits]
+    kind: Kind = "trapezoid"
+    asked: float | None = None
+
+    def planned(self, facts: Mapping[str, Fact], duration: float | None = None) -> Planned:
+        """The movement; raises LimitExceeded for a goal that an axis or its device does not allow."""
+        goals = {name: goal(facts[name].position) for name, goal in self.goals.items()}
+        for name, goal in goals.items():
+            axis, fact = self.axes[name], facts[name]
+            at_once = None if "train" in axis.able else fact.position
+            limits.check_goal(name, axis.spec, goal, measured=at_once, device=fact.device)
+        moves = {name: Move(facts[name].position, goal, self.limits[name]) for name, goal in goals.items()}
+        whole = synchronised(moves, kind=self.kind, duration=duration)
+        grains = {name: GRAIN / abs(axis.spec.ratio) for name, axis in self.axes.items()}
+        speeds = {name: profile.peak for name, profile in whole.profiles.items()}
+        return Planned(Crisp(whole, grains), goals, speeds, self.limits, whole.limited_by)
+
+
+class Along(NamedTuple):
+    """Along a trajectory, from its first sample on; all axes can be led. See `journey.Plan`."""
+
+    axes: Mapping[str, AxisVerbs]
+    trajectory: Trajectory
+    asked: float | None = None
+
+    def planned(self, facts: Mapping[str, Fact], duration: float | None = None) -> Planned:
+        """The movement; raises LimitExceeded for the first sample that an axis or its device does not allow."""
+        specs = {name: axis.spec for name, axis in self.axes.items()}
+        limits.check_course(self.trajectory, specs, {name: fact.device for name, fact in facts.items()})
+        own = {name: Limits.of(spec) for name, spec in specs.items()}
+        goals = {name: places[-1] for name, places in self.trajectory.axes.items()}
+        speeds = {name: one.velocity for name, one in own.items()}
+        return Planned(self.trajectory, goals, speeds, own, Limiting("", "duration"))
+
+
+# -- several axes ------------------------------------------------------------------------------------------------------
+
+
+def move(
+    body: Body,
+    goals: Mapping[str, float],
+    *,
+    duration: float | None = None,
+    kind: Kind = "trapezoid",
+    speed: float = 1.0,
+) -> Abreast[Moved]:
+    """Move axes to these goals (rad, m, by their names): all begin together and all end together.
+
+    It is as quick as the slowest axis can, or takes `duration` (s). `speed` (above 0, at most 1) makes all of it so
+    much slower: with 0.5 it takes twice the time. `kind` is `trapezoid`, or `minimum_jerk`, which is gentler; an axis
+    whose device has a profile of its own moves by that.
+
+    Raises before anything moves: RequestError for a name that is no axis and for a duration that is too short,
+    LimitExceeded for a goal, NotHomed for an axis of which nobody knows where it is, NoReply. When anything goes wrong
+    on the way, all axes are stopped and that is raised: Stalled, NoReply, Interrupted by a stop or another order.
+    """
+    return Journey(*_moving(body, goals, duration, kind, speed)).abreast()
+
+
+def pose(
+    body: Body,
+    name: str,
+    *,
+    duration: float | None = None,
+    kind: Kind = "trapezoid",
+    speed: float = 1.0,
+) -> Abreast[Moved]:
+    """Move to a pose of the machine file; see `move`. Raises RequestError when there is none of this name."""
+    return move(body, body.machine.pose(name), duration=duration, kind=kind, speed=speed)
+
+
+def park(
+    body: Body,
+    names: str | Iterable[str] | None = None,
+    *,
+    duration: float | None = None,
+    kind: Kind = "trapezoid",
+    speed: float = 1.0,
+) -> Abreast[Moved]:
+    """Move axes to where the machine file says that they park; see `move`. Without names, all that have such a place.
+
+    Raises RequestError for an axis that has none, and when none has one.
+    """
+    axes = body.chosen(names)
+    places = {name: axis.spec.park for name, axis in axes.items()}
+    goals = {name: place for name, place in places.items() if place is not None}
+    missing = [name for name in places if name not in goals]
+    if missing and (names is not None or not goals):
+        raise RequestError(
+            f"{', '.join(missing)} has no place to park",
+            expected="axes with `park` in the machine file",
+            advice=f'add one, as park = "0 {axes[missing[0]].spec.unit}"; {NOTHING}',
+        )
+    return move(body, goals, duration=duration, kind=kind, speed=speed)
+
+
+def replay(
+    body: Body, trajectory: Course, *, speed: float = 1.0, rate: float | None = None
+) -> Abreast[Moved]:
+    """Go along a trajectory: first to its beginning in one movement, then as it says. Its goals leave at `rate` (Hz).
+
+    `speed` (above 0) is how much faster it goes: 0.5 takes twice the time. A route is sampled first. What comes back is
+    of the trajectory, without the way to its beginning.
+
+    Raises RequestError for an axis that cannot be led: a device that moves by a profile of its own goes from point to
+    point only. Raises LimitExceeded for the first sample that goes beyond a limit; else as `move`.
+    """
+    plan, first = _replayed(body, trajectory, speed)
+    approach = Journey(*_moving(body, first, None, "trapezoid", min(speed, 1.0)))
+    journey = Journey(plan.axes, plan, body.origins, rate)
+    buses = dict.fromkeys(axis.spec.bus for axis in plan.axes.values())
+
+    def on(bus: str) -> Operation[list[object]]:
+        try:
+            yield from approach.on(bus)
+        except BaseException as error:
+            journey.fail(approach.fate.failure or error)
+            raise
+        return list((yield from journey.on(bus)))
+
+    return Abreast({bus: on(bus) for bus in buses}, journey.combine)
+
+
+def _moving(
+    body: Body, goals: Mapping[str, float], duration: float | None, kind: Kind, speed: float
+) -> tuple[Mapping[str, AxisVerbs], PointToPoint, Mapping[str, float]]:
+    """What a journey to these goals is made of, as far as it can be judged without asking anybody."""
+    if not goals:
+        raise RequestError("no axis is named", expected="a goal for one or more", advice=NOTHING)
+    axes = {name: body.axis(name) for name in goals}
+    own = {name: limits.limits_for(name, axis.spec, speed=speed) for name, axis in axes.items()}
+    _check(kind, duration)
+    for name, goal in goals.items():
+        limits.check_goal(name, axes[name].spec, goal)
+    return (
+        axes,
+        PointToPoint(axes, {name: _to(goal) for name, goal in goals.items()}, own, kind, duration),
+        body.origins,
+    )
+
+
+def _replayed(body: Body, course: Course, speed: float) -> tuple[Along, dict[str, float]]:
+    """What a replay is made of, and where it begins."""
+    if not (isfinite(speed) and speed > 0):
+        raise RequestError(f"speed is {speed}", expected="a finite number above 0", advice=NOTHING)
+    trajectory = course if isinstance(course, Trajectory) else sampled(course, USUAL)
+    axes = {name: body.axis(name) for name in trajectory.axes}
+    for name, axis in axes.items():
+        if "train" not in axis.able:
+            raise RequestError(
+                f"{name} cannot go along a trajectory: {axis.spec.device} moves by a profile of its own",
+                expected="axes that can be led",
+                advice=f"leave it out, and move it from point to point; {NOTHING}",
+            )
+    plan = Along(axes, trajectory if speed == 1.0 else trajectory.scaled(1 / speed))
+    limits.check_course(plan.trajectory, {name: axis.spec for name, axis in axes.items()})
+    return plan, {name: places[0] for name, places in trajectory.axes.items()}
+
+
+# -- one axis ----------------------------------------------------------------------------------------------------------
+
+
+def move_axis(
+    axis: AxisVerbs,
+    to: float,
+    *,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    duration: float | None = None,
+) -> Operation[Moved]:
+    """Move to a position (rad, m) within a velocity and an acceleration (rad/s, m/s and per s²), and those of the axis.
+
+    As quick as these allow, or in `duration` (s). Returns when it is there. Raises as `Robot.move`, and LimitExceeded
+    for a velocity or an acceleration above that of the axis.
+    """
+    limits.check_goal(axis.name, axis.spec, to)
+    own = limits.limits_for(axis.name, axis.spec, velocity=velocity, acceleration=acceleration)
+    return (yield from _alone(axis, _to(to), own, duration))
+
+
+def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Operation[float]:
+    """Move by so far (rad, m) from where it is, at so much (rad/s, m/s; None: the fastest that the axis may).
+
+    Returns the way that was gone: measured, or *estimated* where the device does not tell where it is. Such an axis may
+    be moved by a way also while nobody knows where it is. Raises as `move`.
+    """
+    if "train" not in axis.able:
+        return (yield from reckoning.move_by(axis, way, velocity=velocity))
+    limits.check_finite(axis.name, "way", way)
+    own = limits.limits_for(axis.name, axis.spec, velocity=velocity)
+    return _way((yield from _alone(axis, _by(way), own)), axis.name)
+
+
+def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
+    """Move at a velocity (rad/s, m/s, with its sign) for so long (s), starting and stopping within it.
+
+    Returns the way that was gone, as `move_by`. Raises LimitExceeded, and nothing is sent, when the way would lead out
+    of the limits; else as `move`.
+    """
+    if "train" not in axis.able:
+        return (yield from reckoning.jog(axis, velocity, seconds))
+    limits.check_velocity(axis.name, axis.spec, velocity)
+    if not (isfinite(seconds) and seconds > 0) or not velocity:
+        raise RequestError(
+            f"{axis.name}: {velocity} for {seconds} s is no jog",
+            expected="a velocity that is not 0, and a finite time above 0",
+            advice=NOTHING,
+        )
+    own = limits.limits_for(axis.name, axis.spec, velocity=abs(velocity))
+    ramp = min(own.velocity / own.acceleration, seconds / 2)
+    way = copysign(own.acceleration * ramp * (seconds - ramp), velocity)
+    return _way((yield from _alone(axis, _by(way), own)), axis.name)
+
+
+def _alone(
+    axis: AxisVerbs, goal: Callable[[float], float], own: Limits, duration: float | None = None
+) -> Operation[Moved]:
+    _check("trapezoid", duration)
+    axes = {axis.name: axis}
+    plan = PointToPoint(axes, {axis.name: goal}, {axis.name: own}, "trapezoid", duration)
+    journey = Journey(axes, plan, {axis.spec.bus: 0.0})
+    told = yield from outcome(journey.on(axis.spec.bus))
+    return journey.combine({axis.spec.bus: told})
+
+
+def _way(moved: Moved, name: str) -> float:
+    """How far it has gone (rad, m)."""
+    presents = moved.tracks[name].presents
+    return moved.axes[name].present - presents[0] if presents else 0.0
+
+
+def _to(goal: float) -> Callable[[float], float]:
+    return lambda _: goal
+
+
+def _by(way: float) -> Callable[[float], float]:
+    return lambda start: start + way
+
+
+def _check(kind: Kind, duration: float | None) -> None:
+    if kind not in KINDS:
+        raise RequestError(f"{kind!r} is no kind of profile", expected=" or ".join(KINDS), advice=NOTHING)
+    if duration is not None and not (isfinite(duration) and duration > 0):
+        raise RequestError(f"duration is {duration}", expected="a finite number of s above 0", advice=NOTHING)

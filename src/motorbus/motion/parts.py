@@ -1,0 +1,275 @@
+"""The parts of a journey: the axes of one bus that are led together, and an axis that keeps time by itself.
+
+Both go through the same steps, and both end in one of two ways: all of it has arrived, or it was told to stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from motorbus.core.family import Turned
+from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards
+from motorbus.errors import NoReply
+from motorbus.motion import axis as one
+from motorbus.motion import limits
+from motorbus.motion.command import Command
+from motorbus.motion.moved import STILL, Arrived, Track
+from motorbus.motion.plan import Fact, Gone, Planned
+from motorbus.motion.stream import SHOWN, Stream, rate_for
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.journey import Journey
+    from motorbus.motion.meeting import Seat
+
+LOOK: Final = 0.02
+"""s between two looks at whether the others have failed, while an axis moves by its own profile."""
+DRAWN: Final = 0.02
+"""s between two points of the track of such an axis."""
+SPARE: Final = 1.25
+"""Times the highest speed of its course is what an axis may take to keep up with it."""
+NO_WAY: Final = 1e-9
+"""rad or m; an axis that has less to go stays where it is."""
+
+
+def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
+    """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
+    led = "train" in axes[0].able
+    work: Led | Own = Led(journey, party, axes) if led else Own(journey, party, axes[0])
+    yield from afterwards(_failing(journey, work.run()), lambda: _ended(journey, work))
+    assert work.gone is not None
+    return work.gone
+
+
+def _failing(journey: Journey, work: Operation[None]) -> Operation[None]:
+    """Let the other parts know when this one fails."""
+    try:
+        yield from work
+    except BaseException as error:
+        journey.fail(error)
+        raise
+
+
+def _ended(journey: Journey, work: Led | Own) -> Operation[None]:
+    """Stop what was begun and has not arrived."""
+    if work.begun and work.gone is None:
+        journey.unstopped.update((yield from work.command.stop()))
+
+
+class Led:
+    """The axes of one bus, led along the course."""
+
+    def __init__(self, journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> None:
+        self.command: Final = Command(axes)
+        self.begun = False
+        self.gone: Gone | None = None
+        self._journey: Final = journey
+        self._party: Final = party
+        self._axes: Final = axes
+        self._bus: Final = axes[0].bus
+
+    def run(self) -> Operation[None]:
+        """See `part`."""
+        journey, axes = self._journey, self._axes
+        train = yield from axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate)
+        looked = yield from self._looked(train)
+        rate = rate_for(self._bus, train, _angles(axes, looked), journey.rate)
+        facts = yield from journey.meet(self._party, looked)
+        seat = journey.seat(self._party, axes[0].spec.bus)
+        shortest = journey.outlined(facts).course.duration
+        planned = journey.agreed(facts, (yield from seat.agreed(shortest, _any)))
+        stream = Stream(
+            axes,
+            train,
+            planned.course,
+            rate=rate,
+            speeds=planned.speeds,
+            command=self.command,
+            fate=journey.fate,
+            reports=journey.reports(self._party),
+        )
+        yield from self._ready(train, planned)
+        lead = stream.lead(self._bus)
+        streamed = yield from stream.run((yield from seat.start(lead)), lead)
+        for axis in axes:
+            axis.arrives()
+        arrived = {axis.name: _seen(axis, facts, planned, streamed.tracks[axis.name]) for axis in axes}
+        self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
+
+    def _looked(self, train: Any) -> Operation[dict[str, Fact]]:
+        """Where they stand, and how far their devices let them go."""
+        told = yield from Together(list(train.positions))
+        angles = {node: angle for one in told for node, angle in one.values.items()}
+        devices = yield from Together([limits.of_device(axis) for axis in self._axes])
+        for axis in self._axes:
+            if axis.spec.node not in angles:
+                raise _silent(axis)
+        return {
+            axis.name: Fact(axis.spec.from_device(angles[axis.spec.node]), device)
+            for axis, device in zip(self._axes, devices, strict=True)
+        }
+
+    def _ready(self, train: Any, planned: Planned) -> Operation[None]:
+        """Torque on where they stand, and as quick in following as the course needs it."""
+        self.command.depart()
+        self.begun = True
+        for axis in self._axes:
+            yield from one.cap(axis)
+        yield from train.begin({axis.spec.node: _following(axis, planned) for axis in self._axes})
+
+
+class Own:
+    """An axis that moves by a profile of its own, from where it is reckoned to be."""
+
+    def __init__(self, journey: Journey, party: str, axis: AxisVerbs) -> None:
+        self.command: Final = Command([axis])
+        self.gone: Gone | None = None
+        self._journey: Final = journey
+        self._axis: Final = axis
+        self._timing: Final = Kept(journey, party, axis)
+        self._over = False
+
+    @property
+    def begun(self) -> bool:
+        """Whether it may have been told to move."""
+        return self._timing.moment is not None
+
+    def run(self) -> Operation[None]:
+        """See `part`."""
+        axis, timing = self._axis, self._timing
+        assert axis.reckoning is not None
+        stood = axis.reckoning.known(axis.name)
+        yield from timing.meet(stood)
+        way = timing.planned.goals[axis.name] - stood
+        if abs(way) <= NO_WAY:
+            yield from timing.agreed(0.0, _any)
+            yield from timing.start(0.0)
+            self.gone = self._stayed(stood)
+            return
+        told = yield from Together([self._turned(way), self._watched()])
+        self.gone = self._arrived(stood, told[0])
+
+    def _turned(self, way: float) -> Operation[Turned]:
+        axis, spec = self._axis, self._axis.spec
+        self.command.depart()
+        try:
+            turned: Turned = yield from axis.able["keep_time"](
+                axis.device,
+                way * spec.ratio,
+                self._timing,
+                velocity=abs(spec.rate_to_device(self._timing.planned.limits[axis.name].velocity)),
+                acceleration=abs(spec.rate_to_device(self._timing.planned.limits[axis.name].acceleration)),
+            )
+        except BaseException as error:
+            if self.begun:
+                axis.fails(f"a movement did not come to its end: {getattr(error, 'summary', error)}")
+            else:
+                axis.stays()
+            raise
+        finally:
+            self._over = True
+        axis.arrives(turned.angle / spec.ratio)
+        return turned
+
+    def _watched(self) -> Operation[None]:
+        """While it is under way: stop it when another part fails, and tell how far all of it is."""
+        journey, timing = self._journey, self._timing
+        reported = -SHOWN
+        while not self._over:
+            now = yield from Pause(LOOK)
+            if timing.moment is None:
+                continue
+            if journey.fate.failure is not None:
+                journey.unstopped.update((yield from self.command.stop()))
+                return
+            since = now - timing.moment
+            if journey.reports(timing.party) and reported + SHOWN <= since <= timing.duration:
+                reported = since
+                yield from Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
+
+    def _stayed(self, stood: float) -> Gone:
+        arrived = Arrived(self._timing.planned.goals[self._axis.name], stood, True, 0.0, 0.0)
+        return Gone({self._axis.name: arrived}, {self._axis.name: Track(estimated=True)})
+
+    def _arrived(self, stood: float, turned: Turned) -> Gone:
+        axis, timing = self._axis, self._timing
+        assert timing.moment is not None
+        began = turned.start - timing.moment
+        ended = began + turned.duration
+        present = stood + turned.angle / axis.spec.ratio
+        arrived = Arrived(timing.planned.goals[axis.name], present, True, began, ended)
+        count = int(max(ended, timing.duration) / DRAWN) + 1
+        times = (*(number * DRAWN for number in range(count)), max(ended, timing.duration))
+        goals = tuple(timing.planned.course.positions(at)[axis.name] for at in times)
+        ways = (turned.way(at - began) / axis.spec.ratio for at in times)
+        track = Track(times, goals, tuple(stood + way for way in ways), estimated=True)
+        return Gone({axis.name: arrived}, {axis.name: track})
+
+
+class Kept:
+    """How such an axis keeps time with the rest of its journey: a `core.family.Timing` that remembers what it said."""
+
+    planned: Planned
+
+    def __init__(self, journey: Journey, party: str, axis: AxisVerbs) -> None:
+        self.party: Final = party
+        self.duration = 0.0
+        self.moment: float | None = None
+        self._journey: Final = journey
+        self._name: Final = axis.name
+        self._seat: Final[Seat] = journey.seat(party, axis.spec.bus)
+        self._facts: Mapping[str, Fact] = {}
+
+    def meet(self, position: float) -> Operation[None]:
+        """Say where it stands (rad, m), and get to know what the movement shall be."""
+        self._facts = yield from self._journey.meet(self.party, {self._name: Fact(position)})
+        self.planned = self._journey.outlined(self._facts)
+
+    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+        """See `core.family.Timing`."""
+        self._journey.needs[self._name] = shortest
+        least = max(shortest, self.planned.course.duration)
+        self.duration = yield from self._seat.agreed(least, lambda others: max(others, fitted(others)))
+        self._journey.needs[self._name] = max(shortest, fitted(least))
+        self.planned = self._journey.agreed(self._facts, self.duration)
+        return self.duration
+
+    def start(self, lead: float) -> Operation[float]:
+        """See `core.family.Timing`."""
+        moment = yield from self._seat.start(lead)
+        self.moment = moment
+        return moment
+
+
+def _any(duration: float) -> float:
+    """Whoever can have every duration."""
+    return duration
+
+
+def _angles(axes: Sequence[AxisVerbs], facts: Mapping[str, Fact]) -> dict[int, float]:
+    """Where they stand (rad of the device), by id."""
+    return {axis.spec.node: axis.spec.to_device(facts[axis.name].position) for axis in axes}
+
+
+def _following(axis: AxisVerbs, planned: Planned) -> float:
+    """How fast its device may be to keep up with its course (rad/s)."""
+    speed = min(planned.speeds[axis.name], axis.spec.max_velocity) or axis.spec.max_velocity
+    return abs(axis.spec.rate_to_device(speed)) * SPARE
+
+
+def _seen(axis: AxisVerbs, facts: Mapping[str, Fact], planned: Planned, track: Track) -> Arrived:
+    """What the host saw of an axis that was led."""
+    present = track.presents[-1] if track.presents else facts[axis.name].position
+    still = STILL / abs(axis.spec.ratio)
+    moved = abs(present - facts[axis.name].position) > still
+    return Arrived(planned.goals[axis.name], present, False, 0.0, track.rested(still) if moved else 0.0)
+
+
+def _silent(axis: AxisVerbs) -> NoReply:
+    return NoReply(
+        f"{axis.name} ({axis.spec.device}) does not answer, so nobody moves",
+        cause="its cable, its supply, or another device in between",
+        advice="look at the cable and the supply; nothing was sent that moves anything",
+        node=axis.spec.node,
+    )

@@ -1,0 +1,180 @@
+"""One axis in a loop: where it was last, where it is to go, and the small goal of the next cycle.
+
+A goal is judged when it is new, and before anything of its cycle is sent. As a rule an axis *follows* it within its
+velocity and its acceleration, and what is sent is a step on that way. Sent *direct*, a goal goes out as it was given, and
+then it may be no farther from the last one than the velocity of the axis allows in that time.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+from typing import TYPE_CHECKING, Final
+
+from motorbus.errors import LimitExceeded
+from motorbus.motion import limits
+from motorbus.motion.limits import Device, shown_rate
+from motorbus.motion.machine.model import ROUNDING, VELOCITY
+from motorbus.motion.profile import Follower, Limits, follower
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+
+CATCH_UP: Final = 3
+"""Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal by
+then, and begins anew from there."""
+
+
+class Place:
+    """An axis of a loop. Positions are in rad (m), `node` is the id of its device.
+
+    `position` is where it was heard to be last, `heard` when that was (s of robot time), `silent` how many cycles in a
+    row it has not been heard. `asked` is the goal that was set and `sent` the position that was ordered last; None: none.
+    `begun` is true once it has got torque here.
+    """
+
+    __slots__ = (
+        "_device",
+        "_direct",
+        "_far",
+        "_follower",
+        "_high",
+        "_jerk",
+        "_low",
+        "_passed",
+        "_period",
+        "_way",
+        "asked",
+        "axis",
+        "begun",
+        "heard",
+        "name",
+        "node",
+        "position",
+        "ratio",
+        "sent",
+        "silent",
+        "zero",
+    )
+
+    def __init__(self, axis: AxisVerbs, device: Device, period: float, direct: bool, jerk: float | None) -> None:
+        spec = axis.spec
+        found = limits.bounds(spec, device)
+        slack = ROUNDING * max((abs(end) for end in found[:2] if isfinite(end)), default=0.0) + ROUNDING
+        self.axis: Final = axis
+        self.name: Final = axis.name
+        self.node: Final = spec.node
+        self.zero: Final = spec.zero
+        self.ratio: Final = spec.ratio
+        self._device: Final = device
+        self._low: Final = found.low - slack
+        self._high: Final = found.high + slack
+        self._far: Final = inf if spec.max_step is None else spec.max_step * (1 + ROUNDING)
+        self._period: Final = period
+        self._way: Final = spec.max_velocity * period * (1 + ROUNDING) + ROUNDING
+        self._direct: Final = direct
+        self._jerk: Final = jerk
+        self._follower: Follower | None = None
+        self._passed: float | None = None
+        self.position = 0.0
+        self.heard = -inf
+        self.silent = 0
+        self.asked: float | None = None
+        self.sent: float | None = None
+        self.begun = False
+
+    @property
+    def interrupted(self) -> bool:
+        """It was led from here, and somebody has stopped it since or let it go."""
+        return self.begun and not (self.axis.under_way and self.axis.engaged)
+
+    def allows(self, goal: float) -> bool:
+        """Whether its soft limits and those of its device allow this goal (rad, m)."""
+        return self._low <= goal <= self._high
+
+    def begin(self, position: float) -> None:
+        """It has got torque, and stands there (rad, m)."""
+        self.position = self.sent = position
+        self._follower = (
+            None if self._direct else follower(position, Limits.of(self.axis.spec), jerk=self._jerk)
+        )
+        self.begun = True
+
+    def release(self) -> None:
+        """It is led no more: it was stopped, and waits for a new goal, with which it begins anew."""
+        self.asked = self.sent = self._passed = self._follower = None
+        self.begun = False
+
+    def judge(self, periods: int) -> None:
+        """Raise LimitExceeded for a goal that must not be sent, `periods` after the last one, and forget it."""
+        asked = self.asked
+        if asked is None or (asked == self._passed and not self._direct):
+            return
+        try:
+            if not self._low <= asked <= self._high:
+                limits.check_goal(self.name, self.axis.spec, asked, device=self._device)
+            if self._direct:
+                self._judge_way(asked, periods)
+        except LimitExceeded:
+            self.asked = self._passed
+            raise
+        self._passed = asked
+
+    def _judge_way(self, asked: float, periods: int) -> None:
+        since, periods = self.position if self.sent is None else self.sent, min(periods, CATCH_UP)
+        way, far = abs(asked - since), abs(asked - self.position)
+        if way > self._way * periods:
+            raise self._too_fast(asked, since, periods)
+        if far > self._far:
+            limits.check_step(self.name, self.axis.spec, asked, self.position)
+
+    def step(self, periods: int) -> float:
+        """The angle of its device (rad) to be ordered `periods` after the last one.
+
+        Raises LimitExceeded, at rest where it was told to be last, when that is too far from where it is measured to be:
+        something holds it back.
+        """
+        asked, way = self.asked, self._follower
+        assert asked is not None
+        if way is not None:
+            if periods > CATCH_UP:
+                assert self.sent is not None
+                way.reset(self.sent)
+                periods = 1
+            asked = way.step(periods * self._period, asked)
+            if abs(asked - self.position) > self._far:
+                self._held_back(way, asked)
+        self.sent = asked
+        return self.zero + asked * self.ratio
+
+    def _held_back(self, way: Follower, asked: float) -> None:
+        try:
+            limits.check_step(self.name, self.axis.spec, asked, self.position)
+        except LimitExceeded:
+            assert self.sent is not None
+            way.reset(self.sent)
+            self.asked = self._passed = self.sent
+            raise
+
+    def halt(self) -> bool:
+        """Where it follows and is on its way: brake from here on. False when there is nothing to brake."""
+        if self._follower is None or not self._follower.velocity:
+            return False
+        self._follower.halt()
+        self.asked = self._passed = self._follower.goal
+        return True
+
+    @property
+    def arrived(self) -> bool:
+        """Its small goals have come to its goal, and rest."""
+        return self._follower is None or self._follower.arrived
+
+    def _too_fast(self, asked: float, since: float, periods: int) -> LimitExceeded:
+        spec = self.axis.spec
+        rate = shown_rate(spec, VELOCITY, abs(asked - since) / (periods * self._period))
+        limit = shown_rate(spec, VELOCITY, spec.max_velocity)
+        return LimitExceeded(
+            f"{self.name}: from {spec.show(since)} to {spec.show(asked)} in {periods * self._period * 1e3:.3g} ms is "
+            f"{rate}, and its limit is {limit}",
+            expected=f"at most {spec.show(self._way * periods)} from the last goal",
+            advice="give goals that are closer together, or leave direct out and they are followed; nothing was sent",
+        )

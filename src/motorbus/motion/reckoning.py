@@ -1,0 +1,218 @@
+"""Dead reckoning: where an axis stands whose device does not tell, by adding up what it was told to do.
+
+A device without feedback begins somewhere. Homing says where it is, or a person does; each movement that came to its
+end is added. A stop in the middle, an error or a program makes it unknown again, and the reason is kept for whoever
+needs the position next. Everything that comes from here is called *estimated*: a motor that missed a step, or was
+turned by hand, tells nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from motorbus.core.operation import Operation, Runnable
+from motorbus.errors import LimitExceeded, NotHomed, RequestError
+from motorbus.motion import limits
+from motorbus.motion.machine.model import FARTHEST
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+
+T = TypeVar("T")
+
+NEVER_SAID: Final = "nobody has said where it is since it was opened"
+UNDER_WAY: Final = "it is moving"
+
+
+class Reckoning:
+    """Where one axis is, by dead reckoning: `position` in rad or m, None while that is not known, and then `why`."""
+
+    def __init__(self) -> None:
+        self.position: float | None = None
+        self.why = NEVER_SAID
+        self._before: tuple[float | None, str] = (None, NEVER_SAID)
+
+    def declare(self, position: float) -> None:
+        """It stands there, as somebody knows who has seen it."""
+        self.position, self.why = position, ""
+
+    def forget(self, why: str) -> None:
+        """Nobody knows any more where it is, and this is why."""
+        self.position, self.why = None, why
+
+    def depart(self) -> None:
+        """A movement begins. Until it has come to its end nothing is known."""
+        if self.why != UNDER_WAY:
+            self._before = self.position, self.why
+        self.forget(UNDER_WAY)
+
+    def stay(self) -> None:
+        """The movement was refused before anything was sent: it is where it was."""
+        self.position, self.why = self._before
+
+    def arrive(self, way: float) -> None:
+        """The movement came to its end: it is so far (rad, m, with its sign) from where it was."""
+        before, why = self._before
+        self.position, self.why = (None, why) if before is None else (before + way, "")
+
+    def known(self, name: str) -> float:
+        """Where it is. Raises NotHomed, with the reason, while that is not known."""
+        if self.position is not None:
+            return self.position
+        raise NotHomed(
+            f"{name}: where it is is not known",
+            expected="an axis that was homed, or of which somebody said where it is",
+            cause=self.why,
+            advice="home it, or declare its position when you have seen it; nothing was sent",
+        )
+
+    def __str__(self) -> str:
+        return f"not known: {self.why}" if self.position is None else f"{self.position:.6g}, estimated"
+
+
+def is_reckoned(able: object) -> bool:
+    """Whether a device with these capabilities moves and does not tell where it is."""
+    names = frozenset(able)  # type: ignore[call-overload]
+    return "position" not in names and bool(names & {"move_by", "home", "keep_time", "jog"})
+
+
+def checked_place(name: str, position: float) -> float:
+    """A position that a person declares. Raises RequestError for what cannot be one."""
+    if isinstance(position, bool) or not isinstance(position, int | float) or not isfinite(position):
+        raise RequestError(f"{name}: {position!r} is not a finite number", expected="a position in rad or m")
+    if abs(position) > FARTHEST:
+        raise RequestError(f"{name}: {position:g} is too far", expected=f"at most {FARTHEST:g} rad or m")
+    return float(position)
+
+
+def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | None = None) -> Operation[T]:
+    """Carry out a movement of one axis and keep account of it: it is engaged, under way, and at rest afterwards.
+
+    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. What was
+    refused before anything was sent changes nothing; any other end in the middle makes a reckoned position unknown.
+    """
+    axis.departs()
+    try:
+        told = yield from movement
+    except (RequestError, LimitExceeded):
+        axis.stays()
+        raise
+    except BaseException as error:
+        axis.fails(_reason(error))
+        raise
+    axis.arrives(way(told) if way is not None else None)
+    return told
+
+
+def _reason(error: BaseException) -> str:
+    said = getattr(error, "summary", "") or str(error) or type(error).__name__
+    return f"a movement did not come to its end: {said}"
+
+
+# -- verbs of axes whose device moves by a profile of its own ------------------------------------------------------
+
+
+def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Operation[float]:
+    """Move by so far (rad, m) at so much (rad/s, m/s; None: as fast as the axis may), by the device's own profile.
+
+    Returns the way that was gone, *estimated*: in whole steps of the motor. Allowed also where the position is not
+    known, for that is how an axis gets off its switch. Raises LimitExceeded, with nothing sent, for a way that leads
+    out of the limits or is longer than `max_step`, and for too great a velocity; else as the device's own verb.
+    """
+    check_way(axis, way)
+    rate = _rate(axis, velocity)
+    ratio = axis.spec.ratio
+    told = yield from journey(
+        axis,
+        axis.able["move_by"](axis.device, way * ratio, velocity=rate),
+        lambda told: _turned(told, way * ratio) / ratio,
+    )
+    return _turned(told, way * ratio) / ratio
+
+
+def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
+    """Move at a velocity (rad/s, m/s, with its sign) for a while (s), then stop. Returns the way, *estimated*.
+
+    Raises LimitExceeded for what `move_by` refuses; else as the device's own verb.
+    """
+    limits.check_finite(axis.name, "seconds", seconds)
+    limits.check_velocity(axis.name, axis.spec, velocity)
+    way = velocity * seconds
+    check_way(axis, way)
+    ratio = axis.spec.ratio
+    jog_ = axis.able["jog"](axis.device, velocity * ratio, seconds)
+    told = yield from journey(axis, jog_, lambda told: _turned(told, way * ratio) / ratio)
+    return _turned(told, way * ratio) / ratio
+
+
+def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
+    """Go to the switch of the axis, at most for so long (s; None: what is usual there). Returns where that is (rad, m).
+
+    From then on it is known where the axis stands, *estimated*: its device is at its angle 0 there. Raises NotHomed
+    when the switch did not come; else as the device's own verb.
+    """
+    options = {} if deadline is None else {"deadline": deadline}
+    axis.departs()
+    try:
+        yield from axis.able["home"](axis.device, **options)
+    except BaseException as error:
+        axis.stays() if isinstance(error, RequestError) else axis.fails(_reason(error))
+        raise
+    axis.arrives(0.0)
+    place = axis.spec.from_device(0.0)
+    if axis.reckoning is not None:
+        axis.reckoning.declare(place)
+    return place
+
+
+def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> Operation[Any]:
+    """Run a program that is stored in the device, at most for so long (s), and wait for its end.
+
+    Returns what the device's own verb does. Where the axis stands afterwards is not known, for its program does not
+    tell. Raises as the device's own verb.
+    """
+    options = {} if timeout is None else {"timeout": timeout}
+    told = yield from journey(axis, axis.able["run"](axis.device, number, **options), lambda _: 0.0)
+    if axis.reckoning is not None:
+        axis.reckoning.forget(f"program {number} has moved it")
+    return told
+
+
+def check_way(axis: AxisVerbs, way: float) -> None:
+    """Raise LimitExceeded for a way that is no number, longer than `max_step`, or leads out of the soft limits.
+
+    Where nobody knows where the axis is, the whole range between its limits is as far as it may go.
+    """
+    name, spec = axis.name, axis.spec
+    limits.check_finite(name, "way", way)
+    known = axis.reckoning.position if axis.reckoning is not None else None
+    if known is not None:
+        limits.check_goal(name, spec, known + way, measured=known)
+        return
+    limits.check_step(name, spec, way, 0.0)
+    if spec.low is not None and spec.high is not None and abs(way) > spec.high - spec.low:
+        raise LimitExceeded(
+            f"{name}: {spec.show(abs(way))} is more than all its way, and where it is is not known",
+            expected=f"at most {spec.show(spec.high - spec.low)}",
+            advice="home it first, or go less far; nothing was sent",
+        )
+
+
+def _rate(axis: AxisVerbs, velocity: float | None) -> float:
+    """How fast the device is to turn (rad/s)."""
+    if velocity is not None and not velocity > 0:
+        raise RequestError(
+            f"{axis.name}: velocity is {velocity}",
+            expected="a number above 0; the sign of the way says where",
+            advice="nothing was sent",
+        )
+    asked = axis.spec.max_velocity if velocity is None else velocity
+    limits.check_velocity(axis.name, axis.spec, asked)
+    return abs(axis.spec.rate_to_device(asked))
+
+
+def _turned(told: object, ordered: float) -> float:
+    """The angle (rad of the device) that it says it has turned, else what it was told to."""
+    return float(getattr(told, "angle", ordered))

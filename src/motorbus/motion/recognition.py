@@ -1,0 +1,92 @@
+"""What the devices of a machine are, asked when it is opened: without that nobody knows what its axes can do.
+
+Only reads are sent. What the file asks of a device that cannot do it is refused here, before anything moves: a person
+who wrote down a cap or a way to end relies on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from motorbus.core.family import Identity
+from motorbus.core.operation import Operation, Runnable
+from motorbus.errors import MotorbusError, NoReply, RequestError
+from motorbus.motion.abreast import Abreast
+from motorbus.motion.axis import AxisVerbs
+from motorbus.motion.body import Body
+from motorbus.motion.several import everyone, of_each, raised
+
+
+def recognise(body: Body) -> Abreast[None]:
+    """Ask each device what it is, the buses at the same time, and tell its axis what it can do.
+
+    Raises NoReply, naming axis, device and address, for one that does not answer; RequestError for one of which nobody
+    has said what it can do, or that lacks what the file asks of it. Everyone is asked first, and all are named.
+    """
+    parts = body.by_bus(body.axes)
+
+    def combine(results: Mapping[str, Any]) -> None:
+        told = of_each(parts, results)
+        for name, one in told.items():
+            axis = body.axes[name]
+            told[name] = _unheard(axis, body, one) if isinstance(one, NoReply) else _judged(axis, one)
+        raised(told)
+
+    return Abreast({bus: everyone(there, _asked) for bus, there in parts.items()}, combine)
+
+
+def _asked(axis: AxisVerbs) -> Operation[Identity]:
+    identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
+    return (yield from identify)
+
+
+def _unheard(axis: AxisVerbs, body: Body, silence: NoReply) -> NoReply:
+    address = body.machine.buses[axis.spec.bus].address
+    found = NoReply(
+        f"{axis.spec.device} does not answer on {address}",
+        sent=silence.sent,
+        received=silence.received,
+        expected=f"the device with the id {axis.spec.node}",
+        cause=silence.cause or "it has no power, another id or another rate, or its cable is off",
+        advice="see to that, or open the machine with other axes only; nothing was sent but questions",
+        node=axis.spec.node,
+    )
+    found.__cause__ = silence
+    return found
+
+
+def _judged(axis: AxisVerbs, told: Any) -> MotorbusError | None:
+    """Tell the axis what its device can do; the error when that does not do."""
+    if isinstance(told, MotorbusError):
+        return told
+    axis.recognised(axis.bus.family.axis(told.model), told.model)
+    if not axis.able:
+        return RequestError(
+            f"{axis.spec.device} is {told.model}, of which nobody has said what it can do",
+            expected="a device that moves",
+            advice="take the axis out of the file, or use its own commands; nothing was sent but questions",
+        )
+    return _lacking(axis)
+
+
+def _lacking(axis: AxisVerbs) -> RequestError | None:
+    """The error for what the machine file asks of this axis and its device cannot."""
+    spec, able = axis.spec, axis.able
+    wants = (
+        ("torque", "a cap of its torque", spec.torque is not None, ("cap_torque",), "take torque out"),
+        ("current", "a cap of its current", spec.current is not None, ("cap_current",), "take current out"),
+        ("exit", "a switch for its torque", spec.exit == "torque_off", ("disable_torque",), 'exit = "hold"'),
+        ("exit", "a way to its place", spec.exit == "park", ("train", "keep_time"), 'exit = "hold"'),
+    )
+    for key, what, wanted, needs, instead in wants:
+        if wanted and not any(one in able for one in needs):
+            return RequestError(
+                f"axis.{axis.name}.{key}: {spec.device} ({axis.model}) does not have {what}",
+                expected=f"a key that its device can follow, as {instead}"
+                if "=" in instead
+                else "no such key",
+                advice=f"write {instead}" if "=" in instead else f"{instead} of the file; nothing was sent",
+                node=spec.node,
+            )
+    return None

@@ -1,0 +1,328 @@
+"""The axes of one bus on their way along a course: small goals on a fixed grid, and positions back in each cycle.
+
+A goal that leaves at one slot of the grid is where the axis shall be at the next one. So the first order sets it moving
+at once, and the last one leaves just early enough. A servo goes from goal to goal at its own speed; the goals come so
+often that it never comes to rest between two of them. A slot that was missed is skipped and counted, the grid is never
+stretched: where the axis is at a moment does not depend on how busy the host was before.
+
+What goes wrong is seen within a few cycles: an axis that does not follow, one that is silent, an order from elsewhere,
+another bus of the same movement that has failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil, floor
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from motorbus.bus.face import BusFace
+from motorbus.core.family import Positions, Train
+from motorbus.core.operation import Exchange, Operation, Pause, Progress, Report, Together, outcome
+from motorbus.errors import (
+    Interrupted,
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    RequestError,
+    Stalled,
+    WireError,
+)
+from motorbus.motion.command import Command
+from motorbus.motion.moved import STILL, Cycles, Track
+from motorbus.motion.profile.shapes import NOTHING
+from motorbus.motion.trajectory import Course
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
+
+USUAL: Final = 100.0
+"""Hz at which axes are led where the wire carries twice as much."""
+SHARE: Final = 0.5
+"""Of what the wire carries: the rest is for others, and for a reply that has to be asked for again."""
+TOLERANCE: Final = 0.02
+"""rad of the device, a little more than a degree: under load a servo stays off its goal."""
+SETTLE: Final = 1.0
+"""s after the end of the course within which an axis must be in position."""
+LAG: Final = 0.3
+"""s that an axis may be behind, at the highest speed of its course: slower servos need another max_velocity."""
+FAR: Final = 0.1
+"""rad of the device that an axis may be off where it should be, whatever its speed."""
+SILENCE: Final = 0.15
+"""s for which nothing may be heard of an axis, or three cycles, if those last longer."""
+SHOWN: Final = 0.25
+"""s between two reports of progress."""
+LOST: Final = (NoReply, WireError, OutcomeUnknown)
+"""An exchange that failed like this may be forgotten: the next cycle brings another."""
+
+
+class Fate:
+    """What the parts of one movement know of each other: whether one of them has failed, and why."""
+
+    def __init__(self) -> None:
+        self.failure: MotorbusError | None = None
+
+    def fail(self, error: MotorbusError) -> None:
+        """A part has failed; the others learn it in their next cycle."""
+        self.failure = self.failure or error
+
+    def check(self) -> None:
+        """Raise Interrupted when another part has failed."""
+        if self.failure is not None:
+            raise Interrupted(
+                "the movement was ended, for another part of it failed",
+                cause=self.failure.summary,
+                advice="all its axes were told to stop",
+            )
+
+
+class Streamed(NamedTuple):
+    """What came of it: a track for each axis by its name, and how the cycles went."""
+
+    tracks: dict[str, Track]
+    cycles: Cycles
+
+
+class Grid(NamedTuple):
+    """The slots of a course: a goal leaves every `period` s; `last` is the number of the last one, the first is 0."""
+
+    period: float
+    last: int
+
+    @classmethod
+    def over(cls, duration: float, rate: float) -> Grid:
+        """At most `rate` (Hz) slots, so that the last goal leaves one period before the end of the course."""
+        slots = max(1, floor(duration * rate * (1 + 1e-9)))
+        return cls(duration / slots if duration else 1 / rate, slots - 1)
+
+    def after(self, slot: int, since: float) -> int:
+        """The slot that comes next when this one is done so many s after the start; never beyond the last."""
+        return min(max(slot + 1, ceil(since / self.period - 1e-6)), self.last)
+
+
+def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: float | None = None) -> float:
+    """Hz at which the axes of a train are led; where nobody has asked for one see `USUAL` and `SHARE`.
+
+    `angles` are goals that they could be told, by id (rad): for counting, each is as long as any other. Raises
+    RequestError for a rate that is none, or more than the wire carries.
+    """
+    cycle = (*train.goals(angles), *train.positions)
+    highest = 1 / sum(bus.family.air_time(one, bus.rate) for one in cycle)
+    if asked is None:
+        return min(USUAL, SHARE * highest)
+    if not 0 < asked <= highest:
+        raise RequestError(
+            f"{asked} Hz is not possible here",
+            expected=f"above 0, at most {highest:.4g} Hz",
+            cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} devices",
+            advice=f"take less; {NOTHING}",
+        )
+    return asked
+
+
+class Stream:
+    """Axes of one bus that are led along a course; `speeds` are the highest of it by name (rad/s, m/s).
+
+    `command` is over these axes, `fate` that of the whole movement. With `reports` it reports its progress.
+    """
+
+    def __init__(
+        self,
+        axes: Sequence[AxisVerbs],
+        train: Train,
+        course: Course,
+        *,
+        rate: float,
+        speeds: Mapping[str, float],
+        command: Command,
+        fate: Fate,
+        reports: bool = False,
+    ) -> None:
+        self._axes: Final = {axis.spec.node: axis for axis in axes}
+        self._train: Final = train
+        self._course: Final = course
+        self._grid: Final = Grid.over(course.duration, rate)
+        self._allowed: Final = {axis.name: _allowed(axis, speeds[axis.name]) for axis in axes}
+        self._command: Final = command
+        self._fate: Final = fate
+        self._reports: Final = reports
+        self._tracks: dict[str, tuple[list[float], list[float], list[float]]] = {
+            axis.name: ([], [], []) for axis in axes
+        }
+        self._start = self._reported = 0.0
+        self._heard: dict[int, float] = {}
+        self._cycles = self._skipped = self._lost = 0
+
+    def lead(self, bus: BusFace) -> float:
+        """s before the start at which the first goals must leave, so that they have arrived then."""
+        return sum(bus.family.air_time(one, bus.rate) for one in self._train.goals(self._goals(0.0)))
+
+    def run(self, start: float, lead: float = 0.0) -> Operation[Streamed]:
+        """Lead them along the course, which begins at `start` (s on the link's clock), and see them arrive.
+
+        Goals leave `lead` s before their slot. Raises Stalled for an axis that does not follow or arrive, NoReply for
+        one that is silent, Interrupted when somebody else has told one of them something or another part has failed.
+        """
+        self._start = start
+        self._heard = dict.fromkeys(self._axes, start)
+        slot = 0
+        while True:
+            due = start - lead + slot * self._grid.period
+            yield from Pause(max(0.0, due - (yield from Pause(0))))
+            yield from self._cycle(slot)
+            if slot == self._grid.last:
+                break
+            done = (yield from Pause(0)) + lead - start
+            reached = self._grid.after(slot, done)
+            self._skipped += reached - slot - 1
+            slot = reached
+        yield from self._settle()
+        tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
+        return Streamed(tracks, Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost))
+
+    def _cycle(self, slot: int) -> Operation[None]:
+        self._fate.check()
+        self._command.check()
+        last = slot == self._grid.last
+        at = self._course.duration if last else (slot + 1) * self._grid.period
+        orders = [self._command.guarded(one) for one in self._train.goals(self._goals(at))]
+        yield from self._exchanged(orders)
+        self._cycles += 1
+        for axis in self._axes.values():
+            self._check_following(axis)
+        yield from self._report(slot * self._grid.period)
+
+    def _goals(self, at: float) -> dict[int, float]:
+        """The goals (rad of the device) for a moment of the course, by id."""
+        places = self._course.positions(at)
+        return {node: axis.spec.to_device(places[axis.name]) for node, axis in self._axes.items()}
+
+    def _exchanged(self, orders: Sequence[Exchange[Any]]) -> Operation[None]:
+        """Send the orders, read the positions, and keep what was heard."""
+        told = yield from Together([outcome(one) for one in (*orders, *self._train.positions)])
+        heard = set()
+        for one in told:
+            if isinstance(one, Positions):
+                heard |= self._keep(one)
+            elif isinstance(one, MotorbusError) and not isinstance(one, LOST):
+                raise one
+        now = yield from Pause(0)
+        for node in self._axes.keys() - heard:
+            self._lost += 1
+            self._check_heard(node, now)
+
+    def _keep(self, found: Positions) -> set[int]:
+        since = found.at - self._start
+        should = self._course.positions(since)
+        for node, angle in found.values.items():
+            axis = self._axes[node]
+            for row, value in zip(
+                self._tracks[axis.name],
+                (since, should[axis.name], axis.spec.from_device(angle)),
+                strict=True,
+            ):
+                row.append(value)
+            self._heard[node] = found.at
+        return set(found.values)
+
+    def _report(self, since: float) -> Operation[None]:
+        if self._reports and since >= self._reported:
+            self._reported = since + SHOWN
+            done, total = round(1000 * since), round(1000 * self._course.duration)
+            yield from Report(Progress(done, total, "moving"))
+
+    # -- the end of it -------------------------------------------------------------------------------------------------
+
+    def _settle(self) -> Operation[None]:
+        """Read positions until all are where they should be, and have come to rest."""
+        period = max(self._grid.period, 0.005)
+        end = self._start + self._course.duration
+        yield from Pause(max(0.0, end - (yield from Pause(0))))
+        while True:
+            yield from self._exchanged(())
+            now = yield from Pause(0)
+            if all(self._arrived(axis, now - end) for axis in self._axes.values()):
+                break
+            if now - end > SETTLE:
+                self._check_arrived()
+            self._fate.check()
+            self._command.check()
+            yield from Pause(period)
+        if self._reports:
+            total = round(1000 * self._course.duration)
+            yield from Report(Progress(total, total, "moving"))
+
+    def _arrived(self, axis: AxisVerbs, since: float) -> bool:
+        """Whether it was seen in position after the end, twice at the same place; when time is up, once."""
+        *_, presents = self._tracks[axis.name]
+        times = self._tracks[axis.name][0]
+        if not times or times[-1] < self._course.duration or self._off(axis) > TOLERANCE:
+            return False
+        before = presents[-2] if len(presents) > 1 else presents[-1]
+        still = abs(presents[-1] - before) * abs(axis.spec.ratio) <= STILL
+        return still or since > SETTLE
+
+    def _off(self, axis: AxisVerbs) -> float:
+        """How far it was last seen from its goal, in rad of the device."""
+        goal = self._course.positions(self._course.duration)[axis.name]
+        return abs(self._tracks[axis.name][2][-1] - goal) * abs(axis.spec.ratio)
+
+    # -- what must not be ----------------------------------------------------------------------------------------------
+
+    def _check_following(self, axis: AxisVerbs) -> None:
+        _, goals, presents = self._tracks[axis.name]
+        if not goals or abs(goals[-1] - presents[-1]) <= self._allowed[axis.name]:
+            return
+        spec, goal, present = axis.spec, goals[-1], presents[-1]
+        raise Stalled(
+            f"{axis.name} does not follow: it is at {spec.show(present)}, and should be at {spec.show(goal)} by now",
+            expected=f"within {spec.show(self._allowed[axis.name])} of where it should be",
+            cause="something blocks it, the load is too heavy, or it is slower than max_velocity says",
+            advice="clear the way, move slower, or change the limits of the axis; all of the movement were stopped",
+            node=spec.node,
+        )
+
+    def _check_arrived(self) -> None:
+        """Raise Stalled for those that are not in position."""
+        goals = self._course.positions(self._course.duration)
+        short = [
+            axis
+            for axis in self._axes.values()
+            if not self._tracks[axis.name][2] or self._off(axis) > TOLERANCE
+        ]
+        for axis in short[:1]:
+            spec = axis.spec
+            raise Stalled(
+                "; ".join(_stands(one, goals[one.name], self._tracks[one.name][2]) for one in short),
+                expected=f"within {spec.show(TOLERANCE / abs(spec.ratio))} of it, {SETTLE:g} s after the end",
+                cause="something blocks it, the load is too heavy, or its torque is bounded",
+                advice="clear the way, or allow it more torque; all of the movement were stopped",
+                node=spec.node,
+            )
+
+    def _check_heard(self, node: int, now: float) -> None:
+        """Raise NoReply for an axis that has been silent for too long."""
+        silent = now - self._heard[node]
+        if silent <= max(SILENCE, 3 * self._grid.period):
+            return
+        axis = self._axes[node]
+        raise NoReply(
+            f"{axis.name} ({axis.spec.device}) has not answered for {silent:.2f} s while it was led",
+            cause="its cable, its supply, or another device in between",
+            advice="look at the cable and the supply; all of the movement were told to stop",
+            node=node,
+        )
+
+
+def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:
+    return Track(tuple(times), tuple(goals), tuple(presents))
+
+
+def _allowed(axis: AxisVerbs, speed: float) -> float:
+    """How far an axis may be from where it should be (rad, m); `max_step` bounds that too."""
+    most = max(FAR / abs(axis.spec.ratio), LAG * speed)
+    return most if axis.spec.max_step is None else min(most, axis.spec.max_step)
+
+
+def _stands(axis: AxisVerbs, goal: float, presents: Sequence[float]) -> str:
+    where = axis.spec.show(presents[-1]) if presents else "a place that is not known"
+    return f"{axis.name} is not in position: its goal is {axis.spec.show(goal)}, and it stands at {where}"

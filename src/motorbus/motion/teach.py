@@ -1,0 +1,90 @@
+"""Show a machine by hand what to do: its axes are let go, guided, and where they are is written down on a fixed grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from motorbus.errors import MotionError, RequestError
+from motorbus.motion import group
+from motorbus.motion.body import Body
+from motorbus.motion.budget import divided
+from motorbus.motion.follow import NOTHING, Ending, check_able, check_seconds
+from motorbus.motion.loop import Errand, LoopFace
+from motorbus.motion.rounds import LoopState
+from motorbus.motion.trajectory import Trajectory
+from motorbus.motion.trajectory.samples import MOST
+
+
+def teach(
+    body: Body,
+    names: str | Iterable[str] | None = None,
+    *,
+    seconds: float | None = None,
+    rate: float = 50.0,
+    until: Callable[[], bool] | None = None,
+    limp: bool = True,
+) -> Errand[Trajectory]:
+    """Let these axes go and write down where they are guided, `rate` times a second (Hz); None: all that can be taught.
+
+    The trajectory has the times of the grid, from 0 on. A cycle in which an axis was not heard has no sample; nothing is
+    smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else moves.
+
+    It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it and
+    what was taught is given. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or whose
+    device cannot be asked in a loop; MotionError when there are less than two samples; and what a `Loop` raises.
+    """
+    check_seconds(seconds)
+    axes = _taught(body, names, limp)
+    return Errand(
+        _Teaching(rate, seconds, until),
+        rate,
+        axes,
+        before=group.disable_torque(body, axes) if limp else None,
+        endless=seconds is None and until is None,
+    )
+
+
+def _taught(body: Body, names: str | Iterable[str] | None, limp: bool) -> tuple[str, ...]:
+    chosen = body.chosen(names)
+    if names is not None:
+        check_able(body, chosen, "train", "taught: nothing tells where it is in a loop")
+        if limp:
+            check_able(body, chosen, "disable_torque", "taught by hand")
+        return tuple(chosen)
+    led, _ = divided(chosen)
+    found = tuple(name for name, axis in led.items() if not limp or "disable_torque" in axis.able)
+    if not found:
+        raise RequestError(
+            "none of these axes can be taught by hand",
+            expected="an axis that tells where it is and can be let go",
+            advice=f"limp=False writes down what something else moves; {NOTHING}",
+        )
+    return found
+
+
+class _Teaching:
+    def __init__(self, rate: float, seconds: float | None, until: Callable[[], bool] | None) -> None:
+        self._rate = rate
+        self._over = Ending(rate, seconds, until)
+        self._numbers: list[int] = []
+        self._rows: list[tuple[float, ...]] = []
+
+    def step(self, loop: LoopFace, state: LoopState) -> bool:
+        """See `loop.Course`."""
+        if not state.missing:
+            self._numbers.append(state.number)
+            self._rows.append(tuple(state.position.values()))
+        return not self._over(state.number) and len(self._rows) < MOST
+
+    def result(self, loop: LoopFace) -> Trajectory:
+        """See `loop.Course`."""
+        if len(self._rows) < 2:
+            raise MotionError(
+                f"{len(self._rows)} samples in {self._over.seconds:.3g} s are no trajectory",
+                expected="two cycles or more in which every axis was heard",
+                advice="teach longer, at a higher rate, or see why an axis is silent; the axes stay as they are",
+            )
+        first = self._numbers[0]
+        times = [(number - first) / self._rate for number in self._numbers]
+        columns = zip(*self._rows, strict=True)
+        return Trajectory(times, dict(zip(loop.axes, columns, strict=True)))

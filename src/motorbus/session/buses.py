@@ -1,0 +1,171 @@
+"""Opening a bus, blocking or async: link, family, gate and journal meet here.
+
+One read is sent, which tells whether the adapter echoes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+from motorbus import families
+from motorbus.bus.aio import AsyncBus
+from motorbus.bus.face import BusFace
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import Exchange
+from motorbus.errors import MotorbusError
+from motorbus.journal import BusJournal
+from motorbus.link.base import Link
+from motorbus.link.lock import socket_path
+from motorbus.link.memory import MemoryLink
+from motorbus.link.url import open_link
+from motorbus.motion.safety import Gate
+from motorbus.session.address import parse_address, parse_ids
+from motorbus.session.keeping import kept_for
+from motorbus.session.opening import Opening, prepare
+from motorbus.simulation.named import Simulation, find
+
+LOG = logging.getLogger("motorbus.session")
+logging.getLogger("motorbus").addHandler(
+    logging.NullHandler()
+)  # silent until somebody asks; here, for nothing below logs
+
+Notify = Callable[[object], None]
+
+
+def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
+    """Open a bus, blocking; use it in a `with`.
+
+    `report` gets progress, early results and journal records, the latter when they are on disk. Options may also stand
+    in the address. A guarded change that was cut off is told as a warning of the bus, see `unfinished`. Raises
+    RequestError for a bad address, PortNotFound, PortBusy (naming the owner) or LinkError for the port.
+    """
+    opening = prepare(address, options)
+    link = _link(opening)
+    try:
+        journal = kept_for(parse_address(address), options, opening, link)
+        bus = Bus(
+            link,
+            opening.family,
+            admit=Gate(),
+            report=report,
+            journal=journal,
+            stop_socket=_stop_socket(opening, link),
+        )
+        _warn(bus, journal)
+        test = _echo_test(bus)
+        if test is not None:
+            _settled(bus, lambda: bus.run(test))
+    except BaseException:
+        link.close()
+        raise
+    return bus
+
+
+class OpenAsyncBus(AsyncBus):
+    """An async bus that finds out about echo when its `async with` is entered."""
+
+    async def __aenter__(self) -> Self:
+        test = _echo_test(self)
+        if test is not None:
+            try:
+                await self.run(test)
+            except MotorbusError as silence:
+                LOG.debug("echo test: %s", silence.summary)
+            _tell_echo(self)
+        return self
+
+
+def open_async(address: str, *, report: Notify | None = None, **options: object) -> AsyncBus:
+    """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
+    opening = prepare(address, options)
+    link = _link(opening)
+    try:
+        journal = kept_for(parse_address(address), options, opening, link)
+        bus = OpenAsyncBus(
+            link,
+            opening.family,
+            admit=Gate(),
+            report=report,
+            journal=journal,
+            stop_socket=_stop_socket(opening, link),
+        )
+        _warn(bus, journal)
+    except BaseException:
+        link.close()
+        raise
+    return bus
+
+
+def simulate(
+    family: str,
+    *,
+    ids: str | tuple[int, ...] = "1",
+    model: str = "",
+    clock: str = "virtual",
+    name: str | None = None,
+    **options: object,
+) -> Simulation:
+    """A simulated bus in this process; use it in a `with`, open it by its `url`, poke its nodes by `sim[3]`.
+
+    `clock` is "virtual" (time passes only while somebody waits) or "real". Raises RequestError for an unknown
+    family, model or option.
+    """
+    found = families.load(family)
+    numbers = parse_ids(ids) if isinstance(ids, str) else ids
+    return Simulation(found, numbers, model=model, clock=clock, name=name, **options)
+
+
+def _link(opening: Opening) -> Link:
+    family, rate = opening.family, opening.rate or opening.family.link.rate
+    if opening.port == "sim":
+        ids = parse_ids(str(opening.options.pop("ids", "1")))
+        model = str(opening.options.pop("model", ""))
+        simulator = family.simulator(ids, model, **opening.options)
+        return MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
+    if opening.port.startswith("sim:"):
+        return find(opening.port.removeprefix("sim:"), family.name).link(rate)
+    return open_link(
+        opening.port,
+        rate=opening.rate,
+        usual=family.link.rate,
+        kind=family.link.kind,
+        options=opening.options,
+    )
+
+
+def _stop_socket(opening: Opening, link: Link) -> Path | None:
+    if opening.port == "sim" or opening.port.startswith("sim:"):
+        return None
+    name: str = getattr(link, "lock_name", opening.port)
+    return socket_path(name) if name else None
+
+
+def _warn(bus: BusFace, journal: BusJournal | None) -> None:
+    warning = journal.warning() if journal is not None else ""
+    if warning:
+        bus.warnings += (warning,)
+
+
+def _echo_test(bus: BusFace) -> Exchange[Any] | None:
+    for warning in bus.warnings:
+        LOG.warning("%s: %s", bus.link.name, warning)
+    test = bus.family.echo_test()
+    if test is not None:
+        bus.turns.expect_echo(test)
+    return test
+
+
+def _settled(bus: BusFace, run: Callable[[], object]) -> None:
+    try:
+        run()
+    except MotorbusError as silence:
+        LOG.debug("echo test: %s", silence.summary)
+    _tell_echo(bus)
+
+
+def _tell_echo(bus: BusFace) -> None:
+    if bus.turns.echo.present:
+        LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

@@ -1,0 +1,109 @@
+"""What opening a machine takes, found out and checked before any port is touched: which buses, which axes on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from os import PathLike
+from typing import NamedTuple, Self
+
+from motorbus.bus.aio import AsyncBus
+from motorbus.bus.pump import Bus
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.axis import AsyncAxis, Axis
+from motorbus.motion.machine import Machine
+from motorbus.motion.machine.agreement import check
+from motorbus.motion.several import named
+from motorbus.session.buses import open, open_async
+from motorbus.session.opening import lock_name, prepare
+
+
+class Plan(NamedTuple):
+    """A machine, the names of the axes that are wanted of it, and of the buses that these need."""
+
+    machine: Machine
+    axes: tuple[str, ...]
+    buses: tuple[str, ...]
+
+    @classmethod
+    def of(cls, machine: Machine, axes: str | Iterable[str] | None = None) -> Self:
+        """What these axes, groups and buses of a machine need; None: all of its axes.
+
+        Raises RequestError for a name that it does not have, a machine that does not fit together, an address that
+        cannot be, and two buses on one port.
+        """
+        check(machine)
+        names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
+        if not names:
+            raise RequestError("the machine has no axis", expected="a file with [axis.NAME]")
+        buses = tuple(dict.fromkeys(machine.axes[name].bus for name in names))
+        _check_ports(machine, buses)
+        return cls(machine, names, buses)
+
+    def open(self, name: str, report: Callable[[object], None] | None) -> Bus:
+        """Open one of the buses. Raises as `motorbus.open`, naming the bus."""
+        try:
+            return open(self.machine.buses[name].address, report=report)
+        except MotorbusError as error:
+            raise named(f"bus.{name}", error) from error
+
+    def open_async(self, name: str, report: Callable[[object], None] | None) -> AsyncBus:
+        """The same for asyncio."""
+        try:
+            return open_async(self.machine.buses[name].address, report=report)
+        except MotorbusError as error:
+            raise named(f"bus.{name}", error) from error
+
+    def blocking(self, buses: Mapping[str, Bus]) -> dict[str, Axis]:
+        """The axes on these buses, of whose devices nothing is known yet."""
+        specs = {name: self.machine.axes[name] for name in self.axes}
+        return {
+            name: Axis(
+                buses[spec.bus],
+                name,
+                spec,
+                buses[spec.bus].family.devices.blocking(buses[spec.bus], spec.node),
+                {},
+            )
+            for name, spec in specs.items()
+        }
+
+    def awaiting(self, buses: Mapping[str, AsyncBus]) -> dict[str, AsyncAxis]:
+        """The same for asyncio."""
+        specs = {name: self.machine.axes[name] for name in self.axes}
+        return {
+            name: AsyncAxis(
+                buses[spec.bus],
+                name,
+                spec,
+                buses[spec.bus].family.devices.awaiting(buses[spec.bus], spec.node),
+                {},
+            )
+            for name, spec in specs.items()
+        }
+
+
+def loaded(path: str | PathLike[str]) -> Machine:
+    """The machine of a file, with every address in it checked. Raises RequestError as `Machine.load`."""
+    return Machine.load(path, check_address=lambda address: prepare(address, {}))
+
+
+def _chosen(machine: Machine, names: str | Iterable[str]) -> tuple[str, ...]:
+    wanted = (names,) if isinstance(names, str) else tuple(names)
+    return tuple(dict.fromkeys(axis for name in wanted for axis in machine.axes_of(name)))
+
+
+def _check_ports(machine: Machine, buses: Iterable[str]) -> None:
+    """Raise RequestError for an address that cannot be, and for a port that two buses share."""
+    taken: dict[str, str] = {}
+    for name in buses:
+        try:
+            port = lock_name(machine.buses[name].address, {})
+        except MotorbusError as error:
+            raise named(f"bus.{name}", error) from error
+        if port in taken and port not in ("", "sim"):
+            raise RequestError(
+                f"bus.{name}.address: {port} is the port of bus.{taken[port]} too",
+                expected="a port for each bus",
+                advice="give the axes of both to one bus, or change an address; nothing was opened",
+            )
+        taken[port] = name

@@ -1,0 +1,41 @@
+"""The emergency stop of a whole machine: every bus in a thread of its own, so that none waits for another.
+
+It does not go through whoever carries out movements: what is to be stopped may be what that waits for.
+"""
+
+from __future__ import annotations
+
+from threading import Thread
+
+from motorbus.bus.stop import StopOutcome
+from motorbus.errors import MotorbusError
+from motorbus.motion.body import Body
+
+
+def estop(body: Body) -> dict[str, StopOutcome]:
+    """Stop every bus of a machine at the same time; what came of each, by its name."""
+    found: dict[str, StopOutcome] = {}
+
+    def one(name: str) -> None:
+        found[name] = _stopped(body, name)
+
+    threads = [Thread(target=one, args=(name,), name=f"motorbus estop {name}") for name in body.buses]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return {name: found[name] for name in body.buses}
+
+
+def _stopped(body: Body, name: str) -> StopOutcome:
+    try:
+        return body.buses[name].estop()
+    except MotorbusError as error:  # closed, or its port is gone: the others are stopped all the same
+        nodes = tuple(axis.spec.node for axis in body.axes.values() if axis.spec.bus == name)
+        return StopOutcome((), nodes, 0, f"nothing: {error.summary}")
+
+
+def reset(body: Body) -> None:
+    """Take the latch of an emergency stop off every bus."""
+    for bus in body.buses.values():
+        bus.reset()

@@ -1,0 +1,324 @@
+"""What devices offer a machine: every capability as the contract has it, and trains, which whole robots are led by."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from math import inf, isfinite, nan
+from typing import Any
+
+import pytest
+
+from motorbus.core.family import Family, State, Train
+from motorbus.core.operation import Effect, Exchange, Operation, Runnable, Together, outcome
+from motorbus.errors import LimitExceeded, NoReply, RequestError
+from tests.conformance.subjects import line_of
+from tests.conformance.world import IDS, Steps, World, abilities, sent, world
+
+DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    **dict.fromkeys(
+        ("state", "position", "velocity", "load", "current", "voltage", "temperature"), (("device",), ())
+    ),
+    **dict.fromkeys(("enable_torque", "disable_torque", "stop", "limits"), (("device",), ())),
+    "move": (("device", "to"), ("wait",)),
+    "move_by": (("device", "angle"), ("velocity", "wait")),
+    "jog": (("device", "velocity", "seconds"), ()),
+    "home": (("device",), ("deadline",)),
+    "run": (("device", "number"), ("timeout",)),
+    "cap_torque": (("device", "fraction"), ()),
+    "cap_current": (("device", "ampere"), ()),
+    "train": (("devices",), ("rate",)),
+    "keep_time": (("device", "angle", "timing"), ("velocity", "acceleration")),
+}
+"""By capability: what it is called with in order, and what by name."""
+TOLD = ("position", "velocity", "load", "current", "voltage", "temperature")
+NODE, OTHER, LAST = IDS
+WAY = 0.3  # rad; some servos turn 44° to either side and no more
+
+
+# --- each capability ----------------------------------------------------------------------------------------
+
+
+def test_capabilities_are_those_of_the_contract_and_are_called_as_it_says(subject: Family) -> None:
+    for name, function in abilities(subject).items():
+        order, named = DOCUMENTED[name]
+        inspect.signature(function).bind(*order, **dict.fromkeys(named))
+
+
+def test_what_is_no_model_has_no_axis(subject: Family) -> None:
+    assert dict(subject.axis("no such model")) == dict(subject.axis("")) == {}
+
+
+def test_a_model_that_is_led_tells_its_position_and_its_limits_and_can_be_stopped(leader: Family) -> None:
+    assert {"position", "state", "limits", "move", "stop"} <= abilities(leader).keys()
+
+
+def test_a_torque_switch_goes_both_ways(subject: Family) -> None:
+    assert ("enable_torque" in abilities(subject)) == ("disable_torque" in abilities(subject))
+
+
+def test_what_it_tells_is_a_number_and_telling_writes_nothing(subject: Family) -> None:
+    able = abilities(subject)
+    with world(subject) as there:
+        before = there.settings()
+        for name in TOLD:
+            if name in able:
+                assert isfinite(ran(there, able[name](there.device(there.ids[0]))))
+        if "state" in able:
+            assert isinstance(ran(there, able["state"](there.device(there.ids[0]))), State)
+        assert there.settings() == before
+
+
+def test_limits_are_read_from_a_device_that_is_not_known_and_contain_where_it_stands(leader: Family) -> None:
+    able = abilities(leader)
+    with world(leader) as there:
+        before = there.settings()
+        device = there.device(NODE)
+        low, high = ran(there, able["limits"](device))
+        assert low < ran(there, able["position"](device)) < high
+        assert there.settings() == before
+        with pytest.raises(LimitExceeded):
+            device.move(high + 0.1)
+
+
+def test_a_cap_is_taken_lasts_until_power_off_and_keeps_nothing(subject: Family) -> None:
+    able = abilities(subject)
+    with world(subject) as there:
+        for name, cap in (("cap_torque", 0.4), ("cap_current", 0.3)):
+            if name in able:
+                before = there.settings()
+                ran(there, able[name](there.device(NODE), cap), Effect.MOTION)
+                assert there.settings() != before
+                there.simulator.nodes[NODE].power_cycle()
+                assert there.settings() == before
+
+
+# --- trains -------------------------------------------------------------------------------------------------
+
+
+def ran(there: World, operation: Runnable[Any], worst: Effect = Effect.NONE) -> Any:
+    """The value of the operation, of which nothing had a greater effect than this."""
+    steps = Steps(there.bus)
+    value = steps.run(operation)
+    assert max((exchange.effect for exchange in steps.exchanges), default=Effect.NONE) <= worst
+    return value
+
+
+def coupled(there: World) -> Train:
+    """All devices as a train; so far nothing was written."""
+    before = there.settings()
+    devices = [there.device(node) for node in there.ids]
+    train: Train = ran(there, abilities(there.family)["train"](devices, rate=there.family.link.rate))
+    assert there.settings() == before
+    return train
+
+
+def heard(there: World, train: Train) -> dict[int, float]:
+    """All positions that it brings; a node that is silent is missing, or all that its exchange asked for."""
+    values: dict[int, float] = {}
+    for found in there.bus.run(visited(train.positions)):
+        if not isinstance(found, Exception):
+            values |= found.values
+            assert set(found.missing).isdisjoint(found.values)
+            assert found.at <= there.link.now()
+        else:
+            assert isinstance(found, NoReply)
+    return values
+
+
+def visited(exchanges: Any) -> Operation[list[Any]]:
+    return (yield from Together([outcome(one) for one in exchanges]))
+
+
+def led(there: World, train: Train, to: Mapping[int, float]) -> None:
+    there.bus.run(together(train.goals(to)))
+
+
+def together(exchanges: Any) -> Operation[None]:
+    yield from Together(list(exchanges))
+
+
+def stands(there: World) -> dict[int, int]:
+    """Where the simulated devices are, in counts."""
+    return {node: there.memory(node)["present_position"] for node in there.ids}
+
+
+def test_a_train_knows_its_nodes_and_brings_the_position_of_each_again_and_again(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        assert train.nodes == there.ids
+        for _ in range(3):
+            told = {node: there.device(node).position() for node in there.ids}
+            assert heard(there, train) == pytest.approx(told)
+        assert {one.effect for one in train.positions} == {Effect.NONE}
+
+
+def test_it_is_known_by_then_and_positions_and_goals_ask_nothing_more(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        with sent(there.bus) as frames:
+            here = heard(there, train)
+        assert len(frames) == len(train.positions)
+        there.bus.run(train.begin({}))
+        goals = train.goals(here)
+        with sent(there.bus) as frames:
+            there.bus.run(together(goals))
+        assert len(frames) == len(goals)
+        assert all(isinstance(one, Exchange) and one.effect is Effect.MOTION for one in goals)
+
+
+def test_beginning_moves_nothing_wherever_the_devices_went_before(leader: Family) -> None:
+    with world(leader) as there:
+        for node in there.ids:
+            device = there.device(node)
+            switched(there, node, "enable_torque")
+            device.move(device.position() + WAY)
+            switched(there, node, "disable_torque")
+        train = coupled(there)
+        before = stands(there)
+        there.bus.run(train.begin(dict.fromkeys(there.ids, 2.0)))
+        there.link.advance(1.0)
+        assert all(abs(here - before[node]) <= 1 for node, here in stands(there).items())
+
+
+def test_beginning_stops_who_is_on_his_way(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        device = there.device(NODE)
+        switched(there, NODE, "enable_torque")
+        goal = device.position() + WAY
+        device.move(goal, wait=False)
+        there.link.advance(0.01)
+        there.bus.run(train.begin({}))
+        there.link.advance(1.0)
+        assert device.position() < goal - WAY / 4
+
+
+def test_goals_are_gone_to_by_those_who_get_one(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        there.bus.run(train.begin(dict.fromkeys(there.ids, 3.0)))
+        begun = heard(there, train)
+        led(there, train, {node: here + WAY for node, here in begun.items()})
+        there.link.advance(2.0)
+        assert heard(there, train) == pytest.approx({n: here + WAY for n, here in begun.items()}, abs=0.02)
+        led(there, train, {LAST: begun[LAST]})
+        there.link.advance(2.0)
+        wanted = {NODE: begun[NODE] + WAY, OTHER: begun[OTHER] + WAY, LAST: begun[LAST]}
+        assert heard(there, train) == pytest.approx(wanted, abs=0.02)
+
+
+def test_who_is_led_stays_close_behind_goals_that_come_in_small_steps(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        there.bus.run(train.begin({}))
+        begun = heard(there, train)
+        for step in range(60):
+            led(there, train, {node: here + step * 0.005 for node, here in begun.items()})
+            there.link.advance(0.01)
+        behind = {node: begun[node] + 59 * 0.005 - here for node, here in heard(there, train).items()}
+        assert all(abs(lag) < 0.05 for lag in behind.values()), behind
+
+
+@pytest.mark.parametrize("way", [0.05, -0.05])
+def test_goals_outside_the_limits_are_refused_for_all_and_nothing_moves(leader: Family, way: float) -> None:
+    able = abilities(leader)
+    with world(leader) as there:
+        train = coupled(there)
+        there.bus.run(train.begin({}))
+        there.link.advance(0.5)
+        here, before = heard(there, train), stands(there)
+        bounds = ran(there, able["limits"](there.device(NODE)))
+        beyond = bounds[way > 0] + way
+        with sent(there.bus) as frames, pytest.raises(LimitExceeded) as caught:
+            led(there, train, here | {NODE: beyond})
+        assert caught.value.node == NODE
+        assert len(frames) < len(there.ids)  # where each has a frame of its own, the others may have theirs
+        there.link.advance(0.5)
+        assert stands(there)[NODE] == before[NODE]
+
+
+@pytest.mark.parametrize("goal", [nan, inf, -inf, 1e12, -1e300])
+def test_goals_that_are_no_position_are_refused_before_an_exchange_is_made(
+    leader: Family, goal: float
+) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        with pytest.raises(LimitExceeded) as caught:
+            train.goals({NODE: goal})
+        assert caught.value.node == NODE
+
+
+def test_goals_for_somebody_else_are_refused(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        with pytest.raises(RequestError, match="60"):
+            train.goals({60: 0.0})
+
+
+def test_every_goal_names_its_node_and_the_limits_that_the_gate_judges_it_by(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        for goal in train.goals(heard(there, train)):
+            assert goal.goals
+            assert all(one.low is not None and one.high is not None for one in goal.goals)
+            assert {one.node for one in goal.goals} <= set(train.nodes)
+
+
+@pytest.mark.parametrize("dead", IDS)
+def test_a_dead_node_is_missing_and_costs_nobody_else_his_position(leader: Family, dead: int) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        there.bus.run(train.begin({}))
+        there.simulator.nodes[dead].unplug()
+        assert heard(there, train).keys() == set(there.ids) - {dead}
+        led_others(there, train, dead)
+
+
+def led_others(there: World, train: Train, dead: int) -> None:
+    """Who is there follows a goal although one is dead."""
+    alive = heard(there, train)
+    to = {node: here + 0.02 for node, here in alive.items()}
+    there.bus.run(visited(train.goals(to | {dead: 0.1})))
+    there.link.advance(0.5)
+    assert heard(there, train) == pytest.approx(to, abs=0.01)
+
+
+def test_beginning_visits_everyone_and_then_says_who_is_dead(leader: Family) -> None:
+    with world(leader) as there:
+        train = coupled(there)
+        there.simulator.nodes[NODE].unplug()
+        with pytest.raises(NoReply) as caught:
+            there.bus.run(train.begin({}))
+        assert caught.value.node == NODE
+        led_others(there, train, NODE)
+
+
+def test_a_train_with_a_dead_node_is_not_made(leader: Family) -> None:
+    with world(leader) as there:
+        there.simulator.nodes[OTHER].unplug()
+        with pytest.raises(NoReply) as caught:
+            coupled(there)
+        assert caught.value.node == OTHER
+
+
+def test_who_is_known_is_coupled_again_without_being_asked(leader: Family) -> None:
+    able = abilities(leader)
+    with world(leader) as there:
+        devices = [there.device(node) for node in there.ids]
+        make: Callable[[], Runnable[Train]] = lambda: able["train"](devices, rate=leader.link.rate)  # noqa: E731
+        there.bus.run(make())
+        with sent(there.bus) as frames:
+            there.bus.run(make())
+        assert frames == []
+
+
+def test_only_lines_that_can_hold_several_devices_have_trains(leader: Family) -> None:
+    assert line_of(leader).devices != 1
+
+
+def switched(there: World, node: int, name: str) -> None:
+    """The torque, where there is a switch for it."""
+    able = abilities(there.family)
+    if name in able:
+        there.bus.run(able[name](there.device(node)))

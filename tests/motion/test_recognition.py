@@ -1,0 +1,130 @@
+"""Opening a machine asks each device what it is: who is silent is named, and what the file asks in vain is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from motorbus import NoReply, RequestError, Robot
+from motorbus.core.family import Identity
+from motorbus.core.operation import Operation, Pause
+from motorbus.motion import recognition
+from tests.motion.machines import listened, machine, said
+
+
+def test_every_device_is_asked_and_its_axis_knows_what_it_can_do() -> None:
+    with machine(arm="1-2", can="0x25", lift=True) as (made, _), Robot.of(made) as robot:
+        assert [axis.model for axis in robot.axes.values()] == [
+            "STS3215",
+            "STS3215",
+            robot["c1"].model,
+            "stepper controller",
+        ]
+        assert all(axis.able for axis in robot.axes.values())
+
+
+def test_loading_only_reads() -> None:
+    with machine(arm="1-6", can="0x25,0x26", lift=True) as (made, sims):
+        before = [sims["arm"][node].memory.read(0, 56) for node in range(1, 7)]
+        listened(sims)
+        with Robot.of(made) as robot:
+            robot.positions()
+            robot.states()
+        sent = said(sims)
+        assert len(sent) > 20
+        assert all(_reads(title) for title in sent), [title for title in sent if not _reads(title)]
+        assert [sims["arm"][node].memory.read(0, 56) for node in range(1, 7)] == before
+
+
+def _reads(title: str) -> bool:
+    return title.startswith(("READ ", "SYNC READ", "PING")) or ": read " in title.lower()
+
+
+def test_who_is_silent_is_named_with_axis_device_and_address() -> None:
+    with machine(arm="1-6") as (made, sims):
+        sims["arm"][3].unplug()
+        with pytest.raises(NoReply, match="a3: arm#3 does not answer") as caught:
+            Robot.of(made)
+        assert sims["arm"].url in str(caught.value)
+        assert "id 3" in str(caught.value)
+        assert "nothing was sent but questions" in str(caught.value)
+
+
+def test_all_who_are_silent_are_named_on_every_bus() -> None:
+    with machine(arm="1-6", can="0x25,0x26") as (made, sims):
+        for bus, node in (("arm", 2), ("arm", 5), ("can", 0x26)):
+            sims[bus][node].unplug()
+        with pytest.raises(NoReply) as caught:
+            Robot.of(made)
+        told = "\n".join([str(caught.value), *caught.value.__notes__])
+        assert all(name in told for name in ("a2: arm#2", "a5: arm#5", "c2: can#0x26"))
+        assert "a1:" not in told
+
+
+def test_what_is_not_wanted_need_not_answer() -> None:
+    with machine(arm="1-3", can="0x25") as (made, sims):
+        sims["arm"][3].unplug()
+        sims["can"][0x25].unplug()
+        with Robot.of(made, ["a1", "a2"]) as robot:
+            assert list(robot.axes) == ["a1", "a2"]
+            assert list(robot.buses) == ["arm"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "keys", "what"),
+    [
+        ("c1", {"torque": 0.5}, "a cap of its torque"),
+        ("c1", {"current": "0.4 A"}, "a cap of its current"),
+        ("a1", {"current": "0.4 A"}, "a cap of its current"),
+        ("lift", {"torque": 0.5}, "a cap of its torque"),
+        ("c1", {"exit": "torque_off"}, "a switch for its torque"),
+        ("lift", {"exit": "torque_off"}, "a switch for its torque"),
+    ],
+)
+def test_what_the_file_asks_in_vain_is_refused_and_nothing_moves(
+    axis: str, keys: dict[str, Any], what: str
+) -> None:
+    with machine(arm="1", can="0x25", lift=True, axes={axis: keys}) as (made, sims):
+        listened(sims)
+        with pytest.raises(RequestError, match=rf"axis\.{axis}\.") as caught:
+            Robot.of(made)
+        assert what in str(caught.value)
+        assert "what to do: " in str(caught.value)
+        assert all(_reads(title) for title in said(sims))
+        with Robot.of(made, [name for name in made.axes if name != axis]) as robot:
+            assert robot.axes, "and the ports were given back"
+
+
+def test_a_place_to_park_needs_a_way_to_it() -> None:
+    with machine(can="0x25", exit="park", park="0 deg") as (made, _), Robot.of(made, "c1") as robot:
+        axis = robot["c1"]
+        assert recognition._lacking(axis) is None
+        axis.able = {"position": axis.able["position"]}
+        refused = recognition._lacking(axis)
+        assert refused is not None
+        assert "axis.c1.exit" in str(refused)
+
+
+def test_a_device_of_which_nobody_has_said_what_it_can_do_is_refused() -> None:
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        axis = robot["a1"]
+        device = axis.device
+
+        def other() -> Operation[Identity]:
+            yield from Pause(0)
+            return Identity(1, "SCS9999", "9.9", "")
+
+        axis.device = type("Other", (), {"identify": type("_", (), {"function": lambda _: other()})})()
+        with pytest.raises(RequestError, match="a1: arm#1 is SCS9999, of which nobody has said"):
+            robot.conductor.run(recognition.recognise(robot))
+        axis.device = device
+        robot.conductor.run(recognition.recognise(robot))
+        assert "position" in axis.able
+        assert replace(other_identity(), firmware="1").firmware == "1"
+
+
+def other_identity() -> Identity:
+    """What it says."""
+    return Identity(1, "SCS9999", "9.9", "")
