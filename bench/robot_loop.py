@@ -2,10 +2,10 @@
 
     python -m bench.robot_loop [--seconds 60]
 
-The other end is the responder in C, on which bytes take as long as at that baud rate. At 80 % of the highest rate that
-the budget names there is to be no overrun in a minute, and asked for that highest rate itself the loop is to achieve 88 %
-of what the wire carries. Both are measured with goals that are followed and with goals that are sent as they are. Each
-axis counts how often it was read, so a reading that is lost, doubled or stale is found, and so is a goal.
+The other end is the responder in C, on which bytes take as long as at that baud rate. At 80 % of the highest rate
+that the budget names there is to be no overrun in a minute, and asked for that highest rate itself the loop is to
+achieve 88 % of what the wire carries. Both are measured with goals that are followed and with goals that are sent as
+they are. Each axis counts how often it was read, so a reading that is lost, doubled or stale is found.
 """
 
 from __future__ import annotations
@@ -33,7 +33,17 @@ SECONDS = 60.0
 FLAT_OUT = 5.0
 STEP = math.tau / COUNTS
 KINDS = ("followed", "direct")
-COLUMNS = ("", "asked for, Hz", "cycles/s", "of the wire's", "overruns", "skipped", "late, µs", "cycle, µs", "processor µs")
+COLUMNS = (
+    "",
+    "asked for, Hz",
+    "cycles/s",
+    "of the wire's",
+    "overruns",
+    "skipped",
+    "late, µs",
+    "cycle, µs",
+    "processor µs",
+)
 
 
 class Sample(NamedTuple):
@@ -72,7 +82,8 @@ def described(port: str) -> str:
 def course(count: int) -> list[dict[str, float]]:
     """Ways from the first position for so many cycles, about as slow as a hand: within what every axis may do."""
     return [
-        {f"a{node}": 0.2 - 0.2 * math.cos(number * (5 + node) / 4000) for node in IDS} for number in range(count)
+        {f"a{node}": 0.2 - 0.2 * math.cos(number * (5 + node) / 4000) for node in IDS}
+        for number in range(count)
     ]
 
 
@@ -141,9 +152,14 @@ def sample(program: Path, kind: str, rate: float, seconds: float) -> Sample:
     """One loop, in a process of its own, against a fresh line. Raises Wrong."""
     BUILD.mkdir(exist_ok=True)
     with responder(program, BAUD) as wire:
+        wanted = {"port": wire.port, "kind": kind, "rate": rate, "seconds": seconds}
         done = subprocess.run(
-            [sys.executable, "-m", "bench.robot_loop", "--port", wire.port, "--kind", kind]
-            + ["--rate", str(rate), "--seconds", str(seconds)],
+            [
+                sys.executable,
+                "-m",
+                "bench.robot_loop",
+                *(f"--{name}={value}" for name, value in wanted.items()),
+            ],
             capture_output=True,
             text=True,
             timeout=seconds + 60,

@@ -15,6 +15,13 @@ EXPECTED = {
     "async_servos.py": ["1: 3.142 rad", "6: 3.142 rad", "7: no reply"],
     "can_servo.py": ["simulated", "at 10.9°", "at -0.8°", "at 0.0°"],
     "control_loop.py": ["cycles/s, simulated"],
+    "robot.py": [
+        "bench: 9 axes, simulated",
+        "3 axes moved in 1.00",
+        "shoulder at -0.30",
+        "slide at 0.020, estimated",
+    ],
+    "async_robot.py": ["2 axes moved", "held up: True", "tilt 0.20 rad"],
     "test_of_my_robot.py": ["1 passed"],
 }
 

@@ -5,6 +5,7 @@ It draws with the Agg canvas and no global state, so it needs no display and dis
 
 from __future__ import annotations
 
+from itertools import product
 from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _INK: Final = "#24292f"
 _FAINT: Final = "#8c959f"
 _GRID: Final = "#e6e9ec"
+_SHADE: Final = "#eceff2"
 # Told apart by readers with any colour vision, and on a dark or a light page.
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _ROOM: Final = 1.3
@@ -90,15 +92,16 @@ def tracks(
     times: Sequence[float],
     axes: Mapping[str, Track],
     *,
+    spans: Sequence[Span] = (),
     title: str = "",
     remark: str = "",
 ) -> None:
     """Draw each axis of a machine in a panel of its own: goal (dashed) and present (solid), and below it the error.
 
     `times` in s, and every track has one value for each of them, or for each of its own. Units may differ from axis to
-    axis, as an arm has degrees and a slide millimetres. What is estimated has another colour, and says so. The suffix
-    of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data do not fit together and
-    MotorbusError when matplotlib is not installed.
+    axis, as an arm has degrees and a slide millimetres. What is estimated has another colour, and says so. `spans` are
+    shaded in every panel and named below. The suffix of `path` chooses the format (.png, .svg, .pdf). Raises
+    RequestError when the data do not fit together and MotorbusError when matplotlib is not installed.
     """
     moments = {name: track.times or times for name, track in axes.items()}
     if not axes or any(len(row) != len(moments[name]) for name, one in axes.items() for row in one[:2]):
@@ -118,12 +121,14 @@ def tracks(
         if number < len(axes):
             name = list(axes)[number]
             _draw_track(*pair, moments[name], axes[name], name, lowest=number + across >= len(axes))
+            for panel, span in product(pair, spans):
+                panel.axvspan(span.begin, span.end, facecolor=_SHADE, edgecolor="none", zorder=0)
             if min(ends) < max(ends):
                 pair[0].set_xlim(min(ends), max(ends))
         else:
             for empty in pair:
                 empty.set_axis_off()
-    _draw_key(figure, estimated=any(track.estimated for track in axes.values()))
+    _draw_key(figure, spans, estimated=any(track.estimated for track in axes.values()))
     _saved(figure, path)
 
 
@@ -149,8 +154,9 @@ def _draw_track(
         error.set_xlabel("time (s)", fontsize=9, color=_INK)
 
 
-def _draw_key(figure: Any, *, estimated: bool) -> None:
+def _draw_key(figure: Any, spans: Sequence[Span], *, estimated: bool) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     reckoned = [Line2D([], [], color=_COLOURS[2], linewidth=1.8, label="estimated: reckoned, not measured")]
     lines = [
@@ -158,6 +164,10 @@ def _draw_key(figure: Any, *, estimated: bool) -> None:
         Line2D([], [], color=_COLOURS[0], linewidth=1.8, label="present"),
         *(reckoned if estimated else []),
         Line2D([], [], color=_COLOURS[1], linewidth=1.2, label="error: present − goal"),
+        *(
+            Patch(facecolor=_SHADE, edgecolor="none", label=name)
+            for name in dict.fromkeys(span.name for span in spans)
+        ),
     ]
     figure.legend(
         handles=lines,

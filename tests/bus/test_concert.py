@@ -258,7 +258,12 @@ def test_a_bell_is_heard_from_other_threads_only_and_once() -> None:
     bell.thread = threading.get_ident()
     bell.ring()
     assert bell.wait([], 0.0) == []
-    thread = threading.Thread(target=lambda: [bell.ring() for _ in range(100_000)])
+
+    def ring() -> None:
+        for _ in range(100_000):
+            bell.ring()
+
+    thread = threading.Thread(target=ring)
     thread.start()
     thread.join()
     assert bell.wait([], 60.0) == [bell.descriptor]

@@ -79,3 +79,22 @@ def test_a_thread_that_waits_for_something_far_away_holds_up_no_deadline() -> No
     assert min(seconds) < 0.5, "not only when the listener wakes"
     thread.join(20)
     bus.close()
+
+
+def test_the_pump_is_claimed_by_one_and_whoever_left_a_bell_hears_that_it_is_free() -> None:
+    bus, _ = memory_bus()
+    rung: list[str] = []
+    bus.relay.bells.add(lambda: rung.append("free"))
+    assert bus.relay.claim()
+    assert bus.relay.claim(), "the same thread again"
+    claims: list[bool] = []
+    thread = threading.Thread(target=lambda: claims.append(bus.relay.claim()))
+    thread.start()
+    thread.join()
+    assert claims == [False]
+    assert rung == []
+    bus.relay.hand_over()
+    assert bus.relay.pumper is None
+    assert rung == ["free"]
+    assert bus.run(position(1)) == 1
+    assert len(rung) > 1, "each time that somebody has pumped"

@@ -11,8 +11,11 @@ import pytest
 
 import motorbus
 from motorbus.cli import main
+from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
+from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
+from tests.motion.machines import machine
 
 
 class Ran(NamedTuple):
@@ -34,6 +37,15 @@ class Ran(NamedTuple):
 
 
 Run = Callable[..., Ran]
+
+
+@pytest.fixture(autouse=True)
+def no_file_of_the_user(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """No machine file of whoever runs the tests counts. The folder where one would be looked for."""
+    monkeypatch.delenv(VARIABLE, raising=False)
+    folder = tmp_path_factory.mktemp("config")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder))
+    return folder / "motorbus"
 
 
 @pytest.fixture
@@ -67,3 +79,39 @@ def served(tmp_path: Path, state_folder: Path) -> Iterator[Simulated]:
     """Three simulated servos in a process of their own on a pseudo-terminal; `served.bus` is their bus."""
     with Simulated("feetech", ids="1-3", link=tmp_path / "bus") as simulated:
         yield simulated
+
+
+class Bench(NamedTuple):
+    """A machine in this process, in virtual time, whose file is in the present folder: axes a1 to a3, c1 and lift."""
+
+    machine: Machine
+    simulations: dict[str, Simulation]
+    file: Path
+
+    def describe(self, extra: str) -> None:
+        """Append to the file."""
+        self.file.write_text(self.file.read_text(encoding="utf-8") + extra, encoding="utf-8")
+
+
+POSES = """
+[pose.ready]
+a1 = "10 deg"
+c1 = "-5 deg"
+
+[pose.whole]
+a1 = "20 deg"
+lift = "15 mm"
+"""
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    """See `Bench`; parking goes to 30 degrees with a1 and to 2 mm with the lift, whose home switch is there."""
+    axes = {"a1": {"park": "30 deg"}, "lift": {"park": "2 mm"}}
+    wired = {"stage": {"home_switch": "wired"}}
+    with machine(arm="1-3", can="0x25", lift=True, axes=axes, options=wired, extra=POSES) as (made, sims):
+        monkeypatch.chdir(tmp_path)
+        file = tmp_path / "motorbus.toml"
+        text = made.text().replace("[pose.ready]", "[pose.ready]  # before work")
+        file.write_text(f"# The bench.\n{text}", encoding="utf-8")
+        yield Bench(made, sims, file)

@@ -4,9 +4,9 @@ Of subjects there are also `shared`, on whose line are several devices, and `wri
 
 A test asks by name: `family`, where no device matters; `subject`, a family with simulated devices of one kind, of which
 it may have several. And some subjects: `lockable`, whose EEPROM has a lock; `mover`, whose devices move; `limp`, whose
-devices can be let go; `leader`, whose devices can be led in a loop; `reporter`, whose devices say something unasked;
-`reporting_mover`, whose devices report a move without having been told to; `plain_one`, with rows that just keep a
-value. Or a family together with one of its vectors, see `VECTORS`.
+devices can be let go; `leader`, whose devices can be led in a loop, and `keeping_leader`, which also has settings that
+are kept; `reporter`, whose devices say something unasked; `reporting_mover`, whose devices report a move without having
+been told to; `plain_one`, with rows that just keep a value. Or a family together with one of its vectors: `VECTORS`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import pytest
 
 from motorbus.core.family import Family
 from tests.conformance.subjects import FAMILIES, SUBJECTS, Line, Vector, line_of, tables_of, vectors
-from tests.conformance.world import has, has_torque_switch, leads, locks, moves, plain, reports
+from tests.conformance.world import has, has_torque_switch, kept, leads, locks, moves, plain, reports
 
 
 def _is_reply(vector: Vector) -> bool:
@@ -44,6 +44,7 @@ SUITS: dict[str, Callable[[Family], object]] = {
     "mover": moves,
     "reporter": reports,
     "leader": leads,
+    "keeping_leader": lambda subject: leads(subject) and any(kept(table) for table in tables_of(subject)),
     "limp": has_torque_switch,
     "reporting_mover": lambda family: moves(family) and reports(family) and not has(family, "start_reports"),
     "plain_one": lambda subject: any(plain(table) for table in tables_of(subject)),

@@ -13,7 +13,7 @@ from motorbus.core.family import Family, State, Train
 from motorbus.core.operation import Effect, Exchange, Operation, Runnable, Together, outcome
 from motorbus.errors import LimitExceeded, NoReply, RequestError
 from tests.conformance.subjects import line_of
-from tests.conformance.world import IDS, Steps, World, abilities, sent, world
+from tests.conformance.world import IDS, Steps, World, abilities, kept, sent, world
 
 DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(
@@ -263,6 +263,24 @@ def test_every_goal_names_its_node_and_the_limits_that_the_gate_judges_it_by(lea
             assert goal.goals
             assert all(one.low is not None and one.high is not None for one in goal.goals)
             assert {one.node for one in goal.goals} <= set(train.nodes)
+
+
+def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Family) -> None:
+    with world(keeping_leader) as there:
+        device = there.device(NODE)
+        devices = [device, *(there.device(node) for node in there.ids[1:])]
+        train = there.bus.run(abilities(keeping_leader)["train"](devices, rate=keeping_leader.link.rate))
+        there.bus.run(train.begin({}))
+        goals = train.goals(heard(there, train))
+        row = next(row for row in kept(there.table(NODE)) if not row.choices)
+        device.write(**device.read(row.name))
+        mine = [one for one in goals if NODE in {goal.node for goal in one.goals}]
+        with sent(there.bus) as frames:
+            for one in mine:
+                with pytest.raises(RequestError):
+                    there.bus.run(one)
+        assert mine
+        assert frames == []
 
 
 @pytest.mark.parametrize("dead", IDS)

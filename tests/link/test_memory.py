@@ -51,6 +51,19 @@ def test_what_has_arrived_is_there_for_a_read_in_the_past() -> None:
     assert (link.now(), link.read(0.0)) == (1.0, [PING[::-1]])
 
 
+def test_it_tells_when_something_happens_next() -> None:
+    link = MemoryLink(Parrot())
+    assert link.due() == float("inf")
+    link.write(PING)
+    assert link.due() == link.now(), "the request reaches the device"
+    link.read(0.0)
+    assert link.due() == DELAY
+    link.advance(1.0)
+    assert link.due() < link.now(), "what has come waits to be read"
+    link.read(0.0)
+    assert link.due() == float("inf")
+
+
 def test_it_starts_when_told() -> None:
     link = MemoryLink(Parrot(), start=17.0)
     link.write(PING)

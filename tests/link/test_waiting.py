@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from motorbus.link import waiting
-from motorbus.link.waiting import wait_readable
+from motorbus.link.waiting import wait_any, wait_readable
 
 
 @pytest.fixture
@@ -40,3 +40,23 @@ def test_the_end_of_the_other_side_is_seen(pipe: tuple[int, int]) -> None:
     assert wait_readable(reader, float("inf"))
     assert os.read(reader, 1) == b""
     os.close(reader)
+
+
+def test_of_several_those_are_told_that_have_something(pipe: tuple[int, int]) -> None:
+    reader, writer = os.pipe()
+    try:
+        assert wait_any([pipe[0], reader], 0.001) == []
+        os.write(writer, b"x")
+        assert wait_any([pipe[0], reader], float("inf")) == [reader]
+        os.write(pipe[1], b"x")
+        assert wait_any([pipe[0], reader], float("inf")) == [pipe[0], reader]
+    finally:
+        os.close(writer)
+    os.close(pipe_end := reader)
+    with pytest.raises((OSError, ValueError)):
+        wait_any([pipe[0], pipe_end], 1.0)
+
+
+def test_a_number_that_is_no_descriptor_is_refused(pipe: tuple[int, int]) -> None:
+    with pytest.raises((OSError, ValueError)):
+        wait_any([pipe[0], -1], 1.0)

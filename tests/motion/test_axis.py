@@ -7,7 +7,8 @@ import asyncio
 import pytest
 
 from motorbus import AsyncRobot, RequestError, Robot
-from motorbus.motion.axis import AsyncAxis, Axis, ability
+from motorbus.motion.axes import AsyncAxis, Axis
+from motorbus.motion.axis import ability
 from motorbus.motion.body import Body
 from tests.motion.machines import listened, machine, said
 
@@ -17,7 +18,15 @@ TURNED = {"zero": "90 deg", "sign": -1, "gear": 2.0, "low": "-40 deg", "high": "
 def test_an_axis_has_what_its_device_has() -> None:
     with machine(arm="1", can="0x25", lift=True) as (made, _), Robot.of(made) as robot:
         servo, can, lift = robot["a1"], robot["c1"], robot["lift"]
-        assert {"position", "load", "temperature", "enable_torque", "stop", "hold", "feedback"} <= servo.capabilities
+        assert {
+            "position",
+            "load",
+            "temperature",
+            "enable_torque",
+            "stop",
+            "hold",
+            "feedback",
+        } <= servo.capabilities
         assert {"position", "state", "stop", "hold", "feedback"} <= can.capabilities
         assert {"move_by", "jog", "home", "stop", "hold", "estimated"} <= lift.capabilities
         assert not {"position", "state", "enable_torque", "feedback"} & lift.capabilities
@@ -39,7 +48,9 @@ def test_every_capability_is_a_verb_that_is_there() -> None:
     with machine(arm="1", can="0x25", lift=True) as (made, _), Robot.of(made) as robot:
         for axis in robot.axes.values():
             verbs = axis.capabilities - {"feedback", "estimated"}
-            assert verbs == {name for name in dir(type(axis)) if _is_verb(type(axis), name) and hasattr(axis, name)}
+            assert verbs == {
+                name for name in dir(type(axis)) if _is_verb(type(axis), name) and hasattr(axis, name)
+            }
 
 
 def _is_verb(kind: type, name: str) -> bool:

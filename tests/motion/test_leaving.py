@@ -1,4 +1,4 @@
-"""How a machine is left: each axis as its file says, everyone visited, and nothing sent to what rests where it shall."""
+"""How a machine is left: each axis as its file says, everyone visited, nothing sent to what rests where it shall."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from motorbus.core.operation import Operation, Pause, Together, outcome
 from motorbus.motion import moving
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving
+from motorbus.motion.machine import Machine
 from tests.motion.machines import Cut, listened, machine, said
 
 PARKED = {"exit": "park", "park": "10 deg"}
@@ -58,12 +59,20 @@ def test_each_axis_is_left_as_its_file_says() -> None:
         assert float(str(sims["stage"][1].status()["load"])) == pytest.approx(0.003 / 0.005 * 1600, rel=0.5)
 
 
+def _failing(made: Machine, error: BaseException, dead: Any = None) -> None:
+    """A program that ends by an error, after which a device is dead."""
+    with Robot.of(made) as robot:
+        robot.enable_torque()
+        if dead is not None:
+            dead.unplug()
+        raise error
+
+
 @pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
 def test_an_exception_leaves_it_in_the_same_way_and_is_what_is_raised(kind: type[BaseException]) -> None:
     with machine(arm="1", exit="torque_off") as (made, sims):
-        with pytest.raises(kind), Robot.of(made) as robot:
-            robot.enable_torque()
-            raise kind
+        with pytest.raises(kind):
+            _failing(made, kind())
         assert torque(sims, 1) == 0
 
 
@@ -76,7 +85,9 @@ def test_what_moves_is_stopped_first() -> None:
                 robot[name].device.move(4.0, velocity=0.5, wait=False)
             listened(sims)
         titles = [one for one in said(sims) if "WRITE" in one]
-        limp = next(number for number, one in enumerate(titles) if "servo 2" in one and _is_last(titles, number))
+        limp = next(
+            number for number, one in enumerate(titles) if "servo 2" in one and _is_last(titles, number)
+        )
         assert any("servo 1" in one for one in titles[:limp]), titles
         assert torque(sims, 2) == 0
         assert torque(sims, 1) == 1
@@ -96,13 +107,15 @@ def _wait(seconds: float) -> Operation[None]:
 
 def test_everyone_is_visited_though_some_are_dead() -> None:
     with machine(arm="1-4", can="0x25", exit="torque_off", axes={"c1": {"exit": "hold"}}) as (made, sims):
-        with pytest.raises(MotorbusError) as caught, Robot.of(made) as robot:
-            robot.enable_torque()
-            for axis in robot.axes.values():
-                axis.departs()
-            sims["arm"][1].unplug()
-            sims["arm"][3].unplug()
-            sims["can"][0x25].unplug()
+        robot = Robot.of(made)
+        robot.enable_torque()
+        for axis in robot.axes.values():
+            axis.departs()
+        sims["arm"][1].unplug()
+        sims["arm"][3].unplug()
+        sims["can"][0x25].unplug()
+        with pytest.raises(MotorbusError) as caught:
+            robot.close()
         assert [torque(sims, node) for node in (2, 4)] == [0, 0]
         told = "\n".join([str(caught.value), *caught.value.__notes__])
         assert all(name in told for name in ("a1", "a3", "c1"))
@@ -114,10 +127,8 @@ def test_everyone_is_visited_though_some_are_dead() -> None:
 
 def test_what_leaving_did_not_achieve_is_a_note_of_what_is_raised_already() -> None:
     with machine(arm="1-2", exit="torque_off") as (made, sims):
-        with pytest.raises(ValueError, match="mine") as caught, Robot.of(made) as robot:
-            robot.enable_torque()
-            sims["arm"][1].unplug()
-            raise ValueError("mine")
+        with pytest.raises(ValueError, match="mine") as caught:
+            _failing(made, ValueError("mine"), sims["arm"][1])
         assert any("leaving failed: a1" in note for note in caught.value.__notes__)
         assert torque(sims, 2) == 0
 
@@ -133,11 +144,13 @@ def test_one_that_lost_its_power_is_let_go_all_the_same() -> None:
 def test_an_interruption_while_leaving_skips_no_stop_and_no_torque_off() -> None:
     for number in range(1, 12):
         with machine(arm="1-3", exit="torque_off") as (made, sims):
-            with pytest.raises(KeyboardInterrupt), Robot.of(made) as robot:
-                robot.enable_torque()
-                for axis in robot.axes.values():
-                    axis.departs()
-                sims["arm"].line = Cut(number, number + 1, number + 3)
+            robot = Robot.of(made)
+            robot.enable_torque()
+            for axis in robot.axes.values():
+                axis.departs()
+            sims["arm"].line = Cut(number, number + 1, number + 3)
+            with pytest.raises(KeyboardInterrupt):
+                robot.close()
             assert [torque(sims, node) for node in (1, 2, 3)] == [0, 0, 0], number
 
 
@@ -177,18 +190,22 @@ def test_after_an_emergency_stop_nothing_is_sent_that_would_be_refused() -> None
 def test_what_nobody_knows_is_not_parked_and_the_others_are() -> None:
     axes = {"lift": {"exit": "park", "park": "3 mm"}, "a1": PARKED}
     with machine(arm="1", lift=True, axes=axes) as (made, _):
-        with pytest.raises(NotHomed, match="lift: where it is is not known"), Robot.of(made) as robot:
-            robot.enable_torque()
-            robot["lift"].move_by(0.001)
+        robot = Robot.of(made)
+        robot.enable_torque()
+        robot["lift"].move_by(0.001)
+        with pytest.raises(NotHomed, match="lift: where it is is not known"):
+            robot.close()
         with Robot.of(made) as robot:
             assert robot["a1"].position() == pytest.approx(0.1745, abs=0.01)
 
 
 def test_what_cannot_park_together_parks_alone() -> None:
     with machine(arm="1-3", exit="park", park="10 deg") as (made, sims):
-        with pytest.raises(MotorbusError, match="a2"), Robot.of(made) as robot:
-            robot.enable_torque()
-            sims["arm"][2].unplug()
+        robot = Robot.of(made)
+        robot.enable_torque()
+        sims["arm"][2].unplug()
+        with pytest.raises(MotorbusError, match="a2"):
+            robot.close()
         sims["arm"][2].plug()
         with Robot.of(made) as robot:
             places = robot.positions()
@@ -266,10 +283,11 @@ def test_async_parks_and_tells_what_failed() -> None:
                 await robot.enable_torque()
             with Robot.of(made, "a1") as again:
                 assert again["a1"].position() == pytest.approx(0.1745, abs=0.01)
+            robot = await AsyncRobot.of(made).__aenter__()
+            await robot.enable_torque()
+            sims["arm"][2].unplug()
             with pytest.raises(MotorbusError, match="a2"):
-                async with AsyncRobot.of(made) as robot:
-                    await robot.enable_torque()
-                    sims["arm"][2].unplug()
+                await robot.close()
 
     asyncio.run(main())
 

@@ -25,6 +25,7 @@ from motorbus.core.operation import (
     Notice,
     Operation,
     Rank,
+    Refusal,
     Timeout,
     afterwards,
     outcome,
@@ -75,6 +76,7 @@ def exchange(
     goals: tuple[Goal, ...] = (),
     timeout: Timeout = Timeout.REPLY,
     tells_position: bool = False,
+    refusal: Refusal | None = None,
 ) -> Exchange[T]:
     """One request to one node; `take` makes a value of the four bytes of the answer.
 
@@ -99,6 +101,7 @@ def exchange(
         timeout=timeout,
         repeatable=True,
         tells_position=tells_position,
+        refusal=refusal,
     )
 
 
@@ -113,8 +116,10 @@ def read_row(node: Node, row: Entry) -> Exchange[int]:
     )
 
 
-def write_row(node: Node, row: Entry, raw: int, *goals: Goal) -> Exchange[None]:
-    """Write one object. Raises RequestError when the raw value is out of range."""
+def write_row(
+    node: Node, row: Entry, raw: int, *goals: Goal, refusal: Refusal | None = None
+) -> Exchange[None]:
+    """Write one object, unless `refusal` objects just before. Raises RequestError for a raw value out of range."""
     return exchange(
         node,
         wire.Command.WRITE,
@@ -126,6 +131,7 @@ def write_row(node: Node, row: Entry, raw: int, *goals: Goal) -> Exchange[None]:
         effect=row.effect,
         goals=goals,
         timeout=Timeout.STORE if row.storage is Storage.EEPROM else Timeout.REPLY,
+        refusal=refusal,
     )
 
 

@@ -60,12 +60,9 @@ def _position(node: Node) -> Exchange[Positions]:
 
 
 def _order(node: Node, to: float) -> Exchange[None]:
-    if node.limits is None:
-        raise RequestError(
-            f"the settings of node {node.node} were written since it was led",
-            advice="end the loop and begin another; nothing was sent",
-            node=node.node,
-        )
+    known = node.limits
+    if known is None:
+        raise _written(node)
     raw = _GOAL.to_raw(to) if isfinite(to) else _GOAL.high + 1
     if not _GOAL.low <= raw <= _GOAL.high:
         raise LimitExceeded(
@@ -73,8 +70,18 @@ def _order(node: Node, to: float) -> Exchange[None]:
             advice="give a number in rad; nothing was sent",
             node=node.node,
         )
-    goal = Goal(node.node, "position", float(_GOAL.to_value(raw)), *node.limits)
-    return write_row(node, _GOAL, raw, goal)
+    goal = Goal(node.node, "position", float(_GOAL.to_value(raw)), *known)
+    return write_row(
+        node, _GOAL, raw, goal, refusal=lambda _: None if node.limits == known else _written(node)
+    )
+
+
+def _written(node: Node) -> RequestError:
+    return RequestError(
+        f"the settings of node {node.node} were written since it was led, and goals may mean something else",
+        advice="end the loop and begin another; nothing was sent",
+        node=node.node,
+    )
 
 
 def _begin(node: Node, speed: float | None) -> Operation[None]:

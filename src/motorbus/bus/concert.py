@@ -179,13 +179,12 @@ class Bell:
     """Wakes the thread that waits for several buses; any other thread may ring it."""
 
     def __init__(self) -> None:
-        pair = socket.socketpair()
+        weakref.finalize(self, _close, pair := socket.socketpair())  # both at once, whatever comes in between
+        self._ear, self._clapper = pair
         for end in pair:
             end.setblocking(False)
-        self._ear, self._clapper = pair
         self.descriptor = self._ear.fileno()
         self.thread = 0
-        weakref.finalize(self, _close, pair)
 
     def ring(self) -> None:
         """Something has been settled, or nobody pumps any more."""

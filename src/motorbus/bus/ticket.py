@@ -147,7 +147,9 @@ class Flight(Ticket):
         for index, (_, key, length) in enumerate(dues):
             if key == reply.key and length == size and index not in self.got:
                 self.got[index] = self.last = reply
-                self.complete = len(self.got) == len(dues) or self._all_believed_here()
+                self.complete = len(self.got) == len(dues) or bool(
+                    self.unbelieved and self._all_believed_here()
+                )
                 return True
         return False
 

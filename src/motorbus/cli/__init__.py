@@ -68,7 +68,7 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
     },
     Group("Without hardware", sort_key=4): {
         "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
-        "demo": "Find, identify and move six simulated devices, and draw what they did.",
+        "demo": "Find nine simulated axes of three families, move them together, and draw what they did.",
     },
 }
 _FAMILIES: Final = Group("One family", sort_key=8)

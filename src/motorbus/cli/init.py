@@ -164,7 +164,7 @@ def _split(text: str) -> tuple[str, str]:
             expected="FAMILY:PORT, or NAME=FAMILY:PORT",
             advice="for example arm=feetech:/dev/ttyACM0; nothing was sent",
         )
-    return name, address
+    return name if equals else "", address
 
 
 def _apart(name: str, taken: set[str]) -> None:
@@ -230,10 +230,10 @@ def _met(wanted: Wanted, output: Output) -> list[Met]:
 def _asked(bus: Bus, found: Found, output: Output) -> Met | None:
     """What an axis needs to know of a device; None, with a note, for one that cannot be an axis."""
     identity = found.identity
-    able = bus.family.axis(identity.model) if identity is not None else {}
+    able = bus.family.axis(identity.model) if identity is not None and identity.table else {}
     if identity is None or not able:
-        model = identity.model if identity is not None else "a device that does not say what it is"
-        output.note(f"note: #{found.node} is {model}, of which nobody has said how it moves: it is left out")
+        what = f"{identity.model} with firmware {identity.firmware}" if identity is not None else "a device"
+        output.note(f"note: #{found.node} is {what} of which nobody has said how it moves: it is left out")
         return None
     limits = bus.run(able["limits"](face(bus, found.node))) if "limits" in able else None
     return Met(found.node, identity, limits, frozenset(able))

@@ -21,6 +21,7 @@ from motorbus.motion.machine.model import VELOCITY
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
+    from motorbus.cli.robot import InHand
 
 app = App(
     name="jog",
@@ -108,10 +109,10 @@ def _axis(
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")
         if dry_run:
-            rehearse(hand, [name], lambda axis: axis.jog(velocity, span))
+            _rehearse(hand, name, velocity, span, show=True)
             return Exit.OK
         if way > (FAR_LINEAR if spec.linear else FAR) and not yes:
-            rehearse(hand, [name], lambda axis: axis.jog(velocity, span), show=False)
+            _rehearse(hand, name, velocity, span, show=False)
             output.consent(f"move {name} by {spec.show(way)}", yes=False)
         with hand.working("jogging"):
             told = verb(velocity, span)
@@ -119,5 +120,24 @@ def _axis(
         stands = place(hand.robot, name, present)
     facts = {"axis": name, "velocity": velocity, "seconds": span, "present": present}
     output.document("motorbus.jog.axes/1", {**facts, "result": plain(told)})
-    output.text(f"{name}: now at {stands}")
+    output.text(f"{name}: by {spec.show(told)}; now at {stands}")
     return Exit.OK
+
+
+def _rehearse(hand: InHand, name: str, velocity: float, span: float, *, show: bool) -> None:
+    """What it would be refused for, and what would be sent. Of an axis that is led, that is made on the way only."""
+    from motorbus.motion import limits
+
+    axis = hand.robot[name]
+    if "train" not in axis.able:
+        rehearse(hand, [name], lambda one: one.jog(velocity, span), show=show)
+        return
+    limits.check_velocity(name, axis.spec, velocity)
+    if show:
+        way = axis.spec.show(velocity * span)
+        facts = {"axis": name, "velocity": velocity, "seconds": span, "at_most": velocity * span}
+        hand.output.document("motorbus.jog.plan/1", facts)
+        hand.output.text(
+            f"{name} would go by {way} at most; nothing was sent. "
+            "Its frames are made on the way, from what is read then, so none can be shown."
+        )

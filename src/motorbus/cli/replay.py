@@ -12,8 +12,9 @@ from motorbus.cli.machine import machine
 from motorbus.cli.moving import Goal, absolute, consent_to_far, tell
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.robot import place, robot
+from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core import units
-from motorbus.errors import RequestError
+from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
     from motorbus.cli.robot import InHand
@@ -71,18 +72,18 @@ def replay(
     options
         Any option of the buses, as a flag.
     """
-    from motorbus.motion.trajectory import Trajectory, check
+    from motorbus.motion.trajectory import Trajectory
 
     share = units.parse(speed, "load") if speed else 1.0
     if not share > 0 or repeat < 1 or not smooth >= 0:
         raise RequestError(
             "--speed must be above 0, --repeat at least 1 and --smooth not below 0", advice="nothing was sent"
         )
-    axes = machine().axes
-    wanted = Trajectory.load(file, axes)
+    wanted = Trajectory.load(file, machine().axes)
     wanted = wanted.smoothed(smooth) if smooth else wanted
-    check(wanted.scaled(1 / share), axes)
+    _judge(wanted.scaled(1 / share))
     with robot(list(wanted.axes), options, output) as hand:
+        _led(hand, wanted)
         first = wanted.positions(0.0)
         present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
         if dry_run:
@@ -93,6 +94,27 @@ def replay(
                 moved = hand.robot.replay(wanted, speed=share)
         tell(hand, "replay", moved)
     return Exit.OK
+
+
+def _judge(wanted: Trajectory) -> None:
+    """Raise LimitExceeded, in words of the shell, for a movement that goes beyond the limits of its axes."""
+    from motorbus.motion.trajectory import check
+
+    try:
+        check(wanted, machine().axes)
+    except LimitExceeded as error:
+        in_words_of_the_shell(error)
+        raise
+
+
+def _led(hand: InHand, wanted: Trajectory) -> None:
+    """Raise RequestError for an axis that goes by a profile of its own, so that nobody can lead it along a file."""
+    if alone := [name for name in wanted.axes if "train" not in hand.robot[name].able]:
+        raise RequestError(
+            f"{', '.join(alone)}: nobody can lead such a device along a file",
+            expected="axes that can be led",
+            advice="leave its column out, and `motorbus move` it; nothing was sent",
+        )
 
 
 def _plan(hand: InHand, wanted: Trajectory, present: dict[str, float]) -> Exit:

@@ -16,7 +16,7 @@ from motorbus.cli import dry, faces
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.machine import machine
 from motorbus.cli.output import Bar
-from motorbus.cli.target import face, said
+from motorbus.cli.target import face, said, traced
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
 from motorbus.errors import MotorbusError, RequestError
@@ -93,6 +93,8 @@ def robot(axes: Sequence[str], options: Mapping[str, str], output: Output) -> It
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
                 output.note(f"note: {warning}")
+            for bus in hand.robot.buses.values():
+                traced(bus)
             yield hand
             for axis in hand.robot.axes.values():
                 axis.engaged = False

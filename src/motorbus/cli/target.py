@@ -21,6 +21,7 @@ from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
+    from motorbus.bus.face import BusFace
     from motorbus.bus.pump import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.cli.output import Output
@@ -108,8 +109,7 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
     with session.open(bus, report=tell, **said(options)) as found:
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
-        if LOG.isEnabledFor(logging.DEBUG):
-            found.trace.add(_Told(0))
+        traced(found)
         for warning in found.warnings:
             output.note(f"note: {warning}")
         try:
@@ -120,6 +120,12 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
+
+
+def traced(bus: BusFace) -> None:
+    """With -vv, log all that is sent and delivered on this bus from here on."""
+    if LOG.isEnabledFor(logging.DEBUG):
+        bus.trace.add(_Told(0))
 
 
 def said(options: Mapping[str, str]) -> dict[str, str]:

@@ -25,6 +25,8 @@ COMMANDS: Final[Mapping[str, str]] = {
     "set_baud()": "`motorbus set-baud`",
     "recover()": "`motorbus recover BUS`",
     "recover(alone=True)": "`motorbus recover BUS --alone`",
+    "scaled(2)": "`--speed 50%`",
+    "smoothed(5)": "`--smooth 5`",
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
 PHRASES: Final[Mapping[str, str]] = {
@@ -35,7 +37,7 @@ _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 
-def in_words_of_the_shell(error: BaseException, family: Family) -> None:
+def in_words_of_the_shell(error: BaseException, family: Family | None = None) -> None:
     """Name commands where this error and its notes name methods; what has no command stays as it is."""
     for part in _PARTS if isinstance(error, MotorbusError) else ():
         setattr(error, part, shell_words(getattr(error, part), family))
@@ -44,11 +46,12 @@ def in_words_of_the_shell(error: BaseException, family: Family) -> None:
         notes[:] = [shell_words(note, family) for note in notes]
 
 
-def shell_words(text: str, family: Family) -> str:
+def shell_words(text: str, family: Family | None = None) -> str:
     """A text that names methods, with commands in their place."""
     for phrase, instead in PHRASES.items():
         text = text.replace(phrase, instead)
-    words: dict[str, str] = {**COMMANDS, **(faces.offer(family.name, "COMMANDS") or {})}
+    own = faces.offer(family.name, "COMMANDS") if family is not None else None
+    words: dict[str, str] = {**COMMANDS, **(own or {})}
 
     def said(call: re.Match[str]) -> str:
         return words.get(call[0]) or words.get(call[1] or "", call[0]).format(call[2])

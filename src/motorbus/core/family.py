@@ -109,8 +109,8 @@ class Train(Protocol):
     """Devices of one bus in a control loop, of which all is known that a cycle needs; see `Family.axis`.
 
     Its exchanges ask nothing but what they bring. Those on different lanes may be in flight at once. Until `begin` is
-    carried out, or goals are sent, nothing is written. What its goals and positions are reckoned by are the settings
-    that a device has then; when some were written since, by whomever here, they raise RequestError.
+    carried out, or goals are sent, nothing is written. When settings of a device were written since through the same
+    object, goals that were made before do not leave, and later ones are reckoned anew or raise RequestError.
     """
 
     @property

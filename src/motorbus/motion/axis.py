@@ -1,7 +1,7 @@
 """One axis of a machine: the capabilities of its device, in the units, the zero and the direction of the axis.
 
 An axis has what its device has and lacks what it lacks: `hasattr(axis, "temperature")` tells, and no verb is there only
-to raise. `Axis` and `AsyncAxis` are two-line classes over one list of verbs.
+to raise. Here is what an axis is, and what it tells and is told without moving; the list of its verbs is in `axes`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias,
 
 from motorbus.core.family import State
 from motorbus.core.operation import Operation, Runnable
-from motorbus.core.verbs import Awaiting, Blocking, verb
+from motorbus.core.verbs import verb
 from motorbus.errors import RequestError
-from motorbus.motion import moving, reckoning
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Reckoning, checked_place, is_reckoned
 
@@ -267,30 +266,3 @@ def hold(axis: AxisVerbs) -> Operation[None]:
     else:
         yield from stop(axis)
     axis.under_way = False
-
-
-class _Verbs(AxisVerbs):
-    state = ability("state", state)
-    position = ability("position", position)
-    velocity = ability("velocity", velocity)
-    load = ability("load", load)
-    current = ability("current", current)
-    voltage = ability("voltage", voltage)
-    temperature = ability("temperature", temperature)
-    enable_torque = ability("enable_torque", enable_torque)
-    disable_torque = ability("disable_torque", disable_torque)
-    stop = ability("stop", stop)
-    hold = ability(("enable_torque", "stop"), hold)
-    move = ability(("train", "keep_time"), moving.move_axis)
-    move_by = ability(("train", "move_by"), moving.move_by)
-    jog = ability(("train", "jog"), moving.jog)
-    home = ability("home", reckoning.home)
-    run = ability("run", reckoning.run)
-
-
-class Axis(_Verbs, Blocking):
-    """An axis of a `Robot`."""
-
-
-class AsyncAxis(_Verbs, Awaiting):
-    """An axis of an `AsyncRobot`: every verb is awaited."""

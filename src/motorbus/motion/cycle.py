@@ -23,7 +23,7 @@ T = TypeVar("T")
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
 """Ways in which a reading, or the acknowledgement of a goal, is lost and a loop goes on."""
 SPIN: Final = 0.0002
-"""s before a slot from which on a blocking loop looks at the clock without a pause: a system wakes nobody that exactly."""
+"""s before a slot from which on a blocking loop looks at the clock without a pause: no system wakes it that exactly."""
 
 
 class Part:
@@ -128,6 +128,20 @@ class Part:
         for place in fresh:
             angle: float = yield from place.axis.able["position"](place.axis.device)
             place.begin(place.axis.spec.from_device(angle))
+
+    def has(self, places: Sequence[Place]) -> bool:
+        """Whether one of these is here."""
+        return any(place in self.places.values() for place in places)
+
+    def stopped(self) -> list[Place]:
+        """Those who were led, and were stopped since or let go; all of them after an emergency stop."""
+        turns = self.bus.turns
+        return [
+            place
+            for node, place in self.places.items()
+            if place.begun
+            and (turns.latched or place.interrupted or turns.known.stops(node) != self._stops[node])
+        ]
 
     def _stopped_since(self, stops: Stops) -> MotorbusError | None:
         for node, before in self._stops.items():

@@ -1,7 +1,7 @@
 """One arm leads, another follows: each follower goes where its leader is, as fast as its own limits let it.
 
-Leaders are let go, so that a hand can guide them. A follower starts where it stands and comes after its leader within its
-own velocity and acceleration, so nothing jumps, however far apart the two are at the beginning.
+Leaders are let go, so that a hand can guide them. A follower starts where it stands and comes after its leader within
+its own velocity and acceleration, so nothing jumps, however far apart the two are at the beginning.
 """
 
 from __future__ import annotations
@@ -134,7 +134,9 @@ def check_able(body: Body, names: Iterable[str], needs: str, what: str) -> None:
     """Raise RequestError for an axis that is not open, or whose device lacks what is needed to be `what`."""
     for name in names:
         if name not in body.axes:
-            raise RequestError(f"there is no open axis {name!r}", expected=f"one of {', '.join(body.axes)}", advice=NOTHING)
+            raise RequestError(
+                f"there is no open axis {name!r}", expected=f"one of {', '.join(body.axes)}", advice=NOTHING
+            )
         if needs not in body.axes[name].able:
             raise RequestError(
                 f"{name} cannot be {what}",

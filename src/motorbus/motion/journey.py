@@ -25,8 +25,6 @@ from motorbus.motion.stream import Fate
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
 
-CLOSE: Final = 0.02
-"""Of a duration that somebody asked for: it may be longer by so much, for a device may have only some speeds."""
 ROUNDING: Final = 1e-6
 """Of a duration; less is no difference."""
 
@@ -131,22 +129,22 @@ class Journey:
         self.outline = self.plan.planned(facts, self.plan.asked)
         return self.outline
 
-    def agreed(self, facts: Mapping[str, Fact], duration: float) -> Planned:
-        """The movement in the time (s) that all have agreed on. Raises RequestError when that was not asked for."""
+    def check_asked(self, name: str, shortest: float) -> None:
+        """Raise RequestError when an axis that moves by its own profile needs longer than was asked for (s)."""
+        self.needs[name] = shortest
         asked = self.plan.asked
-        if asked is not None and duration > max(asked, self._shortest()) * (1 + CLOSE):
-            slowest = max(self.needs, key=lambda name: self.needs[name], default="it")
+        if asked is not None and shortest > asked * (1 + ROUNDING):
             raise RequestError(
-                f"{asked:.6g} s is too short: {slowest} needs {duration:.4g} s",
-                expected=f"{duration:.4g} s or more",
-                cause=f"how fast its device can go by its own profile, and how it speeds up: {slowest}",
+                f"{asked:.6g} s is too short: {name} needs {shortest:.4g} s",
+                expected=f"{shortest:.4g} s or more",
+                cause=f"how fast the device of {name} goes by its own profile, and how it speeds up",
                 advice=f"give it more time, or leave the duration out for the quickest; {NOTHING}",
             )
+
+    def agreed(self, facts: Mapping[str, Fact], duration: float) -> Planned:
+        """The movement in the time (s) that all have agreed on."""
         self.duration = duration
         return self.plan.planned(facts, duration)
-
-    def _shortest(self) -> float:
-        return self.outline.course.duration if self.outline is not None else 0.0
 
     def reports(self, party: str) -> bool:
         """Whether this part tells the progress of all."""

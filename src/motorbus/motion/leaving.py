@@ -41,7 +41,6 @@ class Leaving:
         self._tries: dict[str, int] = {}
         self._parks: list[list[str]] | None = None
         self._parking: list[str] = []
-        self._hurried = False
 
     def work(self) -> Abreast[Any] | None:
         """What to do next; None when all is done."""
@@ -54,10 +53,11 @@ class Leaving:
 
     def hurry(self) -> None:
         """Somebody does not want to wait: nothing is parked any more."""
-        skipped = [name for name in self._parked() if name not in self.errors] if self._parks != [] else []
-        if skipped and not self._hurried:
+        waiting = [self._parked()] if self._parks is None else self._parks
+        skipped = [name for names in [self._parking, *waiting] for name in names if name not in self.errors]
+        if skipped:
             self.said.append(f"{', '.join(skipped)}: not parked, for it was interrupted")
-        self._hurried, self._parks = True, []
+        self._parks, self._parking = [], []
 
     def failed(self, error: MotorbusError) -> None:
         """The work raised this. Axes that could not park together try alone, unless something was in their way."""
@@ -133,6 +133,7 @@ class Leaving:
     def _park(self) -> Abreast[Any] | None:
         if self._parks is None:
             self._parks = self._first_parks()
+        self._parking = []
         if not self._parks:
             return None
         self._parking = self._parks.pop(0)

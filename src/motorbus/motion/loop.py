@@ -4,12 +4,15 @@
         for state in loop:                                   # one sync read in, one sync write out
             loop.goal["elbow"] = 0.5 * state.position["shoulder"]
 
-Entering reads and nothing else. Nothing moves before the first goal of an axis is set; it then gets torque without a jump,
-in a cycle of its own. Goals are followed within velocity and acceleration of the axis, or sent as they are with
+Entering reads and nothing else. Nothing moves before the first goal of an axis is set; it then gets torque without a
+jump, in a cycle of its own. Goals are followed within velocity and acceleration of the axis, or sent as they are with
 `direct=True`. When the `with` is left, by whatever, no goal follows any more: who follows one and is on its way brakes,
 and what was sent direct is the last that its device knows. What the axes do then is the affair of their exit policy.
 
-Whoever leaves the `for` and stays in the `with` leaves the axes at their last small goal, abruptly where they were quick.
+Who leaves the `for` and stays in the `with` leaves the axes at their last small goal, abruptly where they were quick.
+
+A collection of garbage may hold Python up for longer than a period. A program with a quick loop had better call
+`gc.collect()` and `gc.freeze()` before it.
 """
 
 from __future__ import annotations
@@ -120,7 +123,9 @@ class Loop(LoopFace):
     axis was stopped from elsewhere; see `Rounds`.
     """
 
-    def __init__(self, body: Body, conductor: BlockingConductor, rate: float, axes: Names = None, **how: Any) -> None:
+    def __init__(
+        self, body: Body, conductor: BlockingConductor, rate: float, axes: Names = None, **how: Any
+    ) -> None:
         super().__init__(body, rate, axes, exactly=True, **how)
         self._conductor = conductor
         self._only: Bus | None = None
@@ -161,7 +166,9 @@ class AsyncLoop(LoopFace):
     An event loop wakes up to a millisecond late, so cycles begin a little later in their slots than those of a `Loop`.
     """
 
-    def __init__(self, body: Body, conductor: AsyncConductor, rate: float, axes: Names = None, **how: Any) -> None:
+    def __init__(
+        self, body: Body, conductor: AsyncConductor, rate: float, axes: Names = None, **how: Any
+    ) -> None:
         super().__init__(body, rate, axes, **how)
         self._conductor = conductor
 
@@ -175,7 +182,9 @@ class AsyncLoop(LoopFace):
     async def __anext__(self) -> LoopState:
         return await _awaited(self._rounds.round(), self._conductor.run)
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: object
+    ) -> None:
         try:
             await _awaited(self._rounds.leaving(), self._conductor.run)
         except MotorbusError as failure:
@@ -259,8 +268,9 @@ class Course(Protocol[T_co]):
 class Errand(NamedTuple, Generic[T]):
     """A course and the loop that it needs: its rate (Hz), its axes, its `jerk`.
 
-    `before` is carried out first, where there is something. One that is `endless` has no other end than an interruption
-    of its caller, so then Ctrl-C ends it and its result is given; else it is raised as everywhere.
+    `before` is carried out once the loop has been entered, where there is something: what refuses the loop, as a rate
+    that cannot be, refuses that too. One that is `endless` has no other end than an interruption of its caller, so then
+    Ctrl-C ends it and its result is given; else it is raised as everywhere.
     """
 
     course: Course[T]
@@ -299,9 +309,9 @@ class looped(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
 
 def _blocking(machine: Any, errand: Errand[T]) -> T:
     course = errand.course
-    if errand.before is not None:
-        machine.conductor.run(errand.before)
     with Loop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
+        if errand.before is not None:
+            machine.conductor.run(errand.before)
         try:
             for state in loop:
                 if not course.step(loop, state):
@@ -314,9 +324,9 @@ def _blocking(machine: Any, errand: Errand[T]) -> T:
 
 async def _awaiting(machine: Any, errand: Errand[T]) -> T:
     course = errand.course
-    if errand.before is not None:
-        await machine.conductor.run(errand.before)
     async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
+        if errand.before is not None:
+            await machine.conductor.run(errand.before)
         async for state in loop:
             if not course.step(loop, state):
                 break

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from motorbus.core.operation import Operation, Pause, Runnable
+from motorbus.core.operation import Operation, Pause
 from motorbus.errors import Interrupted, MotorbusError
 
 T = TypeVar("T")
@@ -73,17 +73,6 @@ class Beat:
     def of(self, party: str, origin: float) -> Seat:
         """Its part in it: a `core.family.Timing`."""
         return Seat(self, party, origin)
-
-    def attend(self, party: str, runnable: Runnable[T]) -> Operation[T]:
-        """Carry out the part of this party. When it ends before all have come, the others are told, and why."""
-        left: MotorbusError = Interrupted(f"{party} ended before the start")
-        try:
-            return (yield from runnable)
-        except MotorbusError as error:
-            left = error
-            raise
-        finally:
-            self.fail(left)
 
     def fail(self, error: MotorbusError) -> None:
         """Somebody cannot take part; all who wait, or come to wait, are told."""

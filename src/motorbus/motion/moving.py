@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from math import copysign, isfinite
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from motorbus.core.operation import Operation, outcome
 from motorbus.errors import RequestError
@@ -26,9 +26,6 @@ from motorbus.motion.trajectory import Course, Trajectory, sampled
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
     from motorbus.motion.body import Body
-
-GRAIN: Final = 0.003
-"""rad of the device: at least one count of every servo that can be led, at most two of most (0.088 and 0.1 degrees)."""
 
 
 # -- what a movement shall be ------------------------------------------------------------------------------------------
@@ -88,7 +85,7 @@ class PointToPoint(NamedTuple):
             limits.check_goal(name, axis.spec, goal, measured=at_once, device=fact.device)
         moves = {name: Move(facts[name].position, goal, self.limits[name]) for name, goal in goals.items()}
         whole = synchronised(moves, kind=self.kind, duration=duration)
-        grains = {name: GRAIN / abs(axis.spec.ratio) for name, axis in self.axes.items()}
+        grains = {name: facts[name].grain / abs(axis.spec.ratio) for name, axis in self.axes.items()}
         speeds = {name: profile.peak for name, profile in whole.profiles.items()}
         return Planned(Crisp(whole, grains), goals, speeds, self.limits, whole.limited_by)
 

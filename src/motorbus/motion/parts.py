@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.core.family import Turned
-from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards
-from motorbus.errors import NoReply
-from motorbus.motion import axis as one
+from motorbus.core.family import Positions, Turned
+from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
+from motorbus.errors import MotorbusError, NoReply
+from motorbus.motion import axis as single
 from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moved import STILL, Arrived, Track
 from motorbus.motion.plan import Fact, Gone, Planned
-from motorbus.motion.stream import SHOWN, Stream, rate_for
+from motorbus.motion.stream import LOST, SHOWN, Stream, grains, rate_for
 
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
@@ -27,8 +27,6 @@ LOOK: Final = 0.02
 """s between two looks at whether the others have failed, while an axis moves by its own profile."""
 DRAWN: Final = 0.02
 """s between two points of the track of such an axis."""
-SPARE: Final = 1.25
-"""Times the highest speed of its course is what an axis may take to keep up with it."""
 NO_WAY: Final = 1e-9
 """rad or m; an axis that has less to go stays where it is."""
 
@@ -73,8 +71,7 @@ class Led:
         """See `part`."""
         journey, axes = self._journey, self._axes
         train = yield from axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate)
-        looked = yield from self._looked(train)
-        rate = rate_for(self._bus, train, _angles(axes, looked), journey.rate)
+        rate, looked = yield from self._looked(train)
         facts = yield from journey.meet(self._party, looked)
         seat = journey.seat(self._party, axes[0].spec.bus)
         shortest = journey.outlined(facts).course.duration
@@ -89,7 +86,7 @@ class Led:
             fate=journey.fate,
             reports=journey.reports(self._party),
         )
-        yield from self._ready(train, planned)
+        yield from self._ready(train)
         lead = stream.lead(self._bus)
         streamed = yield from stream.run((yield from seat.start(lead)), lead)
         for axis in axes:
@@ -97,26 +94,36 @@ class Led:
         arrived = {axis.name: _seen(axis, facts, planned, streamed.tracks[axis.name]) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
 
-    def _looked(self, train: Any) -> Operation[dict[str, Fact]]:
-        """Where they stand, and how far their devices let them go."""
-        told = yield from Together(list(train.positions))
-        angles = {node: angle for one in told for node, angle in one.values.items()}
-        devices = yield from Together([limits.of_device(axis) for axis in self._axes])
+    def _looked(self, train: Any) -> Operation[tuple[float, dict[str, Fact]]]:
+        """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
+        told = yield from Together([outcome(one) for one in train.positions])
+        for one in told:
+            if isinstance(one, MotorbusError) and not isinstance(one, LOST):
+                raise one
+        angles = {
+            node: angle for one in told if isinstance(one, Positions) for node, angle in one.values.items()
+        }
         for axis in self._axes:
             if axis.spec.node not in angles:
                 raise _silent(axis)
-        return {
-            axis.name: Fact(axis.spec.from_device(angles[axis.spec.node]), device)
-            for axis, device in zip(self._axes, devices, strict=True)
+        found = yield from Together([limits.of_device(axis) for axis in self._axes])
+        devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
+        possible = {node: _within(angles[node], device) for node, device in devices.items()}
+        steps = grains(train, possible)
+        facts = {
+            axis.name: Fact(axis.spec.from_device(angles[node]), devices[node], steps[node])
+            for node, axis in ((axis.spec.node, axis) for axis in self._axes)
         }
+        return rate_for(self._bus, train, possible, self._journey.rate), facts
 
-    def _ready(self, train: Any, planned: Planned) -> Operation[None]:
-        """Torque on where they stand, and as quick in following as the course needs it."""
+    def _ready(self, train: Any) -> Operation[None]:
+        """Torque on where they stand, and as quick in following as the axis may be."""
         self.command.depart()
         self.begun = True
         for axis in self._axes:
-            yield from one.cap(axis)
-        yield from train.begin({axis.spec.node: _following(axis, planned) for axis in self._axes})
+            yield from single.cap(axis)
+        speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in self._axes}
+        yield from train.begin({node: abs(speed) for node, speed in speeds.items()})
 
 
 class Own:
@@ -228,7 +235,7 @@ class Kept:
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
         """See `core.family.Timing`."""
-        self._journey.needs[self._name] = shortest
+        self._journey.check_asked(self._name, shortest)
         least = max(shortest, self.planned.course.duration)
         self.duration = yield from self._seat.agreed(least, lambda others: max(others, fitted(others)))
         self._journey.needs[self._name] = max(shortest, fitted(least))
@@ -247,15 +254,9 @@ def _any(duration: float) -> float:
     return duration
 
 
-def _angles(axes: Sequence[AxisVerbs], facts: Mapping[str, Fact]) -> dict[int, float]:
-    """Where they stand (rad of the device), by id."""
-    return {axis.spec.node: axis.spec.to_device(facts[axis.name].position) for axis in axes}
-
-
-def _following(axis: AxisVerbs, planned: Planned) -> float:
-    """How fast its device may be to keep up with its course (rad/s)."""
-    speed = min(planned.speeds[axis.name], axis.spec.max_velocity) or axis.spec.max_velocity
-    return abs(axis.spec.rate_to_device(speed)) * SPARE
+def _within(angle: float, device: limits.Device) -> float:
+    """An angle (rad) that its device can be told, this one if that may be."""
+    return angle if device is None else min(max(angle, device[0]), device[1])
 
 
 def _seen(axis: AxisVerbs, facts: Mapping[str, Fact], planned: Planned, track: Track) -> Arrived:

@@ -1,8 +1,8 @@
 """One axis in a loop: where it was last, where it is to go, and the small goal of the next cycle.
 
 A goal is judged when it is new, and before anything of its cycle is sent. As a rule an axis *follows* it within its
-velocity and its acceleration, and what is sent is a step on that way. Sent *direct*, a goal goes out as it was given, and
-then it may be no farther from the last one than the velocity of the axis allows in that time.
+velocity and its acceleration, and what is sent is a step on that way. Sent *direct*, a goal goes out as it was given,
+and then it may be no farther from the last one than the velocity of the axis allows in that time.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
 
 CATCH_UP: Final = 3
-"""Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal by
-then, and begins anew from there."""
+"""Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal
+by then, and begins anew from there."""
 
 
 class Place:
     """An axis of a loop. Positions are in rad (m), `node` is the id of its device.
 
     `position` is where it was heard to be last, `heard` when that was (s of robot time), `silent` how many cycles in a
-    row it has not been heard. `asked` is the goal that was set and `sent` the position that was ordered last; None: none.
-    `begun` is true once it has got torque here.
+    row it has not been heard. `asked` is the goal that was set and `sent` the position that was ordered last; None:
+    none. `begun` is true once it has got torque here.
     """
 
     __slots__ = (
@@ -56,7 +56,9 @@ class Place:
         "zero",
     )
 
-    def __init__(self, axis: AxisVerbs, device: Device, period: float, direct: bool, jerk: float | None) -> None:
+    def __init__(
+        self, axis: AxisVerbs, device: Device, period: float, direct: bool, jerk: float | None
+    ) -> None:
         spec = axis.spec
         found = limits.bounds(spec, device)
         slack = ROUNDING * max((abs(end) for end in found[:2] if isfinite(end)), default=0.0) + ROUNDING
@@ -130,8 +132,8 @@ class Place:
     def step(self, periods: int) -> float:
         """The angle of its device (rad) to be ordered `periods` after the last one.
 
-        Raises LimitExceeded, at rest where it was told to be last, when that is too far from where it is measured to be:
-        something holds it back.
+        Raises LimitExceeded, at rest where it was told to be last, when that is too far from where it is measured to
+        be: something holds it back.
         """
         asked, way = self.asked, self._follower
         assert asked is not None

@@ -16,10 +16,14 @@ from motorbus.motion.trajectory import Course
 
 
 class Fact(NamedTuple):
-    """Where an axis stands (rad, m), and its device's own limits (rad of the device)."""
+    """Where an axis stands (rad, m), and of its device (rad) its own limits, and the smallest step that it can be told.
+
+    Of an axis that moves by its own profile that step is 0: it is no matter there.
+    """
 
     position: float
     device: limits.Device = None
+    grain: float = 0.0
 
 
 class Planned(NamedTuple):

@@ -13,7 +13,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import LimitExceeded, NotHomed, RequestError
+from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
 
@@ -96,14 +96,19 @@ def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | 
     axis.departs()
     try:
         told = yield from movement
-    except (RequestError, LimitExceeded):
-        axis.stays()
-        raise
     except BaseException as error:
-        axis.fails(_reason(error))
+        axis.stays() if _stands(error) else axis.fails(_reason(error))
         raise
     axis.arrives(way(told) if way is not None else None)
     return told
+
+
+def _stands(error: BaseException) -> bool:
+    """Whether it is certain that nothing has moved: it was refused before anything was sent, or called off before it
+    began. Of a device that is silent nothing is certain.
+    """
+    refused = isinstance(error, RequestError | LimitExceeded)
+    return refused or (isinstance(error, MotionError) and error.unmoved)
 
 
 def _reason(error: BaseException) -> str:
@@ -158,7 +163,7 @@ def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
     try:
         yield from axis.able["home"](axis.device, **options)
     except BaseException as error:
-        axis.stays() if isinstance(error, RequestError) else axis.fails(_reason(error))
+        axis.stays() if _stands(error) else axis.fails(_reason(error))
         raise
     axis.arrives(0.0)
     place = axis.spec.from_device(0.0)

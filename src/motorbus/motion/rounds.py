@@ -4,8 +4,9 @@
     a round    goals out, positions in; before it, in a cycle of its own, torque for axes with their first goal
     leaving    axes that are on their way brake
 
-Each is a generator that yields work on several buses and is sent what came of it. Nothing moves before a goal is set. A
-goal that must not be sent ends its round before anything leaves, and who was stopped from elsewhere gets no goal any more.
+Each is a generator that yields work on several buses and is sent what came of it. Nothing moves before a goal is set.
+A goal that must not be sent ends its round before anything leaves, and who was stopped from elsewhere gets no goal any
+more.
 """
 
 from __future__ import annotations
@@ -86,7 +87,9 @@ class Rounds:
         exactly: bool,
     ) -> None:
         if not (isfinite(rate) and rate > 0):
-            raise RequestError(f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent")
+            raise RequestError(
+                f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
+            )
         if direct and jerk is not None:
             raise RequestError(
                 "jerk is said of goals that are sent as they are",
@@ -162,9 +165,7 @@ class Rounds:
     def _first_look(self) -> Works:
         unheard = set(self.places)
         for _ in range(PATIENCE + 1):
-            told = yield Abreast(
-                {bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled
-            )
+            told = yield Abreast({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
             for bus, part in self.parts.items():
                 missing = part.take(told[bus])
                 unheard -= {place.name for place in part.places.values()} - set(missing)
@@ -206,9 +207,7 @@ class Rounds:
         moment = grid.take(now)
         orders = {bus: part.orders(periods) for bus, part in self.parts.items()}
         self._stepped = grid.number
-        told = yield Abreast(
-            {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
-        )
+        told = yield Abreast({bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict)
         return self._taken(told, moment, grid.number)
 
     def _judge(self, periods: int) -> None:
@@ -269,7 +268,7 @@ class Rounds:
         """A bus has raised: who was stopped there is led no more."""
         for bus, found in told.items():
             if isinstance(found, Interrupted):
-                for place in self.parts[bus].places.values():
+                for place in self.parts[bus].stopped():
                     place.release()
         settled(told)
 
@@ -298,11 +297,12 @@ class Rounds:
         grid = self._grid
         if grid is None:
             return
-        for place in self._all:
-            if place.interrupted:
+        for part in self.parts.values():
+            for place in part.stopped():
                 place.release()
-        braking = [place for place in self._all if place.begun and place.halt()]
-        parts = {bus: part for bus, part in self.parts.items() if any(one in braking for one in part.places.values())}
+        led = {place.name for place in self._all if place.begun and not self._direct}
+        braking = [place for place in self._all if place.halt()]
+        parts = {bus: part for bus, part in self.parts.items() if part.has(braking)}
         failures: dict[str, Any] = {}
         while parts and not all(place.arrived for place in braking):
             grid.forgive(self.now)
@@ -312,9 +312,10 @@ class Rounds:
             )
             failures |= {bus: found for bus, found in told.items() if isinstance(found, MotorbusError)}
             parts = {bus: part for bus, part in parts.items() if bus not in failures}
-            braking = [place for part in parts.values() for place in part.places.values() if place in braking]
-        for place in braking:
-            place.axis.arrives()
+            braking = [place for place in braking if place.axis.spec.bus in parts]
+        for place in self._all:
+            if place.name in led and place.axis.spec.bus not in failures:
+                place.axis.arrives()
         settled(failures)
 
 
@@ -323,5 +324,7 @@ _NEVER: Final[Mapping[str, float]] = MappingProxyType({})
 
 def _number(name: str, goal: object) -> float:
     if isinstance(goal, bool) or not isinstance(goal, int | float):
-        raise RequestError(f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent")
+        raise RequestError(
+            f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent"
+        )
     return float(goal)

@@ -20,6 +20,7 @@ from motorbus.core.family import Positions, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Progress, Report, Together, outcome
 from motorbus.errors import (
     Interrupted,
+    LimitExceeded,
     MotorbusError,
     NoReply,
     OutcomeUnknown,
@@ -47,6 +48,8 @@ LAG: Final = 0.3
 """s that an axis may be behind, at the highest speed of its course: slower servos need another max_velocity."""
 FAR: Final = 0.1
 """rad of the device that an axis may be off where it should be, whatever its speed."""
+FINEST: Final = 1e-5
+"""rad of the device; no servo can be told less."""
 SILENCE: Final = 0.15
 """s for which nothing may be heard of an axis, or three cycles, if those last longer."""
 SHOWN: Final = 0.25
@@ -111,12 +114,37 @@ def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: flo
         return min(USUAL, SHARE * highest)
     if not 0 < asked <= highest:
         raise RequestError(
-            f"{asked} Hz is not possible here",
+            f"{asked:.6g} Hz is not possible here",
             expected=f"above 0, at most {highest:.4g} Hz",
-            cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} devices",
+            cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} of these",
             advice=f"take less; {NOTHING}",
         )
     return asked
+
+
+def grains(train: Train, angles: Mapping[int, float]) -> dict[int, float]:
+    """By id, the smallest step (rad) that each can be told from its angle (rad): goals say what will be told."""
+    return {node: _grain(train, node, angle) for node, angle in angles.items()}
+
+
+def _grain(train: Train, node: int, angle: float) -> float:
+    here = _told(train, node, angle)
+    step = FINEST
+    while step < FAR:
+        for there in (_told(train, node, angle + step), _told(train, node, angle - step)):
+            if here is not None and there not in (None, here):
+                return abs(there - here)
+        step *= 2
+    return FAR
+
+
+def _told(train: Train, node: int, angle: float) -> float | None:
+    """What it is told for an angle (rad); None for one that it cannot be told."""
+    try:
+        (exchange,) = train.goals({node: angle})
+    except LimitExceeded:
+        return None
+    return next((goal.value for goal in exchange.goals), None)
 
 
 class Stream:

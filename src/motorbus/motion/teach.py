@@ -1,4 +1,4 @@
-"""Show a machine by hand what to do: its axes are let go, guided, and where they are is written down on a fixed grid."""
+"""Show a machine by hand what to do: its axes are let go and guided, and where they are is written down on a grid."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ def teach(
 ) -> Errand[Trajectory]:
     """Let these axes go and write down where they are guided, `rate` times a second (Hz); None: all that can be taught.
 
-    The trajectory has the times of the grid, from 0 on. A cycle in which an axis was not heard has no sample; nothing is
-    smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else moves.
+    The trajectory has the times of the grid, from 0 on. A cycle in which an axis was not heard has no sample; nothing
+    is smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
+    moves.
 
-    It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it and
-    what was taught is given. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or whose
-    device cannot be asked in a loop; MotionError when there are less than two samples; and what a `Loop` raises.
+    It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it
+    and what was taught is given. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or
+    whose device cannot be asked in a loop; MotionError for less than two samples; and what a `Loop` raises.
     """
     check_seconds(seconds)
     axes = _taught(body, names, limp)

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.axis import AsyncAxis, Axis
+from motorbus.motion.axes import AsyncAxis, Axis
 from motorbus.motion.machine import Machine
 from motorbus.motion.machine.agreement import check
 from motorbus.motion.several import named

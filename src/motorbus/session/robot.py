@@ -25,7 +25,7 @@ from motorbus.bus.stop import StopOutcome
 from motorbus.errors import MotorbusError
 from motorbus.motion import group, moving
 from motorbus.motion.abreast import Led, LedAsync, together
-from motorbus.motion.axis import AsyncAxis, Axis
+from motorbus.motion.axes import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.budget import budget
 from motorbus.motion.conductor import Conductor, LoopConductor
@@ -170,8 +170,13 @@ class Robot(RobotVerbs, Led):
     def _leave(self, leaving: Leaving) -> BaseException | None:
         """Carry out all of it; the first interruption that came meanwhile."""
         first: BaseException | None = None
+        caught: BaseException | None = None
         while True:
             try:
+                if caught is not None:
+                    first = first or caught
+                    leaving.hurry()
+                    caught = None
                 work = leaving.work()
                 if work is None:
                     return first
@@ -179,8 +184,7 @@ class Robot(RobotVerbs, Led):
             except MotorbusError as error:
                 leaving.failed(error)
             except BaseException as interruption:  # a second Ctrl-C: less waiting, and nobody is left out
-                first = first or interruption
-                leaving.hurry()
+                caught = interruption
 
 
 class AsyncRobot(RobotVerbs, LedAsync):
@@ -247,14 +251,20 @@ class AsyncRobot(RobotVerbs, LedAsync):
     async def _leave(self, leaving: Leaving) -> BaseException | None:
         """Carry out all of it; the first cancellation that came meanwhile."""
         first: BaseException | None = None
+        caught: BaseException | None = None
         while True:
             try:
+                if caught is not None:
+                    first = first or caught
+                    leaving.hurry()
+                    caught = None
                 work = leaving.work()
                 if work is None:
                     return first
                 await self.conductor.run(work)
             except MotorbusError as error:
                 leaving.failed(error)
+            except GeneratorExit:  # nobody will await us again: what was begun has cleaned up
+                raise
             except BaseException as interruption:  # cancelled once more: less waiting, and nobody is left out
-                first = first or interruption
-                leaving.hurry()
+                caught = interruption

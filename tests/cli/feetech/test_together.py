@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 import motorbus
 from motorbus.cli import feetech
-from motorbus.errors import NoReply, RequestError
+from motorbus.errors import RequestError
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
-
-
-def test_a_train_sends_all_goals_and_reads_all_positions(arm: Simulation) -> None:
-    with motorbus.open(arm.url) as bus:
-        train = feetech.Train(bus, [1, 3])
-        before = bus.run(train.positions)
-        bus.run(train.goals([math.pi, math.pi]))
-        assert before.values == {1: pytest.approx(math.pi), 3: pytest.approx(math.pi)}
-        assert train.air_time([0.0, 0.0]) == pytest.approx((14 + 10 + 2 * 8) * 10e-6)
-        with pytest.raises(NoReply):
-            feetech.Train(bus, [1, 9])
 
 
 def test_moving_together_is_one_packet(arm: Simulation) -> None:
@@ -38,18 +25,6 @@ def test_moving_together_is_one_packet(arm: Simulation) -> None:
             pytest.approx(2.0, abs=0.05),
             pytest.approx(3.0, abs=0.05),
         ]
-
-
-def test_a_train_of_several_maps_asks_those_one_by_one_who_know_no_sync_read() -> None:
-    with (
-        motorbus.simulate("feetech", ids="1-3", model="sts3215+scs0009+hls3925") as sim,
-        motorbus.open(sim.url) as bus,
-    ):
-        train = feetech.Train(bus, [1, 2, 3])
-        for _ in range(2):
-            assert list(bus.run(train.positions).values) == [1, 2, 3]
-        reads = (8 + 2 + 2 * 8) + (8 + 8)
-        assert train.air_time([1.0, 1.0, 1.0]) == pytest.approx((8 + 3 * 3 + reads) * 10e-6)
 
 
 def test_moving_together_takes_a_packet_for_each_layout_and_switches_torque_on() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Effect, Exchange, Rank
+from motorbus.core.operation import Effect, Exchange, Pause, Rank
 from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError
 from motorbus.families import feetech
 from motorbus.families.feetech.driver import Node, Train, limits, sync_write_positions, train
@@ -61,6 +61,22 @@ def test_positions_of_all_maps_come_in_as_few_exchanges_as_their_maps_allow() ->
     together = sync_reads(56, {1: (0, 8), 3: (0, 4)}, 2)
     assert play(one, together).values == {1: pytest.approx(2048 * COUNT), 3: pytest.approx(1024 * COUNT)}
     assert [len(alone.replies) for alone in (other, last)] == [1, 1]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("models", "reads"),
+    [("sts3215", (8 + 3) + 3 * 8), ("sts3215+scs0009+hls3925", (8 + 2) + 2 * 8 + (8 + 8))],
+)
+def test_a_cycle_takes_no_more_of_the_wire_than_its_bytes(models: str, reads: int) -> None:
+    with (
+        motorbus.simulate("feetech", ids="1-3", model=models) as simulation,
+        motorbus.open(simulation.url) as bus,
+    ):
+        led = bus.run(train([feetech.Servo(bus, id) for id in (1, 2, 3)], rate=RATE))
+        cycle = [*led.goals(dict.fromkeys(led.nodes, 1.0)), *led.positions]
+        assert sum(bus.family.air_time(one, RATE) for one in cycle) == pytest.approx(
+            (8 + 3 * 3 + reads) * 10e-6
+        )
 
 
 def test_replies_of_one_exchange_stay_short_at_a_slow_rate() -> None:
@@ -226,6 +242,26 @@ def test_each_is_told_to_be_as_quick_as_it_may(name: str, speed: float | None) -
         assert device.memory["torque_enable"] == 1
         if servo.control.current:
             assert device.memory["goal_torque"] > 0
+
+
+def test_servos_of_several_maps_on_one_bus_are_led_together_no_faster_than_they_may_go() -> None:
+    models = "sts3215+scs0009+hls3606+scs15-2"
+    with (
+        motorbus.simulate("feetech", ids="1-4", model=models) as simulation,
+        motorbus.open(simulation.url) as bus,
+    ):
+        led = bus.run(train([feetech.Servo(bus, id) for id in (1, 2, 3, 4)], rate=RATE))
+        bus.run(led.begin(dict.fromkeys(led.nodes, 1.0)))
+        begun = heard(bus, led)
+        bus.run(only(led.goals({id: here + 0.4 for id, here in begun.items()})))
+        bus.run(iter(Pause(0.2)))
+        assert all(0.1 < here - begun[id] < 0.23 for id, here in heard(bus, led).items())
+        bus.run(iter(Pause(1.0)))
+        assert heard(bus, led) == pytest.approx({id: here + 0.4 for id, here in begun.items()}, abs=0.01)
+
+
+def heard(bus: Any, led: Train) -> dict[int, float]:
+    return {id: here for one in led.positions for id, here in bus.run(one).values.items()}
 
 
 def test_what_another_program_left_in_the_registers_holds_nobody_back() -> None:

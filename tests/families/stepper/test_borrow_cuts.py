@@ -15,6 +15,7 @@ import pytest
 from motorbus.errors import LinkLost, RequestError
 from motorbus.families.stepper import Controller
 from tests.families.stepper.loans import Cut, Line1
+from tests.families.stepper.partners import Partner, kept
 from tests.families.stepper.test_driver_borrowing import READINGS
 
 Work = Callable[[Controller], object]
@@ -32,15 +33,21 @@ def homed(device: Controller) -> object:
     return device.home(velocity=tau, deadline=5.0)
 
 
+def timed(device: Controller) -> object:
+    return kept(device, Partner(1.0, thinks=0.01), -tau)
+
+
 WORKS: dict[str, tuple[Work, dict[str, Any]]] = {
     "jog": (jogged, {}),
     "move_by": (moved, {}),
     "home": (homed, {"home_switch": "wired", "home_at": -30}),
+    "keep_time": (timed, {}),
 }
 OTHERS: tuple[Work, ...] = (
     jogged,
     moved,
     homed,
+    timed,
     lambda device: device.run_once(),
     lambda device: device.jog_forward(0.1),
     lambda device: device.run(1),

@@ -10,7 +10,7 @@ import pytest
 
 from motorbus.core.family import Turned
 from motorbus.core.operation import INTENT, OUTCOME, Operation, Pause, Together, outcome
-from motorbus.errors import Interrupted, LinkLost, MotorbusError, OutcomeUnknown, RequestError
+from motorbus.errors import Interrupted, LinkLost, MotorbusError, NotHomed, OutcomeUnknown, RequestError
 from motorbus.families.stepper import FAMILY, Controller, driver
 from motorbus.families.stepper.driver.borrowing import LOST, NOTE
 from motorbus.families.stepper.driver.stopping import MAY_TURN
@@ -46,7 +46,7 @@ def unmoved(line: Line1) -> None:
 
 @pytest.mark.parametrize("pace", [True, False])
 @pytest.mark.parametrize("turnaround", [0.0, 0.002, 0.015])
-@pytest.mark.parametrize("needs", [0.0, 1.0, 2.5, 7.3, 30.0])
+@pytest.mark.parametrize("needs", [0.0, 1.0, 2.5, 7.3, 15.0])
 @pytest.mark.parametrize("angle", [pi / 2, -3.0, 5 * tau])
 def test_it_begins_and_ends_when_it_was_agreed(
     angle: float, needs: float, turnaround: float, pace: bool
@@ -66,15 +66,12 @@ def test_it_begins_and_ends_when_it_was_agreed(
 
 
 def test_the_way_is_what_the_motor_does() -> None:
-    line = paced()
-    way: list[tuple[float, int]] = []
-    partner = Partner(2.0)
-    found = Kept(line, partner, angle=-tau)
-    motion = found.motion
+    found = Kept(paced(), Partner(2.0), angle=-tau)
+    motion, behind = found.motion, 1e-9
     assert motion is not None
-    way = [(at / 50, motion.sign * motion.done(found.first - found.since + at / 50)) for at in range(120)]
-    for at, pulses in way:
-        assert found.turned.way(at) == pytest.approx(pulses * PULSE)
+    for at in [number / 50 for number in range(120)]:
+        pulses = motion.done(found.first - found.since + at + behind)
+        assert found.turned.way(at + behind) == pytest.approx(-pulses * PULSE), at
     assert found.turned.way(-0.1) == 0.0
     assert found.turned.way(1e9) == found.turned.angle == pytest.approx(-tau)
 
@@ -103,12 +100,20 @@ def test_how_long_it_takes_at_least_can_be_asked_without_borrowing() -> None:
 
 
 def test_a_cleared_project_1_takes_its_geometry_from_another_and_is_clear_again() -> None:
-    line = paced(shipped="empty")
     line = Line1(None, shipped="empty")
     line.simulated.put(3, replace(MINE, number=3))
     found = Kept(line, Partner(2.0), angle=tau)
     assert found.turned.angle == pytest.approx(tau)
     assert (line.simulated.position, line.as_before) == (1600, True)
+
+
+def test_what_cannot_be_so_slow_ends_before_the_others_and_says_so() -> None:
+    line = paced()
+    found = Kept(line, Partner(60.0), angle=pi / 2)
+    assert found.partner.fit == pytest.approx(20.8, abs=0.1)
+    assert found.partner.agreed_on == 60.0
+    assert found.turned.duration == pytest.approx(found.last - found.first)
+    assert found.turned.duration < 21.0
 
 
 # -- in which order ----------------------------------------------------------------------------------------------------
@@ -171,12 +176,12 @@ def test_what_cannot_be_is_refused_before_anybody_is_asked(what: str) -> None:
 
 def test_unsaved_edits_of_others_are_refused_before_anybody_is_asked() -> None:
     line, partner = paced(), Partner()
-    line.simulated.put(2, replace(MINE, number=2))
-    told = line.run(lambda device: (device.select(2), device.set_step_delay(1, 5), kept(device, partner)))
-    if not isinstance(told, MotorbusError):  # only what the driver edits is remembered
-        line = paced()
-        line.simulated.put(2, replace(MINE, number=2))
-        told = line.run(lambda device: (device.write(2, step_1_delay=0.5, save=False), kept(device, partner)))
+
+    def work(device: Controller) -> Turned:
+        device.memory.unsaved = replace(MINE, number=2)
+        return kept(device, partner)
+
+    told = line.run(work)
     failed(told, RequestError, "not saved")
     assert partner.asked == []
 
@@ -249,10 +254,9 @@ def test_ctrl_c_gives_project_1_back(moment: float) -> None:
 
 
 def test_a_host_that_is_killed_in_the_middle_leaves_word_of_it() -> None:
-    line = paced()
-    requests = Line1()
-    Kept(requests, Partner(2.0))
-    move = starts(requests.sent).index(MOVE)
+    line, whole = Line1(), Line1()
+    Kept(whole, Partner(2.0))
+    move = starts(whole.sent).index(MOVE)
     found = Kept(line, Partner(2.0), Cut(move, sent=True))
     assert isinstance(found.told, LinkLost)
     assert not found.told.unmoved
@@ -313,9 +317,25 @@ def test_with_another_reading_of_the_ramp_it_still_comes_to_its_end(ramp: dict[s
     line = paced(**ramp)
     found = Kept(line, Partner(2.0), angle=tau)
     assert line.simulated.position == 1600
-    assert abs(found.first - found.partner.moment) < 0.02
+    assert abs(found.first - found.partner.moment) < 0.03, "a period of the start frequency, at most"
 
 
-def test_it_is_what_an_axis_can_do() -> None:
-    assert FAMILY.axis("stepper controller")["keep_time"] is driver.keep_time
-    assert FAMILY.axis("stepper controller")["run"] is driver.run
+def test_an_axis_keeps_time_homes_and_runs_programs_by_its_capabilities() -> None:
+    able = FAMILY.axis("stepper controller")
+    line = paced(home_switch="wired", home_at=-1000)
+    partner = Partner(1.0)
+    told = line.run(
+        lambda device: [
+            device.bus.run(able["keep_time"](device, 1.0, partner, velocity=5.0, acceleration=20.0)),
+            device.bus.run(able["home"](device, deadline=5.0)),
+            device.bus.run(able["run"](device, 1, timeout=9.0)),
+        ]
+    )
+    assert isinstance(told, list), told
+    turned, homed, ran = told
+    assert isinstance(turned, Turned)
+    assert isinstance(homed, driver.Homed)
+    assert (homed.node, 0 < homed.seconds < 5.0, homed.promise) == (1, True, driver.Promise.STOP_ACCEPTED)
+    assert ran.outcome is driver.Outcome.COMPLETED
+    late = line.run(lambda device: device.bus.run(able["home"](device, deadline=0.2)))
+    failed(late, NotHomed, "within 0.2 s")

@@ -58,3 +58,36 @@ def test_nonsense_is_refused() -> None:
 
 def test_a_reset_starts_again() -> None:
     followers.assert_starts_again(follower(0.0, USUAL))
+
+
+@given(st.floats(-10, 10), limits, chases)
+def test_its_bare_numbers_are_those_of_the_trapezoid(start: float, may: Limits, goals: Chase) -> None:
+    one = TrapezoidFollower(start, may)
+    for goal, steps in goals:
+        way = trapezoid(
+            one.position, goal, velocity=may.velocity, acceleration=may.acceleration,
+            deceleration=may.deceleration, initial=one.velocity,
+        )  # fmt: skip
+        for number in range(1, steps + 1):
+            elapsed = number * followers.PERIOD
+            assert isclose(
+                one.step(followers.PERIOD, goal), way.position(elapsed), rel_tol=1e-9, abs_tol=1e-9
+            )
+            assert isclose(one.velocity, way.velocity(elapsed), rel_tol=1e-7, abs_tol=1e-6)
+
+
+def test_braking_ends_where_it_must_and_no_farther() -> None:
+    one = follower(0.0, USUAL)
+    for _ in range(100):
+        one.step(0.001, 5.0)
+    one.halt()
+    assert isclose(one.goal, 0.04, abs_tol=1e-9)
+    places = [one.step(0.001) for _ in range(101)]
+    assert places == sorted(places)
+    assert (places[-1], one.velocity, one.arrived) == (one.goal, 0.0, True)
+
+
+def test_braking_at_rest_is_nothing() -> None:
+    one = follower(0.5, USUAL)
+    one.halt()
+    assert (one.goal, one.step(0.1), one.arrived) == (0.5, 0.5, True)

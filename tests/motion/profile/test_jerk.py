@@ -70,3 +70,14 @@ def test_without_ruckig_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -
     assert "pip install 'motorbus[ruckig]'" in missing.value.advice
     assert "Linux for ARM" in missing.value.cause
     assert follower(0.0, USUAL).step(0.1, 1.0) > 0
+
+
+def test_braking_keeps_within_the_jerk() -> None:
+    one = made(0.0, USUAL)
+    chase(one, [(5.0, 40)])
+    here, quick = one.position, one.velocity
+    one.halt()
+    seen = chase(one, [(one.goal, 400)])
+    assert one.goal > here + quick * quick / (2 * USUAL.acceleration) - 1e-9
+    assert max(place for place, _ in seen) <= one.goal + 1e-9
+    assert one.arrived

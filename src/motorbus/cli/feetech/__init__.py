@@ -10,11 +10,10 @@ from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, seco
 from motorbus.cli.feetech.commands import COMMANDS
 from motorbus.cli.feetech.offers import say
 from motorbus.cli.feetech.orders import app
-from motorbus.cli.feetech.together import Train, move_together, ping_everyone
+from motorbus.cli.feetech.together import move_together, ping_everyone
 
 __all__ = [
     "COMMANDS",
-    "Train",
     "app",
     "duplicates",
     "many_turns",

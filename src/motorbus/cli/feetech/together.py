@@ -1,4 +1,4 @@
-"""What common commands do with several FEETECH servos at once: begin in one instant, loop, ask who is there."""
+"""What common commands do with several FEETECH servos at once: begin in one instant, ask who is there."""
 
 from __future__ import annotations
 
@@ -17,34 +17,6 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.core.operation import Operation
-
-
-class Train:
-    """What a control loop of several servos does each cycle: all goals in one packet, all positions in one train.
-
-    Makes nothing move. Raises NoReply when a servo that must be asked first is silent.
-    """
-
-    def __init__(self, bus: Bus, nodes: Sequence[int]) -> None:
-        self.servos = [driver.Servo(bus, node) for node in nodes]
-        for error in bus.run(driver.prepare_all(self.servos, rate=bus.rate)).values():
-            raise error
-        self._bus = bus
-
-    @property
-    def positions(self) -> Operation[driver.Positions]:
-        """What reads all positions, once; of servos that know no SYNC READ one after the other."""
-        return driver.read_positions(self.servos, rate=self._bus.rate)
-
-    def goals(self, positions: Sequence[float]) -> Exchange[None]:
-        """The exchange that sends these goals, in rad, one for each servo."""
-        return driver.sync_write_positions(self.servos, positions)
-
-    def air_time(self, positions: Sequence[float]) -> float:
-        """Seconds on the wire for one cycle, without any pause: the limit that no program can beat."""
-        family, rate = self._bus.family, self._bus.rate
-        reads = driver.position_reads(self.servos, rate=rate)
-        return sum(family.air_time(one, rate) for one in (self.goals(positions), *reads))
 
 
 def move_together(

@@ -6,11 +6,14 @@ goals all that is asked for lies on one curve: a step that comes late lands wher
 
 from __future__ import annotations
 
-from math import isfinite
-from typing import Protocol
+from math import inf, isfinite, sqrt
+from typing import Protocol, TypeAlias
 
 from motorbus.errors import RequestError
-from motorbus.motion.profile.shapes import NOTHING, Limits, Profile, trapezoid
+from motorbus.motion.profile.shapes import NOTHING, Limits, trapezoid
+
+_Stretch: TypeAlias = "tuple[float, float, float, float, float]"
+"""Of a way: when it ends and begins (s), where, how fast, and how much faster it gets."""
 
 
 class Follower(Protocol):
@@ -62,62 +65,112 @@ def follower(position: float, limits: Limits, *, jerk: float | None = None) -> F
 
 
 class TrapezoidFollower:
-    """Follows by trapezoids. Acceleration is within the limits and may jump; see `Follower`."""
+    """Follows by trapezoids. Acceleration is within the limits and may jump; see `Follower`.
+
+    A loop asks it thousands of times a second for one step on a way that is new each time. So a way is kept as bare
+    numbers here; it is the one that `trapezoid` makes, which is asked for wherever the usual case is not enough.
+    """
 
     def __init__(self, position: float, limits: Limits) -> None:
         self._limits = limits
-        self._since = 0.0
-        self._way: Profile = self._towards(position, position, 0.0)
+        self._alike = limits.acceleration == limits.braking
+        self._position = self._goal = position
+        self._velocity = self._since = 0.0
+        self._phases: tuple[_Stretch, ...] = ()
+        self.reset(position)
 
     @property
     def position(self) -> float:
         """Where it is now."""
-        return self._way.position(self._since)
+        return self._position
 
     @property
     def velocity(self) -> float:
         """How fast it is now, with its sign."""
-        return self._way.velocity(self._since)
+        return self._velocity
 
     @property
     def goal(self) -> float:
         """Where it is going."""
-        return self._way.goal
+        return self._goal
 
     @property
     def arrived(self) -> bool:
         """Whether it is at rest at its goal."""
-        return self._since >= self._way.duration
+        return not self._phases or self._since >= self._phases[-1][0]
 
     def step(self, elapsed: float, goal: float | None = None) -> float:
         """The position `elapsed` seconds later, on the way to `goal`, or to the one it has; see `Follower`."""
-        check_elapsed(elapsed)
-        if goal is not None and goal != self.goal:
-            self._way = self._towards(self.position, goal, self.velocity)
-            self._since = 0.0
-        self._since += elapsed
-        return self.position
+        if not 0.0 <= elapsed < inf:
+            check_elapsed(elapsed)
+        if goal is not None and goal != self._goal:
+            self._phases = self._usual(goal) or self._any(goal)
+            self._goal, self._since = goal, 0.0
+        self._since = since = self._since + elapsed
+        for ends, begins, position, velocity, acceleration in self._phases:
+            if since < ends:
+                at = since - begins
+                self._velocity = velocity + acceleration * at
+                self._position = place = position + at * (velocity + 0.5 * acceleration * at)
+                return place
+        self._position, self._velocity = self._goal, 0.0
+        return self._goal
 
     def halt(self) -> None:
         """Brake from now on; see `Follower`."""
-        position, velocity = self.position, self.velocity
-        end = position + velocity * abs(velocity) / (2 * self._limits.braking)
-        self._way, self._since = self._towards(position, end, velocity), 0.0
+        velocity = self._velocity
+        goal = self._position + velocity * abs(velocity) / (2 * self._limits.braking)
+        self._phases = self._any(goal)
+        self._goal, self._since = goal, 0.0
 
     def reset(self, position: float) -> None:
         """Be at rest at another position."""
-        self._way, self._since = self._towards(position, position, 0.0), 0.0
+        way = trapezoid(
+            position, position, velocity=self._limits.velocity, acceleration=self._limits.acceleration
+        )
+        self._position = self._goal = way.goal
+        self._velocity = self._since = 0.0
+        self._phases = ()
 
-    def _towards(self, position: float, goal: float, velocity: float) -> Profile:
+    def _usual(self, goal: float) -> tuple[_Stretch, ...]:
+        """The way as `core.plant.move` lays it, where it brakes as it accelerates; () where it cannot be said so."""
+        begin, velocity, hardest = self._position, self._velocity, self._limits.acceleration
+        halt = begin + velocity * abs(velocity) / (2 * hardest)
+        if not self._alike or goal == halt or not isfinite(goal):
+            return ()
+        way = 1.0 if goal > halt else -1.0
+        square = 0.5 * (2 * hardest * way * (goal - begin) + velocity * velocity)
+        fastest = self._limits.velocity
+        peak = way * (fastest if square >= fastest * fastest else sqrt(square) if square > 0.0 else 0.0)
+        gain = hardest if peak > velocity else -hardest
+        first = (peak - velocity) / gain
+        reached = begin + first * (velocity + 0.5 * gain * first)
+        last = goal - peak * abs(peak) / (2 * hardest)
+        along = first + (max(0.0, (last - reached) / peak) if square >= fastest * fastest else 0.0)
+        ends = along + abs(peak) / hardest
+        if not ends < inf:
+            return ()
+        return (
+            (first, 0.0, begin, velocity, gain),
+            (along, first, reached, peak, 0.0),
+            (ends, along, last, peak, -way * hardest),
+        )
+
+    def _any(self, goal: float) -> tuple[_Stretch, ...]:
         limits = self._limits
-        return trapezoid(
-            position,
+        found = trapezoid(
+            self._position,
             goal,
             velocity=limits.velocity,
             acceleration=limits.acceleration,
             deceleration=limits.deceleration,
-            initial=velocity,
+            initial=self._velocity,
         )
+        stretches, begins = [], 0.0
+        for one in found.motion.phases:
+            stretches.append((begins + one.duration, begins, one.position, one.velocity, one.acceleration))
+            begins += one.duration
+        return tuple(stretches)
 
 
 def check_elapsed(elapsed: float) -> None:

@@ -21,7 +21,7 @@ from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.borrowing import PROJECT, Accord, borrowed
 from motorbus.families.stepper.driver.exchanges import timed
 from motorbus.families.stepper.driver.jogging import grounded
-from motorbus.families.stepper.driver.line import BITS
+from motorbus.families.stepper.driver.line import BITS, quiet_time
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.pacing import (
     check,
@@ -39,6 +39,8 @@ from motorbus.families.stepper.table import Project, decode_image
 VERB: Final = "keep_time"
 READS: Final = 2
 """How often something short is asked before, to know how fast the line is."""
+DOUBTS: Final = 4
+"""How often at most, where the bus has had to be quiet before each of them."""
 HELD: Final = 0.02
 """s by which an acknowledgement may be late before it is taken for one of an order that left late."""
 _INPUT: Final = 1
@@ -136,16 +138,18 @@ def _tempo(node: Node) -> Operation[Tempo]:
     """As it is now. Where an answer is there before it can be, bytes take no time: a socket, or no line at all.
 
     That a motion begins when the last byte of its order was heard is an assumption; an answer takes as much longer as
-    the controller thinks.
+    the controller thinks, which on a line where the bus is quiet before each question nobody can tell.
     """
     rate = yield from Tune(0)
     answers: list[float] = []
-    for _ in range(READS):
+    while len(answers) < READS or (min(answers) > quiet_time(rate) and len(answers) < DOUBTS):
         left = yield from Pause(0)
         answers.append((yield from timed(read_input(node, _INPUT))) - left)
-    byte = BITS / rate
-    paced = min(answers) >= byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH)
-    return Tempo(byte * wire.REQUEST_LENGTH if paced else 0.0, min(answers))
+    byte, quickest = BITS / rate, min(answers)
+    air = byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH)
+    if quickest < air:
+        return Tempo(0.0, quickest)
+    return Tempo(byte * wire.REQUEST_LENGTH, quickest if quickest <= quiet_time(rate) else air)
 
 
 def _turned(node: Node, project: Project, true: Project, watch: Watch, tempo: Tempo) -> Operation[Turned]:

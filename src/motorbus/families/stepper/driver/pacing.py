@@ -27,8 +27,9 @@ from motorbus.families.stepper.table.project import HUNDREDTHS_PER_TURN
 
 SPEEDS: Final = 40
 """So many speeds are tried for the quickest move, each a tenth below the one before."""
-GENTLER: Final = 4
-"""The start frequency is lowered to such a part of itself at most, to make a move longer."""
+GENTLER: Final = 0.75
+"""The start frequency is lowered to such a part of itself at most, to make a move longer: the first pulse comes later
+for it, and in no reading of the ramp by as much as in another."""
 _MOST: Final = 0xFFFF
 """The greatest speed (RPM) and acceleration (Hz) that a frame holds."""
 _DISTANCE: Final = 0xFFFFFF
@@ -54,7 +55,7 @@ def first_pulse(project: Project) -> float:
 def lasts(project: Project) -> float:
     """s from the first pulse of its single move to the last; 0 for a move of one pulse."""
     move = moved(project)
-    return max(0.0, move.duration - move.moment(1))
+    return move.duration - move.moment(1) if move.pulses != 1 else 0.0
 
 
 def quickest(project: Project, angle: float, velocity: float, acceleration: float | None) -> Project:
@@ -168,7 +169,7 @@ def _hertz(project: Project) -> float:
 def _stretched(base: Project, seconds: float) -> Project:
     """The same speed with a gentler ramp, so that it takes as long (s) or a little longer; else the gentlest."""
     step = base.step(1)
-    low = max(1, step.start_frequency // GENTLER)
+    low = max(1, int(step.start_frequency * GENTLER))
 
     def ramp(number: int, start: int) -> Project:
         return base.with_step(1, acceleration=number, start_frequency=start)

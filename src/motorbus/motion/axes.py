@@ -1,0 +1,37 @@
+"""The verbs of an axis, in one list: `Axis` and `AsyncAxis` are two-line classes over it.
+
+Each is a driver function of an axis, and is there on an axis whose device has the capability that it needs.
+"""
+
+from __future__ import annotations
+
+from motorbus.core.verbs import Awaiting, Blocking
+from motorbus.motion import axis, moving, reckoning
+from motorbus.motion.axis import AxisVerbs, ability
+
+
+class _Verbs(AxisVerbs):
+    state = ability("state", axis.state)
+    position = ability("position", axis.position)
+    velocity = ability("velocity", axis.velocity)
+    load = ability("load", axis.load)
+    current = ability("current", axis.current)
+    voltage = ability("voltage", axis.voltage)
+    temperature = ability("temperature", axis.temperature)
+    enable_torque = ability("enable_torque", axis.enable_torque)
+    disable_torque = ability("disable_torque", axis.disable_torque)
+    stop = ability("stop", axis.stop)
+    hold = ability(("enable_torque", "stop"), axis.hold)
+    move = ability(("train", "keep_time"), moving.move_axis)
+    move_by = ability(("train", "move_by"), moving.move_by)
+    jog = ability(("train", "jog"), moving.jog)
+    home = ability("home", reckoning.home)
+    run = ability("run", reckoning.run)
+
+
+class Axis(_Verbs, Blocking):
+    """An axis of a `Robot`."""
+
+
+class AsyncAxis(_Verbs, Awaiting):
+    """An axis of an `AsyncRobot`: every verb is awaited."""

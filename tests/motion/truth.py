@@ -1,0 +1,103 @@
+"""What simulated motors really did, whatever the host made of it: the plants' own movements, kept as they change.
+
+A simulated motor is a function of time. Here each function is noted with the moment from which on it held, so afterwards
+every question about the past has an exact answer.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from motorbus.core.family import Simulator
+from motorbus.simulation.named import Simulation
+
+FINE = 0.0002
+"""s between two looks at where a motor was."""
+STIRRED = 0.01
+"""Counts; less is no movement. A pulse of a stepper is a count."""
+
+
+class Went(NamedTuple):
+    """One motor: its way (in its own counts), and when it first and last moved, and had done 1 % and 99 % (s)."""
+
+    way: float
+    first: float
+    last: float
+    one: float
+    most: float
+
+
+class Truth:
+    """The movements of one simulated motor: `where(at)` on the clock of its bus."""
+
+    def __init__(self) -> None:
+        self._since: list[float] = []
+        self._pieces: list[Callable[[float], float]] = []
+        self._kept: object = None
+
+    def keep(self, at: float, key: object, piece: Callable[[float], float]) -> None:
+        """From this moment on the motor moves like that; nothing is kept when that is what it did before."""
+        if key is not self._kept:
+            self._kept = key
+            self._since.append(at)
+            self._pieces.append(piece)
+
+    def where(self, at: float) -> float:
+        """Where it was, in its own counts."""
+        return self._pieces[max(0, bisect_right(self._since, at) - 1)](at)
+
+    def went(self, begin: float, end: float) -> Went:
+        """What it did between two moments at which it stood still."""
+        start, goal = self.where(begin), self.where(end)
+        way = goal - start
+        least = STIRRED
+        moments = [begin + FINE * number for number in range(int((end - begin) / FINE) + 1)]
+        first = next((at for at in moments if abs(self.where(at) - start) > least), begin)
+        last = next((at for at in reversed(moments) if abs(self.where(at) - goal) > least), begin)
+        one = next((at for at in moments if abs(self.where(at) - start) >= 0.01 * abs(way)), begin)
+        most = next((at for at in reversed(moments) if abs(self.where(at) - goal) >= 0.01 * abs(way)), begin)
+        return Went(way, first, last, one, most)
+
+
+@contextmanager
+def watched(sims: Mapping[str, Simulation]) -> Iterator[dict[tuple[str, int], Truth]]:
+    """Keep the movements of all motors of these buses, by bus and id."""
+    truths = {(bus, node): Truth() for bus, sim in sims.items() for node in sim.simulator.nodes}
+    for bus, sim in sims.items():
+        _listen(sim.simulator, {node: truths[bus, node] for node in sim.simulator.nodes})
+    yield truths
+
+
+def _listen(simulator: Simulator, truths: Mapping[int, Truth]) -> None:
+    """Look at every motor after each thing that happens on its bus."""
+    inner: Any = simulator
+    receive, advance = inner.receive, inner.advance
+
+    def look(at: float) -> None:
+        for node, truth in truths.items():
+            truth.keep(at, *_piece(simulator.nodes[node]))
+
+    def received(data: Any, at: float) -> None:
+        receive(data, at)
+        look(at)
+
+    def advanced(to: float) -> Any:
+        told = advance(to)
+        look(to)
+        return told
+
+    look(0.0)
+    inner.receive, inner.advance = received, advanced
+
+
+def _piece(node: Any) -> tuple[object, Callable[[float], float]]:
+    """What moves it now, and where that is at a moment."""
+    if hasattr(node, "shaft"):
+        return node.shaft.motion, node.shaft.motion.position
+    if hasattr(node, "travel"):
+        state, offset = node.state, node.travel.offset
+        return state, lambda at: state.position(at) + offset
+    return node.motion, node.motion.position

@@ -1,0 +1,59 @@
+"""What an address comes to before a port is touched, and the one name under which each port is locked."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus import RequestError
+from motorbus.session.opening import lock_name, prepare
+
+
+def test_options_of_the_address_and_of_the_call_are_one() -> None:
+    found = prepare("feetech:/dev/ttyACM0,baud=500000", {})
+    assert (found.family.name, found.port, found.rate, found.options) == (
+        "feetech",
+        "/dev/ttyACM0",
+        500_000,
+        {},
+    )
+    assert prepare("feetech:/dev/ttyACM0,baud=500000", {"baud": "1M"}).rate == 1_000_000
+    assert prepare("feetech:/dev/ttyACM0", {}).rate == 0, "nobody said"
+
+
+def test_what_a_family_takes_goes_to_the_family_and_the_rest_to_the_link() -> None:
+    found = prepare("kst:can://slcan/dev/ttyACM0,window=3,ttyBaudrate=115200", {})
+    assert found.family.link.window == 3
+    assert found.options == {"ttyBaudrate": "115200"}
+    simulated = prepare("feetech:sim,ids=1-3,model=sts3215", {})
+    assert simulated.options == {"ids": "1-3", "model": "sts3215"}
+
+
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("feetech:/dev/ttyACM0,speed=3", "unknown option 'speed'"),
+        ("feetech:/dev/ttyACM0,baud=fast", "not a rate in bit/s"),
+        ("kst:sim,bitrate=-1", "not a rate in bit/s"),
+        ("nobody:/dev/ttyACM0", "no family 'nobody'"),
+    ],
+)
+def test_what_cannot_be_is_refused_without_touching_the_port(address: str, why: str) -> None:
+    with pytest.raises(RequestError, match=why):
+        prepare(address, {})
+
+
+@pytest.mark.parametrize(
+    ("bus", "name"),
+    [
+        ("feetech:/dev/ttyACM0,baud=500000", "/dev/ttyACM0"),
+        ("feetech:socket://10.0.0.7:4000", "socket://10.0.0.7:4000"),
+        ("kst:can://slcan/dev/ttyACM0", "/dev/ttyACM0"),
+        ("kst:can://slcan/dev/ttyACM0@1000000", "/dev/ttyACM0"),
+        ("kst:can://serial/dev/ttyACM0", "/dev/ttyACM0"),
+        ("kst:can://socketcan/can0", "can://socketcan/can0"),
+        ("kst:can://socketcand/localhost/can0", "can://socketcand/localhost:29536/can0"),
+        ("kst:can://virtual/anything", ""),
+    ],
+)
+def test_a_port_is_locked_under_one_name(bus: str, name: str) -> None:
+    assert lock_name(bus, {}) == name

@@ -1,0 +1,88 @@
+"""What opening a machine takes is found out before any port is touched."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from motorbus import PortBusy, PortNotFound, RequestError
+from motorbus.motion.machine import Machine
+from motorbus.session.plan import Plan, loaded
+from tests.motion.machines import described, machine
+
+
+def made_of(arm: str, can: str) -> Machine:
+    return Machine.parse(described({"arm": arm, "can": can}, "1", "0x25", False, {}, {}))
+
+
+def test_all_axes_or_those_that_are_wanted_and_the_buses_they_need() -> None:
+    with machine(arm="1-3", can="0x25", lift=True) as (made, _):
+        assert Plan.of(made)[1:] == (("a1", "a2", "a3", "c1", "lift"), ("arm", "can", "stage"))
+        assert Plan.of(made, "c1")[1:] == (("c1",), ("can",))
+        assert Plan.of(made, ["lift", "arm", "a1"])[1:] == (("lift", "a1", "a2", "a3"), ("stage", "arm"))
+        assert Plan.of(made, "led").buses == ("arm", "can")
+
+
+def test_a_name_that_is_none_is_refused_with_those_there_are() -> None:
+    with (
+        machine(arm="1") as (made, _),
+        pytest.raises(RequestError, match="there is no axis, group or bus 'elbow'"),
+    ):
+        Plan.of(made, "elbow")
+
+
+def test_a_machine_without_axes_cannot_be_opened() -> None:
+    with pytest.raises(RequestError, match="no axis"):
+        Plan.of(Machine.parse('format = 1\n[bus.arm]\naddress = "feetech:sim,ids=1"\n'))
+
+
+def test_an_address_that_cannot_be_is_refused_naming_its_bus() -> None:
+    with pytest.raises(RequestError, match="^bus.can: .*unknown option 'colour'"):
+        Plan.of(made_of("feetech:sim,ids=1", "kst:sim,colour=red"))
+
+
+def test_two_buses_on_one_port_are_refused() -> None:
+    one, other = "feetech:/dev/ttyACM0", "feetech:/dev/ttyACM0,baud=500000"
+    text = f'format = 1\n[bus.a]\naddress = "{one}"\n[bus.b]\naddress = "{other}"\n'
+    axes = '[axis.x]\ndevice = "a#1"\n[axis.y]\ndevice = "b#2"\n'
+    found = Machine.parse(text + axes)
+    with pytest.raises(RequestError, match="bus.b.address: /dev/ttyACM0 is the port of bus.a too"):
+        Plan.of(found)
+    assert Plan.of(found, "x").buses == ("a",)
+
+
+def test_simulators_that_are_made_anew_are_no_port() -> None:
+    assert Plan.of(made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")).buses == ("arm", "can")
+
+
+def test_a_machine_by_hand_is_judged_too() -> None:
+    found = made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")
+    twice = Machine(buses=found.buses, axes={"x": found.axes["a1"], "y": found.axes["a1"]})
+    with pytest.raises(RequestError, match="moves axis.x already"):
+        Plan.of(twice)
+
+
+def test_a_port_that_cannot_be_opened_is_told_with_its_bus() -> None:
+    plan = Plan.of(made_of("feetech:/dev/ttyNOTHING", "kst:sim:nobody"))
+    for opening in (plan.open, plan.open_async):
+        with pytest.raises(PortNotFound, match=r"^bus\.arm: .*ttyNOTHING"):
+            opening("arm", None)
+        with pytest.raises(PortNotFound, match=r"^bus\.can: "):
+            opening("can", None)
+
+
+def test_a_port_that_is_taken_is_told_with_its_bus() -> None:
+    with machine(arm="1") as (made, _):
+        plan = Plan.of(made)
+        with plan.open("arm", None), pytest.raises(PortBusy, match=r"^bus\.arm: "):
+            plan.open("arm", None)
+
+
+def test_a_file_is_loaded_with_its_addresses_checked(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(described({"arm": "feetech:sim,ids=1"}, "1", "", False, {}, {}), encoding="utf-8")
+    assert list(loaded(file).axes) == ["a1"]
+    file.write_text(described({"arm": "feetech:sim,colour=red"}, "1", "", False, {}, {}), encoding="utf-8")
+    with pytest.raises(RequestError, match="motorbus.toml: .*colour"):
+        loaded(file)
