@@ -114,7 +114,7 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
         gc.freeze()
         used, began = process_time(), perf_counter()
         for state, wanted in zip(loop, goals, strict=False):
-            positions.append(state.position)
+            positions.append((state.position, state.missing))
             for name, way in wanted.items():
                 goal[name] = base[name] + way
             if perf_counter() - began >= seconds:
@@ -136,13 +136,23 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
     }
 
 
-def judged(positions: Sequence[dict[str, float]]) -> None:
-    """Each reading shows one count more than the one before. Raises Wrong."""
-    for number in range(1, len(positions)):
-        for name, after in positions[number].items():
-            way = round((after - positions[number - 1][name]) / STEP) % COUNTS
-            if way != 1:
-                raise Wrong(f"cycle {number}: {name} shows {way} readings since the one before")
+def judged(readings: Sequence[tuple[dict[str, float], frozenset[str]]]) -> None:
+    """Each reading shows one count more than the one before, and one for each that was lost and told as lost.
+
+    Raises Wrong.
+    """
+    last, due = dict(readings[0][0]), dict.fromkeys(readings[0][0], 0)
+    for number, (positions, missing) in enumerate(readings[1:], 1):
+        for name, here in positions.items():
+            due[name] += 1
+            if name in missing:
+                continue
+            way = round((here - last[name]) / STEP) % COUNTS
+            if way != due[name]:
+                raise Wrong(
+                    f"cycle {number}: {name} shows {way} readings since the last, and {due[name]} were asked"
+                )
+            last[name], due[name] = here, 0
 
 
 # -- in the process that conducts --------------------------------------------------------------------------------

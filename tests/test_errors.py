@@ -47,3 +47,8 @@ def test_errors_that_python_knows_are_those_too(kind: type[Exception], builtin: 
 def test_a_device_error_carries_code_and_register() -> None:
     error = errors.DeviceError("no", code=7, register="lock", node=3)
     assert (error.code, error.register, error.node) == (7, "lock", 3)
+
+
+def test_only_what_was_refused_before_anything_was_sent_says_by_itself_that_nothing_moved() -> None:
+    said = {kind.__name__ for kind in CLASSES if kind.unmoved}
+    assert said == {"RequestError", "LimitExceeded"}

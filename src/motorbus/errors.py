@@ -120,6 +120,8 @@ class DeviceError(MotorbusError):
 class RequestError(MotorbusError, ValueError):
     """The request itself is impossible: unknown or read-only register, value out of range. Nothing was sent."""
 
+    unmoved = True
+
 
 class MotionError(MotorbusError):
     """Motion was refused or ended early."""
@@ -127,6 +129,8 @@ class MotionError(MotorbusError):
 
 class LimitExceeded(MotionError):
     """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent."""
+
+    unmoved = True
 
 
 class NotHomed(MotionError):

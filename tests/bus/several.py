@@ -7,7 +7,8 @@ from random import Random
 from typing import Any
 
 from motorbus.bus.aio import AsyncBus
-from motorbus.bus.concert import Concert, LoopConcert
+from motorbus.bus.concert import Concert
+from motorbus.bus.concert_loop import LoopConcert
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Exchange, Operation, Pause, Report

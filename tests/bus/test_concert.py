@@ -9,10 +9,14 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.concert import Bell, clock_of
+from motorbus.bus.concert import Bell
+from motorbus.bus.pump import Bus
 from motorbus.core.operation import Listen, Operation, Pause, Report
 from motorbus.errors import Interrupted, LinkLost, NoReply
+from motorbus.families.feetech import FAMILY
+from motorbus.link.memory import MemoryLink
 from tests.bus.responder import guarded, position
+from tests.bus.script import admit_all
 from tests.bus.several import Several, single, wander
 
 CLOCKS = [(True, True), (False, False), (True, False), (False, True, True)]
@@ -122,6 +126,24 @@ def test_a_virtual_clock_that_has_run_ahead_is_waited_for_by_a_real_one() -> Non
 
     several.concert.run({name: begin(name) for name in several.buses})
     assert min(begun.values()) >= 0.05 - AS_GOOD_AS_EQUAL
+    several.close()
+
+
+class Untold(MemoryLink):
+    """Like a port without descriptor: nobody knows when something will come."""
+
+    due = None  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize("virtual", [True, False])
+def test_links_that_cannot_tell_when_something_comes_are_looked_at(virtual: bool) -> None:
+    several = Several(virtual, virtual)
+    link = Untold(several.responders["a"], virtual=virtual)
+    several.buses["a"] = Bus(link, FAMILY, admit=admit_all)
+    several.origins["a"] = link.now()
+    told = several.concert.run({"a": guarded(1, 9), "b": wander(1, "b", several.origins["b"], [])})
+    assert told == {"a": None, "b": 1}
+    assert several.responders["a"].memory[1][20] == 9
     several.close()
 
 
@@ -242,15 +264,6 @@ def test_a_report_may_do_work_of_its_own_on_the_same_buses() -> None:
     assert several.concert.run({"a": outer(), "b": single(2)}) == {"a": 1, "b": 2}
     assert inner == [{"a": 3, "b": 4}]
     several.close()
-
-
-def test_who_sets_the_pace() -> None:
-    part: Any = type("Part", (), {})
-    virtual, real = part(), part()
-    virtual.link, real.link = part(), part()
-    virtual.link.virtual, real.link.virtual = True, False
-    assert clock_of([virtual, virtual]) is None
-    assert clock_of([virtual, real]) is real
 
 
 def test_a_bell_is_heard_from_other_threads_only_and_once() -> None:

@@ -14,13 +14,13 @@ import pytest
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 from tests.cli.test_estop import FOREIGN, WATCHING, program
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 
 
-PING, READ, WRITE = 1, 2, 3
+PING, READ, WRITE, SYNC_READ = 1, 2, 3, 0x82
 
 
 def registers(arm: Simulation) -> dict[str, int]:
@@ -140,3 +140,40 @@ def test_what_is_possible_is_heard(run: Run, arm: Simulation, monkeypatch: pytes
     assert run("write", f"{arm.url}#1", "torque_limit=50%").code == 0
     assert {packet[4] for packet in heard} > {WRITE}
     assert registers(arm) != before
+
+
+AXES = [
+    ("move a1=nan", 2),
+    ("move a1=151deg", 8),
+    ("move a1=10deg a2=-151deg", 8),
+    ("move upper=1 a1=1", 2),
+    ("move lift=1mm", 8),
+    ("move a1=10deg --duration 1ms", 2),
+    ("pose redy", 2),
+    ("pose whole", 8),
+    ("park a2", 2),
+    ("jog a1=900deg/s --seconds 1", 8),
+    ("jog a1=30deg/s --seconds 60", 8),
+    ("hold a9", 2),
+    ("home a1", 2),
+    ("torque on a9", 2),
+    ("stop a9", 2),
+    ("write a1 goal_position=nan", 2),
+    ("read a1 present_positon", 2),
+]
+
+
+@pytest.mark.parametrize(("command", "code"), AXES)
+def test_a_request_by_names_that_is_impossible_changes_nothing(
+    command: str, code: int, run: Run, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = bench.simulations["arm"]
+    assert run("read", "a1").code == 0  # what a read refreshes is no change
+    before = arm[1].status(), registers(arm)
+    heard = listening(arm, monkeypatch)
+    ran = run(*command.split(), "--yes")
+    ran = run(*command.split()) if "--yes" in ran.err else ran
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.count("error: ") == 1
+    assert (arm[1].status(), registers(arm)) == before
+    assert {packet[4] for packet in heard} <= {PING, READ, SYNC_READ}

@@ -81,15 +81,11 @@ def test_reports_take_their_share(run: Run) -> None:
         [BUS, "--ids", "1", "--latency", "-1ms"],
         [BUS, "--ids", "1", "--reports", "0"],
         [BUS, "--ids", "1", "--profile", "acme"],
-        ["feetech:sim", "--ids", "1"],
-        ["template:sim", "--ids", "1"],
+        [BUS, "--ids", "1", "--model", "kst-ext"],
+        [BUS, "feetech:sim", "--ids", "1"],
     ],
     ids=" ".join,
 )
 def test_what_cannot_be_counted_ends_with_2(words: list[str], run: Run) -> None:
     ran = run("budget", *words)
     assert (ran.code, ran.out) == (2, "")
-
-
-def test_a_serial_bus_comes_later_and_says_so(run: Run) -> None:
-    assert "CAN buses only in this version" in run("budget", "feetech:sim", "--ids", "1").err

@@ -7,12 +7,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 import motorbus
 from motorbus.cli.simulated import Simulated
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 LOOPING = """
 import sys, motorbus
@@ -186,3 +187,27 @@ def test_without_a_bus_there_must_be_one(run: Run) -> None:
 
 def test_the_help_says_that_the_arm_will_sag(run: Run) -> None:
     assert "SAG" in run("estop", "--help").out
+
+
+def test_by_name_every_bus_of_it_is_stopped(bench: Bench, run: Run) -> None:
+    stops = run("estop", "all", "--json").document["buses"]
+    assert [one["acknowledged"] for one in stops] == [[1, 2, 3], [37], [1]]
+
+
+def test_without_a_name_the_machine_is_stopped(bench: Bench, run: Run) -> None:
+    assert run("hold", "a1").code == 0
+    stops = run("estop", "--json").document["buses"]
+    assert [one["acknowledged"] for one in stops] == [[1, 2, 3], [37], [1]]
+    assert run("read", "a1", "torque_enable", "--json").document["registers"][0]["raw"] == 0
+
+
+def test_a_broken_machine_file_keeps_nobody_from_being_stopped(
+    served: Simulated, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "motorbus.toml").write_text("no machine", encoding="utf-8")
+    with program(HANGING, served.bus):
+        ran = run("estop", "--json")
+    assert ran.code == 0
+    assert "the machine file is of no help" in ran.err
+    assert torque(served.bus) == [0, 0, 0]

@@ -15,7 +15,7 @@ import pytest
 import motorbus
 from motorbus import families
 from motorbus.core.operation import INTENT, CanFrame, Journal
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 from tests.conformance.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
 from tests.conformance.world import moves
 
@@ -126,6 +126,40 @@ KST = [
     "kst reverse BUS#1 on --yes",
     "kst reverse BUS#1 on --dry-run",
 ]
+AXES = [
+    "move a1=10deg",
+    "move a1+=5deg c1-=2deg lift=3mm --assume lift=0mm",
+    "move upper=0 --duration 3s --dry-run",
+    "move lift=1mm --home --yes",
+    "move lift+=1mm",
+    "move lift+=1mm --dry-run",
+    "pose ready",
+    "pose ready --dry-run",
+    "pose --save here a1 c1",
+    "park a1",
+    "park a1 --dry-run",
+    "hold",
+    "hold a1 --dry-run",
+    "home lift --yes",
+    "home lift --dry-run",
+    "jog a1=5deg/s --seconds 1",
+    "jog a1=5deg/s --seconds 1 --dry-run",
+    "jog lift=2mm/s --seconds 1",
+    "stop",
+    "stop a1 lift --dry-run",
+    "torque on a1",
+    "torque on upper --dry-run",
+    "torque off all",
+    "estop",
+    "estop all",
+    "read a1",
+    "info c1",
+    "ping all",
+    "scan can --ids 0x25",
+    "monitor a1 c1 --count 1",
+    "init arm=feetech:sim,ids=1-3 kst:sim --force",
+]
+"""By the names of a machine file."""
 LACKS = {"kst": ("torque ", "--velocity")}
 """What devices of a family cannot: no torque switch, no speed."""
 HERE = {"feetech": "3.0", "kst": "0.2", "template": "0.2"}
@@ -210,6 +244,22 @@ def test_it_says_so_to_programs_too(family: str, command: str, run: Run) -> None
     assert ran.code == 0, ran.err
     assert [record["simulated"] for record in ran.records] == [True] * len(ran.records)
     assert ran.records
+
+
+@pytest.mark.parametrize("command", AXES)
+def test_by_names_it_works_too_and_says_that_it_is_simulated(command: str, bench: Bench, run: Run) -> None:
+    ran = run(*command.split())
+    assert ran.code == 0, ran.err
+    assert "(simulated)" in ran.out or ran.out.startswith("simulated\n")
+    assert ran.out.splitlines().count("simulated") <= 1
+
+
+@pytest.mark.parametrize("command", AXES)
+def test_by_names_it_says_so_to_programs_too(command: str, bench: Bench, run: Run) -> None:
+    ran = run(*command.split(), "--json")
+    assert ran.code == 0, ran.err
+    assert ran.records
+    assert all(record["simulated"] and record["schema"].startswith("motorbus.") for record in ran.records)
 
 
 @pytest.mark.parametrize(("family", "command"), LACKING, ids=lambda value: str(value))

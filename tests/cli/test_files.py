@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 
 import pytest
 
-from motorbus.cli.files import usable
+from motorbus.cli.files import replaced, usable
 from motorbus.errors import LinkLost, RequestError
 
 
@@ -30,3 +31,23 @@ def test_what_is_wrong_is_said_with_the_name(tmp_path: Path) -> None:
 def test_a_lost_port_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(LinkLost), usable(tmp_path, "read"):
         raise LinkLost("gone")
+
+
+def test_another_text_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, link = tmp_path / "a", tmp_path / "link"
+    file.write_text("old")
+    file.chmod(0o640)
+    link.symlink_to(file)
+    replaced(link, "new\r\n")
+    assert file.read_bytes() == b"new\r\n"
+    assert link.is_symlink()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o640
+
+    def cut_off(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", cut_off)
+    with pytest.raises(RequestError, match="link cannot be written: no space left on device"):
+        replaced(link, "third")
+    assert file.read_bytes() == b"new\r\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "link"]

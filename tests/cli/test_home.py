@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.core.operation import Pause
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 from tests.cli.stepper.conftest import line_of
 
 pytestmark = pytest.mark.usefixtures("state_folder")
@@ -60,3 +60,23 @@ def test_bad_input_ends_with_2(words: str, run: Run) -> None:
     ran = run("home", *words.split(), "--yes")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.count("error: ") == 1
+
+
+def test_an_axis_is_homed_by_its_name(run: Run, bench: Bench) -> None:
+    assert "would send FF AA" in run("home", "lift", "--dry-run").out
+    ran = run("home", "lift", "--yes", "--json")
+    assert (ran.code, ran.document["schema"]) == (0, "motorbus.home.axes/1")
+    assert ran.document["axes"] == [{"name": "lift", "at": 0.0}]
+    assert run("move", "lift+=3mm").code == 0
+    assert "0.00 mm (estimated)" in run("home", "stage", "--deadline", "20s", "--yes").out
+
+
+def test_it_asks_before_an_axis_is_homed(run: Run, bench: Bench) -> None:
+    ran = run("home", "lift")
+    assert (ran.code, "home lift: each moves until its switch is met" in ran.err) == (8, True)
+
+
+@pytest.mark.parametrize("words", ["", "a1", "all", "lift a9", "lift stage#1", "lift --velocity 1"])
+def test_what_cannot_home_is_refused(words: str, run: Run, bench: Bench) -> None:
+    ran = run("home", *words.split(), "--yes")
+    assert (ran.code, ran.out, ran.err.count("error: ")) == (2, "", 1)

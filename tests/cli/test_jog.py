@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 
 import pytest
 
 import motorbus
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 from tests.cli.stepper.conftest import Line, line_of
 
 pytestmark = pytest.mark.usefixtures("state_folder")
@@ -68,3 +69,29 @@ def test_what_cannot_be_done_is_refused_and_nothing_moves(words: str, run: Run, 
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.count("error: ") == 1
     assert line.orders() == []
+
+
+def test_an_axis_goes_in_its_own_unit_and_inside_its_limits(run: Run, bench: Bench) -> None:
+    told = run("jog", "lift=2mm/s", "--seconds", "1", "--json").document
+    assert (told["schema"], told["axis"], told["present"]) == ("motorbus.jog.axes/1", "lift", None)
+    assert told["result"] == pytest.approx(0.002, abs=2e-4)
+    ran = run("jog", "a1=-10deg/s", "--seconds", "1")
+    assert ran.code == 0
+    assert re.search(r"a1: by -[0-9.]+ deg; now at -[0-9.]+ deg", ran.out)
+    assert run("jog", "a1=60deg/s", "--seconds", "4", "--yes").code == 8
+    assert run("jog", "a1=600deg/s", "--seconds", "0.1").code == 8
+
+
+def test_a_long_way_of_an_axis_needs_agreement(run: Run, bench: Bench) -> None:
+    ran = run("jog", "a1=90deg/s", "--seconds", "3")
+    assert (ran.code, "--yes" in ran.err) == (8, True)
+    ran = run("jog", "lift=20mm/s", "--seconds", "6")
+    assert (ran.code, "move lift by 120.00 mm" in ran.err) == (8, True)
+
+
+def test_a_dry_run_of_an_axis_moves_nothing(run: Run, bench: Bench) -> None:
+    told = run("jog", "a1=10deg/s", "--seconds", "1", "--dry-run", "--json").document
+    assert told["schema"] == "motorbus.jog.plan/1"
+    assert "would go by 10.0 deg at most" in run("jog", "a1=10deg/s", "--seconds", "1", "--dry-run").out
+    assert "would send FF AA" in run("jog", "lift=2mm/s", "--seconds", "1", "--dry-run").out
+    assert abs(run("hold", "a1", "--json").document["axes"][0]["present"]) < 0.01

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def stands(run: Run, arm: Simulation, node: int) -> float:
@@ -103,3 +103,11 @@ def test_a_dry_run_shows_one_frame_and_moves_nothing(more: list[str], run: Run, 
     (frame,) = ran.document["withheld"]
     assert "goal_position" in frame["meaning"]
     assert stands(run, arm, 1) == pytest.approx(math.pi)
+
+
+def test_devices_and_axes_are_not_mixed(run: Run, bench: Bench) -> None:
+    ran = run("move", "a1=10deg", "arm#2=3.0")
+    assert (ran.code, ran.out, "two commands" in ran.err) == (2, "", True)
+    assert run("move", "arm#1+2=3.0", "--velocity", "1").code == 0
+    (one,) = run("hold", "a1", "--json").document["axes"]
+    assert one["present"] == pytest.approx(3.0 - math.pi, abs=0.05), "a device goes by its own angle"

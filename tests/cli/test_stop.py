@@ -9,7 +9,7 @@ import pytest
 import motorbus
 from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def test_it_ends_a_motion_and_holds(run: Run, arm: Simulation) -> None:
@@ -37,3 +37,23 @@ def test_on_a_bus_that_is_held_the_other_stop_is_named(run: Run, served: Simulat
         ran = run("stop", served.bus)
     assert ran.code == 4
     assert "`motorbus estop BUS` reaches it" in ran.err
+
+
+def test_by_name_and_the_whole_machine_without_one(run: Run, bench: Bench) -> None:
+    assert run("move", "arm#1=1", "--velocity", "1", "--no-wait").code == 0
+    told = run("stop", "--json").document["devices"]
+    assert [one["axis"] for one in told] == ["a1", "a2", "a3", "c1", "lift"]
+    assert all(one["done"] for one in told)
+    assert abs(run("hold", "a1", "--json").document["axes"][0]["present"]) < 0.5
+    assert [one["axis"] for one in run("stop", "upper", "lift", "--json").document["devices"]] == [
+        "a1",
+        "a2",
+        "a3",
+        "lift",
+    ]
+    assert run("stop", "a1").out.splitlines()[-1].startswith("a1 (feetech:sim:")
+    assert run("stop", "arm", "--json").document["devices"][0].keys() == {"bus", "id", "done", "promise"}
+
+
+def test_without_a_name_or_a_machine_it_asks_which_bus(run: Run) -> None:
+    assert "which bus?" in run("stop").err

@@ -11,6 +11,7 @@ from motorbus.cli.output import Output
 from motorbus.errors import RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Bench
 
 
 def test_a_bus_and_its_nodes() -> None:
@@ -96,3 +97,13 @@ def test_what_no_device_of_a_family_can_is_known_without_a_bus() -> None:
 def test_an_option_may_be_said_as_a_flag() -> None:
     with target.opened("kst:sim,ids=1", {"id-format": "ext"}, Output()) as bus:
         assert bus.family.identify(1) is not None
+
+
+def test_a_name_of_the_machine_file_is_a_target(bench: Bench) -> None:
+    urls = {name: simulation.url for name, simulation in bench.simulations.items()}
+    assert target.target("a2")[::2] == (urls["arm"], (2,))
+    assert target.device("c1").bus == urls["can"]
+    assert target.gathered(["upper", "arm#3", "lift"]) == {urls["arm"]: (1, 2, 3), urls["stage"]: (1,)}
+    assert [one.bus for one in target.targets("all")] == list(urls.values())
+    with pytest.raises(RequestError, match="all is on 3 buses"):
+        target.target("all")

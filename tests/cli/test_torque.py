@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def limp(run: Run, arm: Simulation, node: int) -> bool:
@@ -46,3 +46,36 @@ def test_one_that_is_gone_does_not_keep_the_others_stiff(run: Run, arm: Simulati
 @pytest.mark.parametrize("words", [["on"], ["up", "feetech:sim#1"], []], ids=" ".join)
 def test_what_is_no_order_ends_with_2(words: list[str], run: Run) -> None:
     assert run("torque", *words).code == 2
+
+
+def test_an_axis_gets_the_cap_of_its_file(run: Run, bench: Bench) -> None:
+    text = bench.file.read_text(encoding="utf-8")
+    capped = text.replace("[axis.a2]", "torque = 0.25\n[axis.a2]", 1)
+    bench.file.write_text(capped, encoding="utf-8")
+    ran = run("torque", "on", "a1", "--json")
+    assert (ran.code, ran.document["axes"]) == (0, [{"name": "a1"}])
+    registers = run("read", "a1", "torque_enable", "torque_limit", "--json").document["registers"]
+    assert registers[0]["raw"] == 1
+    assert registers[1]["value"] == pytest.approx(0.25)
+
+
+def test_a_group_is_switched_as_far_as_it_can_be(run: Run, bench: Bench) -> None:
+    assert [one["name"] for one in run("torque", "on", "all", "--json").document["axes"]] == [
+        "a1",
+        "a2",
+        "a3",
+    ]
+    told = run("torque", "off", "all", "--json").document["devices"]
+    assert [(one["axis"], one["done"]) for one in told] == [("a1", True), ("a2", True), ("a3", True)]
+    assert run("read", "a2", "torque_enable", "--json").document["registers"][0]["raw"] == 0
+
+
+def test_a_dry_run_of_an_axis_shows_its_frames(run: Run, bench: Bench) -> None:
+    assert "torque_enable 1 (on)" in run("torque", "on", "a1", "--dry-run").out
+    assert run("read", "a1", "torque_enable", "--json").document["registers"][0]["raw"] == 0
+
+
+@pytest.mark.parametrize("words", ["on c1", "off c1", "off lift", "on a1 arm#2", "on a9"])
+def test_an_axis_without_a_switch_is_refused(words: str, run: Run, bench: Bench) -> None:
+    ran = run("torque", *words.split())
+    assert (ran.code, ran.out, ran.err.count("error: ")) == (2, "", 1)

@@ -6,10 +6,9 @@ from math import inf, nan
 
 import pytest
 
-from motorbus import families
 from motorbus.core.can_bits import bits
 from motorbus.core.operation import CanFrame
-from motorbus.diagnose.budget import Budget, Span, Traffic, Transfer, budget, simulated
+from motorbus.diagnose.budget import Budget, Span, Traffic, Transfer, budget
 from motorbus.errors import RequestError
 
 POSITIONS = range(-900, 901, 20)
@@ -120,36 +119,3 @@ def test_what_cannot_be_counted_is_refused() -> None:
     for options in ({"loop_rate": -1.0}, {"latency": nan}, {"turnaround": inf}):
         with pytest.raises(RequestError, match="cannot be"):
             budget([read(1)], 500_000, **options)  # type: ignore[arg-type]
-
-
-# -- a bus of any kind, without a port ---------------------------------------------------------------------------
-
-
-def test_six_servos_on_a_serial_line_are_88_bytes_a_cycle() -> None:
-    found = simulated(families.load("feetech"), range(1, 7), bit_rate=1_000_000)
-    assert found.wire == pytest.approx(
-        880e-6
-    )  # 26 bytes of goals, 14 of the question, six times 8 of an answer
-    assert (found.axes, found.exchanges, found.replies) == (tuple("123456"), 2, 6)
-    assert found.highest_rate == pytest.approx(1136.36, abs=0.01)
-
-
-def test_devices_that_take_their_time_make_a_serial_line_slower() -> None:
-    quick = simulated(families.load("feetech"), range(1, 7))
-    slow = simulated(families.load("feetech"), range(1, 7), turnaround=0.0001)
-    assert slow.waits == pytest.approx(6 * 0.0001)
-    assert 1 / slow.highest_rate - 1 / quick.highest_rate == pytest.approx(0.0006)
-
-
-def test_exchanges_on_can_overlap_so_only_their_bits_count() -> None:
-    found = simulated(families.load("kst"), (0x21, 0x22, 0x23), turnaround=0.001)
-    assert (found.exchanges, found.replies, found.waits) == (6, 6, 0.0)
-    exact = budget([one for node in (0x21, 0x22, 0x23) for one in (write(node), read(node))], found.bit_rate)
-    assert exact.time.least < found.wire < exact.time.most
-
-
-def test_a_device_that_moves_by_its_own_profile_is_in_no_loop() -> None:
-    with pytest.raises(RequestError, match="cannot be led"):
-        simulated(families.load("stepper"), (1,))
-    with pytest.raises(RequestError, match="cannot be"):
-        simulated(families.load("feetech"), (1,), turnaround=nan)

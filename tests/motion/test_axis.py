@@ -7,10 +7,12 @@ import asyncio
 import pytest
 
 from motorbus import AsyncRobot, RequestError, Robot
+from motorbus.core.operation import Operation, Pause
 from motorbus.motion.axes import AsyncAxis, Axis
 from motorbus.motion.axis import ability
 from motorbus.motion.body import Body
-from tests.motion.machines import listened, machine, said
+from motorbus.simulation.named import Simulation
+from tests.motion.machines import Heard, listened, machine, said
 
 TURNED = {"zero": "90 deg", "sign": -1, "gear": 2.0, "low": "-40 deg", "high": "40 deg"}
 
@@ -81,15 +83,13 @@ def test_effort_has_the_direction_of_the_axis() -> None:
         assert axis.current() == -0.5
 
 
-def _told(value: float):  # type: ignore[no-untyped-def]
-    yield from ()
+def _told(value: float) -> Operation[float]:
+    yield from Pause(0)
     return value
 
 
-def _pause(seconds: float):  # type: ignore[no-untyped-def]
-    from motorbus.core.operation import Pause
-
-    return Pause(seconds).__iter__()
+def _pause(seconds: float) -> Operation[float]:
+    return (yield from Pause(seconds))
 
 
 def test_a_linear_axis_is_in_metres() -> None:
@@ -130,12 +130,13 @@ def test_the_cap_of_the_file_is_set_before_the_torque() -> None:
         assert sims["arm"][1].memory["torque_limit"] == 500
         assert sims["arm"][1].memory["torque_enable"] == 1
         writes = [one for one in said(sims) if one.startswith("WRITE")]
-        assert "torque_limit" in _parts(sims, writes[0]), "the cap comes first"
+        assert "torque_limit" in _parts(sims["arm"], writes[0]), "the cap comes first"
 
 
-def _parts(sims, title: str) -> str:  # type: ignore[no-untyped-def]
-    sim = sims["arm"]
-    found = (one for data in sim.line.sent for one in sim.family.explain(data) if one.title == title)
+def _parts(sim: Simulation, title: str) -> str:
+    assert isinstance(sim.line, Heard)
+    frames = (data for data in sim.line.sent if isinstance(data, bytes))
+    found = (one for data in frames for one in sim.family.explain(data) if one.title == title)
     return " ".join(f"{part.name} {part.meaning}" for part in next(found).parts)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from motorbus import NoReply, RequestError, Robot
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Pause
+from motorbus.core.verbs import verb
 from motorbus.motion import recognition
 from tests.motion.machines import listened, machine, said
 
@@ -107,24 +107,22 @@ def test_a_place_to_park_needs_a_way_to_it() -> None:
         assert "axis.c1.exit" in str(refused)
 
 
+class Other:
+    """A device that is none of those that somebody knows."""
+
+    @verb
+    def identify(self) -> Operation[Identity]:
+        yield from Pause(0)
+        return Identity(1, "SCS9999", "9.9", "")
+
+
 def test_a_device_of_which_nobody_has_said_what_it_can_do_is_refused() -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot:
         axis = robot["a1"]
         device = axis.device
-
-        def other() -> Operation[Identity]:
-            yield from Pause(0)
-            return Identity(1, "SCS9999", "9.9", "")
-
-        axis.device = type("Other", (), {"identify": type("_", (), {"function": lambda _: other()})})()
+        axis.device = Other()
         with pytest.raises(RequestError, match="a1: arm#1 is SCS9999, of which nobody has said"):
             robot.conductor.run(recognition.recognise(robot))
         axis.device = device
         robot.conductor.run(recognition.recognise(robot))
         assert "position" in axis.able
-        assert replace(other_identity(), firmware="1").firmware == "1"
-
-
-def other_identity() -> Identity:
-    """What it says."""
-    return Identity(1, "SCS9999", "9.9", "")

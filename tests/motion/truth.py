@@ -1,6 +1,6 @@
 """What simulated motors really did, whatever the host made of it: the plants' own movements, kept as they change.
 
-A simulated motor is a function of time. Here each function is noted with the moment from which on it held, so afterwards
+A simulated motor is a function of time. Here each function is noted with the moment from which on it held, so later
 every question about the past has an exact answer.
 """
 
@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 from motorbus.core.family import Simulator
 from motorbus.simulation.named import Simulation
 
-FINE = 0.0002
-"""s between two looks at where a motor was."""
+COARSE, FINE = 0.004, 0.0001
+"""s between two looks at where a motor was, and at the moment that was searched."""
 STIRRED = 0.01
 """Counts; less is no movement. A pulse of a stepper is a count."""
 
@@ -53,13 +53,24 @@ class Truth:
         """What it did between two moments at which it stood still."""
         start, goal = self.where(begin), self.where(end)
         way = goal - start
-        least = STIRRED
-        moments = [begin + FINE * number for number in range(int((end - begin) / FINE) + 1)]
-        first = next((at for at in moments if abs(self.where(at) - start) > least), begin)
-        last = next((at for at in reversed(moments) if abs(self.where(at) - goal) > least), begin)
-        one = next((at for at in moments if abs(self.where(at) - start) >= 0.01 * abs(way)), begin)
-        most = next((at for at in reversed(moments) if abs(self.where(at) - goal) >= 0.01 * abs(way)), begin)
+        first = self._crossed(begin, end, lambda at: abs(self.where(at) - start) > STIRRED)
+        last = self._crossed(end, begin, lambda at: abs(self.where(at) - goal) > STIRRED)
+        one = self._crossed(begin, end, lambda at: abs(self.where(at) - start) >= 0.01 * abs(way))
+        most = self._crossed(end, begin, lambda at: abs(self.where(at) - goal) >= 0.01 * abs(way))
         return Went(way, first, last, one, most)
+
+    def _crossed(self, since: float, until: float, there: Callable[[float], bool]) -> float:
+        """The first moment, going from `since` towards `until`, at which it is so; `since` when it never is."""
+        sign = 1.0 if until > since else -1.0
+        for step in range(int(abs(until - since) / COARSE) + 1):
+            at = since + sign * COARSE * (step + 1)
+            if there(at):
+                fine = (
+                    since + sign * (COARSE * step + FINE * number)
+                    for number in range(round(COARSE / FINE) + 1)
+                )
+                return next((one for one in fine if there(one)), at)
+        return since
 
 
 @contextmanager

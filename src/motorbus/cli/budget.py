@@ -1,4 +1,4 @@
-"""`motorbus budget`: what a control loop would cost on a bus, counted to the bit. Opens no port and sends nothing."""
+"""`motorbus budget`: what a control loop would cost on the buses of a machine. Opens no port and sends nothing."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from motorbus.cli import faces
+from motorbus.cli import bus_loads, faces
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import is_address
 from motorbus.cli.output import Output
 from motorbus.cli.target import said, target
 from motorbus.core import units
@@ -21,17 +22,31 @@ if TYPE_CHECKING:
 
 app = App(
     name="budget",
-    usage="Usage: motorbus budget BUS --ids IDS [OPTIONS]",
-    help_epilogue="""CAN buses only in this version. Counts every bit of every frame, stuff bits and
-the gap between frames included, over all positions: least, mean, most. The
-load is that of a loop which once a cycle sends each device its goal, takes the
-acknowledgement, and reads its position. --latency is what adapter and host
-need for one exchange, --turnaround what a device needs before it answers: they
-do not load the bus, but decide how many exchanges must be under way at once to
-fill it. Ends with exit code 1 when the bus cannot carry the loop.
+    usage="Usage: motorbus budget [BUS --ids IDS | NAME... | FILE.toml] [OPTIONS]",
+    help_epilogue="""Counts what a loop sends in each cycle: to each device its goal, and the
+question where it is. Opens no port and sends nothing: simulated devices of the
+same ids are asked how they would be spoken to, the usual model of their family
+unless --model says another. Ends with exit code 1 when a bus cannot carry the
+loop.
+
+Of a machine file, or of axes, groups and buses by their names, it counts every
+bus: how much of it a loop takes, and how fast that could be. Axes that move by
+a profile of their own are not in a loop.
+
+A CAN bus that is named by its address is counted to the bit, stuff bits and
+the gap between frames included, over all positions: least, mean, most.
+--latency is what adapter and host need for one exchange, --turnaround what a
+device needs before it answers. On CAN they do not load the bus, but decide how
+many exchanges must be under way at once to fill it; on a serial line nothing
+else is sent while a device thinks, so there --turnaround counts.
 
 Examples:
 
+    motorbus budget
+    motorbus budget arm --rate 200
+    motorbus budget machine.toml --rate 100 --json
+    motorbus budget feetech:/dev/ttyACM0 --ids 1-6 --rate 500
+    motorbus budget feetech:sim,baud=115200 --ids 1-6 --turnaround 0.1ms
     motorbus budget kst:can://slcan/dev/ttyACM0 --ids 1-16 --rate 50
     motorbus budget kst:can://socketcan/can0,bitrate=1000000 --ids 1-8
     motorbus budget kst:sim --ids 1-4 --rate 200 --latency 1ms --json
@@ -43,12 +58,11 @@ Loop = Literal["write-read", "write", "read"]
 
 @app.default
 def budget(
-    bus: str,
-    /,
-    *,
+    *targets: Annotated[str, Parameter(name="BUS")],
     ids: str = "",
     rate: float = 0.0,
     loop: Loop = "write-read",
+    model: str = "",
     latency: str = "0",
     turnaround: str = "0",
     reports: str = "",
@@ -59,51 +73,61 @@ def budget(
 
     Parameters
     ----------
-    bus
-        FAMILY:PORT, as kst:can://slcan/dev/ttyACM0,bitrate=1000000; or BUS#IDS.
+    targets
+        FAMILY:PORT, as kst:can://slcan/dev/ttyACM0,bitrate=1000000, or BUS#IDS; or names of the machine file, or such a
+        file; the whole machine when left out.
     ids
         Whose loop it is, as 1-16 or 1,4,7.
     rate
         Cycles per second that are wanted; only the limit is told when left out.
     loop
-        What one cycle does with each device.
+        What one cycle does with each device; on CAN.
+    model
+        What the devices are, where they are not the usual ones of their family.
     latency
-        What adapter and host need for one exchange, both ways together, as 1ms.
+        What adapter and host need for one exchange, both ways together, as 1ms; on CAN.
     turnaround
         What a device needs before it answers, as 0.1ms.
     reports
-        Every device also reports its position by itself, so often, as 10ms.
+        Every device also reports its position by itself, so often, as 10ms; on CAN.
     options
         Any option of the bus string, as a flag.
     """
+    thinks = units.parse(turnaround, "time")
+    if len(targets) == 1 and is_address(targets[0]) and target(targets[0]).family.link.kind == "frames":
+        if model:
+            raise RequestError("--model: frames on CAN are the same for all of them", advice="leave it out")
+        times = {"latency": units.parse(latency, "time"), "turnaround": thinks}
+        return _to_the_bit(targets[0], ids, rate, loop, times, reports, options, output)
+    for name, given in (("loop", loop != "write-read"), ("latency", latency != "0"), ("reports", reports)):
+        if given:
+            raise RequestError(f"--{name} is for a CAN bus, named by its address", advice="leave it out")
+    wanted = bus_loads.wanted(targets, ids, model, options)
+    return bus_loads.shown(wanted, rate, thinks, output)
+
+
+def _to_the_bit(
+    bus: str,
+    ids: str,
+    rate: float,
+    loop: Loop,
+    times: Mapping[str, float],
+    reports: str,
+    options: Mapping[str, str],
+    output: Output,
+) -> Exit:
     from motorbus import session
     from motorbus.diagnose.budget import budget as count
 
     wanted = target(bus)
-    nodes = _nodes(wanted.nodes, ids, wanted.family)
+    nodes = bus_loads.nodes(wanted, ids)
     opening = session.prepare(wanted.bus, {**said(options)})
     bitrate = opening.rate or opening.family.link.rate
-    times = {"latency": units.parse(latency, "time"), "turnaround": units.parse(turnaround, "time")}
     besides = _reports(opening.family, nodes, units.parse(reports, "time")) if reports else []
     cycle = _cycle(opening.family, nodes, loop)
     found = count(cycle, bitrate, loop_rate=rate, besides=besides, **times)
     _show(wanted.bus, nodes, found, output)
     return Exit.OK if found.fits() else Exit.FAILURE
-
-
-def _nodes(named: tuple[int, ...], ids: str, family: Family) -> tuple[int, ...]:
-    from motorbus import session
-
-    if family.link.kind != "frames":
-        raise RequestError(
-            f"{family.name}: a budget is made for CAN buses only in this version", advice="nothing was sent"
-        )
-    nodes = session.parse_ids(ids) if ids else named
-    if not nodes:
-        raise RequestError("whose loop is it?", expected="--ids 1-16, or BUS#1-16")
-    for node in nodes:
-        family.devices.blocking(None, node)  # raises when it is no id
-    return nodes
 
 
 def _offered(family: Family, what: str) -> Any:

@@ -29,12 +29,12 @@ app = App(
     help_epilogue="""Both are an axis, or a group or bus of axes: the first axis of the one is
 followed by the first of the other, and so on. Leaders are let go, so that they
 can be led by hand: AN ARM SAGS, hold it. They stay limp. A follower goes where
-its leader is, within its own velocity and acceleration; while its leader stands
-where it may not go, it stays.
+its leader is, within its own velocity and acceleration; while its leader
+stands where it may not go, it stays.
 
 Ends with Enter, with Ctrl-C or after --seconds; the followers brake then, and
-keep their torque. Where the two are far apart at first, the follower has a long
-way to go: more than 180 degrees need --yes.
+keep their torque. Where the two are far apart at first, the follower has a
+long way to go: more than 180 degrees need --yes.
 
 Examples:
 

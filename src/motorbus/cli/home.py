@@ -12,7 +12,7 @@ from motorbus.cli.machine import axes_named, is_name
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
 from motorbus.cli.robot import able, place, rehearse, robot
-from motorbus.cli.target import device, offers, opened
+from motorbus.cli.target import device, offers, opened, target
 from motorbus.core import units
 from motorbus.errors import RequestError
 
@@ -122,6 +122,8 @@ def _axes(
     seconds = units.parse(deadline, "time") if deadline else None
     if velocity:
         raise RequestError("axes home as fast as their devices are set to", expected="no --velocity")
+    for name in names:
+        offers(target(name).family, "home")
     with robot(names, options, output) as hand:
         for name in names:
             able(hand, name, "home")

@@ -28,14 +28,14 @@ app = App(
     usage="Usage: motorbus loop-stats [NAME...] [OPTIONS]",
     help_epilogue="""Runs a loop over axes of the machine file and says how it kept to its grid. It
 only reads positions: nothing moves, and no torque is switched. With --hold it
-gives torque and sends each axis its own position as a goal in every cycle, as a
-loop that controls does: so they stay where they are.
+gives torque and sends each axis its own position as a goal in every cycle, as
+a loop that controls does: so they stay where they are.
 
-An overrun is a cycle that was not over when the next one was due; a slot of the
-grid that went by as a whole is skipped. Neither is ever made up for. Late is a
-cycle by the time from its slot to its first byte. Without --rate the loop is as
-quick as 80% of what the slowest bus allows; `motorbus budget` says what that
-is. Ends with exit code 6 when readings were lost.
+An overrun is a cycle that was not over when the next one was due; a slot of
+the grid that went by as a whole is skipped. Neither is ever made up for. Late
+is a cycle by the time from its slot to its first byte. Without --rate the loop
+is as quick as 80% of what the slowest bus allows; `motorbus budget` says what
+that is. Ends with exit code 6 when readings were lost.
 
 Examples:
 

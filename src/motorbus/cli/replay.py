@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 app = App(
     name="replay",
     usage="Usage: motorbus replay FILE.csv [OPTIONS]",
-    help_epilogue="""The file is CSV, as `motorbus teach` writes it: a column time, then one for each
-axis of the machine file, units in the header. All of it is judged by the limits
-of its axes before anything moves, and refused with exit code 8 where it goes
-beyond them. The axes go to its first point together, then along it. A way there
-of more than 180 degrees needs --yes. Ctrl-C stops them.
+    help_epilogue="""The file is CSV, as `motorbus teach` writes it: a column time, then one for
+each axis of the machine file, units in the header. All of it is judged by the
+limits of its axes before anything moves, and refused with exit code 8 where it
+goes beyond them. The axes go to its first point together, then along it. A way
+there of more than 180 degrees needs --yes. Ctrl-C stops them.
 
 What was taught by hand comes in steps, which are hard: --smooth 5 takes out
 what is quicker than 5 Hz. A stepper controller cannot be led along a file.

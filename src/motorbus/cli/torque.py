@@ -12,6 +12,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import addresses, axes_named, is_name
 from motorbus.cli.output import Output
 from motorbus.cli.robot import able, rehearse, robot
+from motorbus.cli.target import offers, target
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
@@ -87,6 +88,8 @@ def _has(address: str, verb: str) -> bool:
 
 def _on(names: tuple[str, ...], options: Mapping[str, str], output: Output, *, dry_run: bool) -> Exit:
     axes = axes_named(names)
+    for name in (axis for axis in axes if axis in names):
+        offers(target(name).family, "enable_torque")
     with robot(axes, options, output) as hand:
         wanted = [name for name in axes if name in names or "enable_torque" in hand.robot[name].able]
         for name in wanted or axes:

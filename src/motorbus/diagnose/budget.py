@@ -3,24 +3,18 @@
 Whoever plans sixteen servos at 100 Hz wants to know beforehand whether the wire can carry them, and how many must be
 under way at once when the adapter takes its time. Stuff bits are counted, not estimated: frames full of zeros have
 more of them than random ones. Family-blind: it takes frames, whoever made them.
-
-For a bus of any kind, `simulated` tells what its devices would be asked and told in a loop, without a port.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from motorbus.bus.pump import Bus
 from motorbus.core.can_bits import bits, unstuffed
-from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Operation
+from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
-from motorbus.link.memory import MemoryLink
-from motorbus.motion.budget import BusBudget, counted
 
 
 class Transfer(NamedTuple):
@@ -142,43 +136,6 @@ def budget(
     )
 
 
-def simulated(
-    family: Family, ids: Sequence[int], *, model: str = "", bit_rate: int = 0, turnaround: float = 0.0
-) -> BusBudget:
-    """What a loop over devices with these ids costs on a bus of this family, found out from simulated ones.
-
-    They are of the `model`, or the family's usual one, in the state in which such devices ship. `bit_rate` in bit/s, 0
-    for the usual one; `turnaround` is how long (s) each thinks before it answers. Opens no port. Raises RequestError for
-    devices that cannot be led in a loop, and for an id, a model or a figure that cannot be.
-    """
-    _check_times(turnaround)
-    rate = bit_rate or family.link.rate
-    simulator = family.simulator(tuple(ids), model)
-    with Bus(MemoryLink(simulator, rate=rate), family) as bus:
-        return bus.run(_asked(bus, family, ids, rate, turnaround))
-
-
-def _asked(
-    bus: Bus, family: Family, ids: Sequence[int], rate: int, turnaround: float
-) -> Operation[BusBudget]:
-    devices = [family.devices.blocking(bus, node) for node in ids]
-    angles = {}
-    able: Mapping[str, Any] = {}
-    for node, device in zip(ids, devices, strict=True):
-        able = family.axis((yield from family.identify(node)).model)
-        if "train" not in able:
-            raise RequestError(
-                f"{family.name}: such a device cannot be led in a loop",
-                expected="devices that take small goals",
-                advice="it moves by a profile of its own; nothing was sent",
-            )
-        low, high = (yield from able["limits"](device)) if "limits" in able else (-math.inf, math.inf)
-        angles[node] = min(max(0.0, low), high)
-    train = yield from able["train"](devices, rate=rate)
-    names = [str(node) for node in ids]
-    return counted(family, rate, (*train.goals(angles), *train.positions), names, turnaround)
-
-
 def _cost(transfer: Transfer, bitrate: int) -> Cost:
     frames = tuple(_of(frames) for frames in transfer.frames)
     total = _sum(frames)
@@ -214,10 +171,6 @@ def _check(cycle: Sequence[Transfer], bitrate: int, not_negative: tuple[float, .
         )
     if bitrate <= 0:
         raise RequestError(f"{bitrate} is no bit rate", expected="bit/s, more than 0")
-    _check_times(*not_negative)
-
-
-def _check_times(*not_negative: float) -> None:
     if not all(math.isfinite(value) and value >= 0 for value in not_negative):
         raise RequestError(
             "a rate or a time of the budget cannot be", expected="finite numbers, not negative, in Hz and s"

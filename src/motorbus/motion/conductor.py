@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 from motorbus.bus.aio import AsyncBus
-from motorbus.bus.concert import Concert, LoopConcert
+from motorbus.bus.concert import Concert
+from motorbus.bus.concert_loop import LoopConcert
 from motorbus.bus.pump import Bus
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast

@@ -63,6 +63,8 @@ class Goals(Mapping[str, float]):
     def update(self, goals: Mapping[str, float]) -> None:
         """Set several; all of them are judged by name and kind before the first is set."""
         for name, goal in goals.items():
+            self._rounds.check(name, goal)
+        for name, goal in goals.items():
             self[name] = goal
 
 

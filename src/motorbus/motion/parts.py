@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions, Turned
 from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
-from motorbus.errors import MotorbusError, NoReply
+from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import axis as single
 from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moved import STILL, Arrived, Track
 from motorbus.motion.plan import Fact, Gone, Planned
+from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.stream import LOST, SHOWN, Stream, grains, rate_for
 
 if TYPE_CHECKING:
@@ -27,6 +28,10 @@ LOOK: Final = 0.02
 """s between two looks at whether the others have failed, while an axis moves by its own profile."""
 DRAWN: Final = 0.02
 """s between two points of the track of such an axis."""
+MOVED: Final = 0.01
+"""rad of the device; less may be a limp arm that gives way, or the trembling of a reading."""
+TRIES: Final = 3
+"""How often all are asked where they are before one that has said nothing is taken for silent."""
 NO_WAY: Final = 1e-9
 """rad or m; an axis that has less to go stays where it is."""
 
@@ -70,7 +75,7 @@ class Led:
     def run(self) -> Operation[None]:
         """See `part`."""
         journey, axes = self._journey, self._axes
-        train = yield from axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate)
+        train = yield from self._train()
         rate, looked = yield from self._looked(train)
         facts = yield from journey.meet(self._party, looked)
         seat = journey.seat(self._party, axes[0].spec.bus)
@@ -86,7 +91,7 @@ class Led:
             fate=journey.fate,
             reports=journey.reports(self._party),
         )
-        yield from self._ready(train)
+        yield from self._ready(train, facts)
         lead = stream.lead(self._bus)
         streamed = yield from stream.run((yield from seat.start(lead)), lead)
         for axis in axes:
@@ -94,18 +99,20 @@ class Led:
         arrived = {axis.name: _seen(axis, facts, planned, streamed.tracks[axis.name]) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
 
+    def _train(self) -> Operation[Any]:
+        """Those who are led, with all known of them that a cycle needs."""
+        axes = self._axes
+        try:
+            return (yield from axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate))
+        except NoReply as error:
+            silent = [axis for axis in axes if axis.spec.node == error.node]
+            if not silent:
+                raise
+            raise _silent(silent[0]) from error
+
     def _looked(self, train: Any) -> Operation[tuple[float, dict[str, Fact]]]:
         """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
-        told = yield from Together([outcome(one) for one in train.positions])
-        for one in told:
-            if isinstance(one, MotorbusError) and not isinstance(one, LOST):
-                raise one
-        angles = {
-            node: angle for one in told if isinstance(one, Positions) for node, angle in one.values.items()
-        }
-        for axis in self._axes:
-            if axis.spec.node not in angles:
-                raise _silent(axis)
+        angles = yield from self._angles(train)
         found = yield from Together([limits.of_device(axis) for axis in self._axes])
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
         possible = {node: _within(angles[node], device) for node, device in devices.items()}
@@ -116,8 +123,25 @@ class Led:
         }
         return rate_for(self._bus, train, possible, self._journey.rate), facts
 
-    def _ready(self, train: Any) -> Operation[None]:
+    def _angles(self, train: Any) -> Operation[dict[int, float]]:
+        """Where each stands (rad of the device), by id. Raises NoReply for one that is silent."""
+        angles: dict[int, float] = {}
+        for _ in range(TRIES):
+            told = yield from Together([outcome(one) for one in train.positions])
+            for one in told:
+                if isinstance(one, MotorbusError) and not isinstance(one, LOST):
+                    raise one
+                angles.update(one.values if isinstance(one, Positions) else {})
+            missing = [axis for axis in self._axes if axis.spec.node not in angles]
+            if not missing:
+                return angles
+        raise _silent(missing[0])
+
+    def _ready(self, train: Any, facts: Mapping[str, Fact]) -> Operation[None]:
         """Torque on where they stand, and as quick in following as the axis may be."""
+        angles = yield from self._angles(train)
+        for axis in self._axes:
+            _check_still(axis, facts[axis.name].position, axis.spec.from_device(angles[axis.spec.node]))
         self.command.depart()
         self.begun = True
         for axis in self._axes:
@@ -252,6 +276,18 @@ class Kept:
 def _any(duration: float) -> float:
     """Whoever can have every duration."""
     return duration
+
+
+def _check_still(axis: AxisVerbs, stood: float, stands: float) -> None:
+    """Raise RequestError for an axis that is not where it was (rad, m) when the movement was planned."""
+    if abs(stands - stood) * abs(axis.spec.ratio) > MOVED:
+        raise RequestError(
+            f"{axis.name} is moving: it was at {axis.spec.show(stood)}, and is at {axis.spec.show(stands)}",
+            expected="an axis at rest, for a movement begins from rest",
+            cause="another movement leads it, or it is moved by hand",
+            advice=f"wait for it, or stop it first; {NOTHING}",
+            node=axis.spec.node,
+        )
 
 
 def _within(angle: float, device: limits.Device) -> float:

@@ -8,12 +8,12 @@ turned by hand, tells nobody.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
+from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
 
@@ -72,9 +72,9 @@ class Reckoning:
         return f"not known: {self.why}" if self.position is None else f"{self.position:.6g}, estimated"
 
 
-def is_reckoned(able: object) -> bool:
+def is_reckoned(able: Iterable[str]) -> bool:
     """Whether a device with these capabilities moves and does not tell where it is."""
-    names = frozenset(able)  # type: ignore[call-overload]
+    names = frozenset(able)
     return "position" not in names and bool(names & {"move_by", "home", "keep_time", "jog"})
 
 
@@ -90,30 +90,26 @@ def checked_place(name: str, position: float) -> float:
 def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | None = None) -> Operation[T]:
     """Carry out a movement of one axis and keep account of it: it is engaged, under way, and at rest afterwards.
 
-    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. What was
-    refused before anything was sent changes nothing; any other end in the middle makes a reckoned position unknown.
+    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. An error
+    that is `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
     """
     axis.departs()
     try:
         told = yield from movement
     except BaseException as error:
-        axis.stays() if _stands(error) else axis.fails(_reason(error))
+        cut_short(axis, error)
         raise
     axis.arrives(way(told) if way is not None else None)
     return told
 
 
-def _stands(error: BaseException) -> bool:
-    """Whether it is certain that nothing has moved: it was refused before anything was sent, or called off before it
-    began. Of a device that is silent nothing is certain.
-    """
-    refused = isinstance(error, RequestError | LimitExceeded)
-    return refused or (isinstance(error, MotionError) and error.unmoved)
-
-
-def _reason(error: BaseException) -> str:
+def cut_short(axis: AxisVerbs, error: BaseException) -> None:
+    """A movement of this axis ended by an error: it is where it was when nothing has moved, else nobody knows."""
+    if isinstance(error, MotorbusError) and error.unmoved:
+        axis.stays()
+        return
     said = getattr(error, "summary", "") or str(error) or type(error).__name__
-    return f"a movement did not come to its end: {said}"
+    axis.fails(f"a movement did not come to its end: {said}")
 
 
 # -- verbs of axes whose device moves by a profile of its own ------------------------------------------------------
@@ -163,7 +159,7 @@ def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
     try:
         yield from axis.able["home"](axis.device, **options)
     except BaseException as error:
-        axis.stays() if _stands(error) else axis.fails(_reason(error))
+        cut_short(axis, error)
         raise
     axis.arrives(0.0)
     place = axis.spec.from_device(0.0)

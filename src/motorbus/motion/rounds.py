@@ -27,6 +27,7 @@ from motorbus.motion.cycle import Part, silence, stopped, train_of
 from motorbus.motion.grid import Grid, Statistics
 from motorbus.motion.limits import Device
 from motorbus.motion.place import Place
+from motorbus.motion.several import named
 
 Works: TypeAlias = "Generator[Abreast[Any], Any, Any]"
 
@@ -147,6 +148,13 @@ class Rounds:
         yield from self._first_look()
 
     def _opening(self, bus: str, there: list[AxisVerbs]) -> Operation[Any]:
+        try:
+            return (yield from self._opened(bus, there))
+        except MotorbusError as error:
+            name = next((axis.name for axis in there if axis.spec.node == error.node), bus)
+            raise named(name, error) from error
+
+    def _opened(self, bus: str, there: list[AxisVerbs]) -> Operation[Any]:
         face = self._body.buses[bus]
         train = yield from train_of(face, there)
         devices: dict[str, Device] = {}
@@ -178,15 +186,20 @@ class Rounds:
     def ask(self, name: str, goal: float) -> None:
         """Set the goal (rad, m) of an axis for the rounds to come. Raises RequestError for what is none of it."""
         place = self.places.get(name)
-        if place is None:
-            known = ", ".join(self._led)
-            why = "cannot be led" if name in self.without else "is not in this loop"
-            raise RequestError(f"{name} {why}", expected=f"one of {known}", advice="nothing was sent")
-        if type(goal) is not float:
-            goal = _number(name, goal)
+        if place is None or type(goal) is not float:
+            goal = self.check(name, goal)
+            place = self.places[name]
         place.asked = goal
         if not place.begun:
             self._fresh = True
+
+    def check(self, name: str, goal: float) -> float:
+        """Raise RequestError for an axis that is not in the loop, or what is no number."""
+        if name not in self.places:
+            known = ", ".join(self._led)
+            why = "cannot be led" if name in self.without else "is not in this loop"
+            raise RequestError(f"{name} {why}", expected=f"one of {known}", advice="nothing was sent")
+        return _number(name, goal)
 
     def round(self) -> Generator[Abreast[Any], Any, LoopState]:
         """One cycle. Raises LimitExceeded for a goal that must not be sent: then nothing was, and it may go on.
@@ -200,8 +213,8 @@ class Rounds:
         now = self.now
         periods = max(1, grid.upcoming(now) - self._stepped)
         self._judge(periods)
-        if self._fresh:
-            yield from self._begin()
+        if self._fresh and (fresh := self._unbegun()):
+            yield from self._begin(fresh)
             grid.forgive(self.now)
             now, periods = self.now, 1
         moment = grid.take(now)
@@ -220,12 +233,17 @@ class Rounds:
         for place in self._all:
             place.judge(periods)
 
-    def _begin(self) -> Works:
-        fresh = {
+    def _unbegun(self) -> dict[str, list[Place]]:
+        """Who has a goal and no torque yet, by bus."""
+        self._fresh = False
+        return {
             bus: found
             for bus, part in self.parts.items()
             if (found := [one for one in part.places.values() if one.asked is not None and not one.begun])
         }
+
+    def _begin(self, fresh: Mapping[str, list[Place]]) -> Works:
+        self._fresh = True
         try:
             yield Abreast({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
         except MotorbusError:

@@ -82,7 +82,7 @@ def test_on_faulty_lines_it_is_never_wrong(verb: str, fault: str, every: int) ->
 )
 def test_what_is_refused_before_has_moved_nothing(work: Work) -> None:
     error = error_of(Line1().run(work))
-    assert isinstance(error, RequestError)
+    assert (isinstance(error, RequestError), error.unmoved) == (True, True)
 
 
 def test_a_switch_that_is_active_already_has_moved_nothing_and_one_that_does_not_come_has() -> None:

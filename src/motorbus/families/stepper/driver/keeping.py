@@ -57,10 +57,12 @@ def keep_time(
     start frequency. None is the number of step 1. Journalled, alone on the bus and given back as `move_by`.
 
     First all is checked that can be, then it is agreed how long it takes, then project 1 is edited for a move that
-    takes so long or most nearly so long: a slow one may be much too quick, for the slowest speed is 1 RPM. The common
-    start is its first pulse, and the end its last; where the motor is meanwhile, and both of these, are *estimated*:
+    takes so long, or most nearly so long. Between slow speeds there are gaps, see `pacing`; and slower than about 0.7
+    RPM it cannot be, so that a short way ends before the others do, as `Turned.duration` tells.
+
+    The common start is its first pulse and the end its last; both are *estimated*, as is where the motor is meanwhile:
     with another reading of the ramp it takes longer. So it is waited for as long as the slowest reading says, then
-    stopped.
+    stopped. When this returns the motor has turned by `Turned.angle`, in whole pulses, unless steps were lost.
 
     Raises RequestError, with nothing sent that changes anything and before anything is agreed, for an angle of less
     than a pulse or too far, a velocity below 1 RPM, an acceleration not above 0, and as `borrowed` for what it refuses;

@@ -58,7 +58,7 @@ class Watch:
 
     def refusal(self, stops: Stops) -> MotorbusError | None:
         """For the exchange that begins the motion: it must not leave after a stop."""
-        if self.overtaken or self._has_left:
+        if self.overtaken or (self.looked is not None and self._has_left):
             return _early()
         self._stops, self._left = stops, stops(self._node)
         self.ordered = True

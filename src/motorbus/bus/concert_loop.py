@@ -1,0 +1,102 @@
+"""Several buses at the same time, awaited: an operation on each, carried out by one task of an event loop.
+
+Where time is real, the loop watches every bus as it does when that is alone, and this waits for news of any; where it
+is virtual, whoever awaits lets it pass, on all buses alike.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any
+
+from motorbus.bus.aio import NAP, AsyncBus
+from motorbus.bus.crank import crank
+from motorbus.bus.part import Part, advance, clock_of, follow, results, step
+from motorbus.core.operation import Runnable
+
+
+class LoopConcert:
+    """Carries out an operation on each of several async buses. Any number of tasks may call `run`."""
+
+    def __init__(self, buses: Mapping[str, AsyncBus], origins: Mapping[str, float]) -> None:
+        self._buses = buses
+        self._origins = origins
+
+    async def run(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
+        """As `Concert.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
+        news, loop = asyncio.Event(), asyncio.get_running_loop()
+
+        def wake() -> None:
+            with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(news.set)
+
+        parts = {
+            name: Part(self._buses[name], wanted, self._origins[name], wake)
+            for name, wanted in operations.items()
+        }
+        await _play(list(parts.values()), news)
+        return results(parts)
+
+
+async def _play(parts: Sequence[Part[AsyncBus]], news: asyncio.Event) -> None:
+    clock = clock_of(parts)
+    caught: BaseException | None = None
+    while True:
+        try:
+            if caught is not None:
+                _cut(parts, caught)
+            else:
+                await _gather(parts)
+            while advance(parts):
+                await _look(parts, news, clock)
+            return
+        except GeneratorExit:  # nobody will await us again: clean up here and now
+            _cut(parts, asyncio.CancelledError())
+            while advance(parts):
+                for part in parts:
+                    if part.going:
+                        crank(part.link, part.turns, inf)
+            raise
+        except BaseException as interruption:
+            caught = interruption
+
+
+def _cut(parts: Sequence[Part[Any]], interruption: BaseException) -> None:
+    for part in parts:
+        part.run.interrupt(interruption)
+
+
+async def _gather(parts: Sequence[Part[AsyncBus]]) -> None:
+    """Nobody begins before the latest of them; a clock that is real is waited for."""
+    if not any(part.link.virtual for part in parts):
+        return
+    latest = max(part.time for part in parts)
+    for part in parts:
+        until = latest + part.origin
+        while (now := part.link.now()) < until:
+            if not part.link.virtual:
+                await asyncio.sleep(until - now)
+            elif not part.reach(until):
+                break
+
+
+async def _look(parts: Sequence[Part[AsyncBus]], news: asyncio.Event, clock: Part[Any] | None) -> None:
+    """Let time pass."""
+    if clock is None:
+        step(parts)
+        await asyncio.sleep(0)
+        return
+    seconds = NAP
+    for part in parts:
+        if part.link.virtual:
+            seconds = min(seconds, follow(part, clock))
+        elif part.going:
+            part.bus.watch.start(asyncio.get_running_loop())
+            part.bus.watch.crank()
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(max(0.0, seconds)):
+            await news.wait()
+    news.clear()

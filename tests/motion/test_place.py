@@ -1,0 +1,156 @@
+"""One axis in a loop: its goals are judged before they are sent, and followed within its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import inf, nan, pi, radians
+from typing import Any
+
+import pytest
+
+from motorbus.errors import LimitExceeded
+from motorbus.motion.place import CATCH_UP, Place
+from motorbus.session.robot import Robot
+from tests.motion.machines import machine
+
+PERIOD = 0.01
+STEP = radians(90) * PERIOD
+
+
+@pytest.fixture
+def axis() -> Iterator[Any]:
+    """90 deg/s, 360 deg/s², -150 to 150 deg; its device is at pi where it is at 0."""
+    with machine(arm="1", axes={"a1": {"max_step": "20 deg"}}) as (made, _), Robot.of(made) as robot:
+        yield robot["a1"]
+
+
+def place(axis: Any, *, direct: bool = False, jerk: float | None = None) -> Place:
+    axis.departs()
+    found = Place(axis, None, PERIOD, direct, jerk)
+    found.begin(0.0)
+    return found
+
+
+def led(one: Place, goal: float, periods: int = 1) -> float:
+    """The next order, as a position of the axis; it obeys at once."""
+    one.asked = goal
+    one.judge(periods)
+    one.position = one.step(periods) - pi
+    return one.position
+
+
+def test_a_goal_is_followed_within_velocity_and_acceleration(axis: Any) -> None:
+    one = place(axis)
+    way = [0.0] + [led(one, 1.0) for _ in range(120)]
+    speeds = [(after - before) / PERIOD for before, after in pairwise(way)]
+    assert max(speeds) == pytest.approx(radians(90), rel=1e-6)
+    assert (
+        max(abs(after - before) for before, after in pairwise([0.0, *speeds]))
+        <= radians(360) * PERIOD * 1.001
+    )
+    assert way[-1] == pytest.approx(1.0)
+    assert one.arrived
+
+
+@pytest.mark.parametrize("goal", [nan, inf, radians(151), -radians(151)])
+@pytest.mark.parametrize("direct", [False, True])
+def test_what_must_not_be_sent_is_refused_and_forgotten(axis: Any, goal: float, direct: bool) -> None:
+    one = place(axis, direct=direct)
+    led(one, 0.001)
+    one.asked = goal
+    with pytest.raises(LimitExceeded, match="a1: (its|the) goal"):
+        one.judge(1)
+    assert one.asked == 0.001
+    one.judge(1)
+    assert not one.allows(goal)
+
+
+def test_its_device_may_allow_less(axis: Any) -> None:
+    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False, None)
+    one.asked = 0.6
+    with pytest.raises(LimitExceeded, match="the device"):
+        one.judge(1)
+    assert one.asked is None
+    assert one.allows(0.5)
+
+
+def test_a_direct_goal_goes_out_as_it_is(axis: Any) -> None:
+    one = place(axis, direct=True)
+    assert led(one, STEP) == pytest.approx(STEP)
+    assert led(one, 0.0) == pytest.approx(0.0)
+
+
+def test_a_direct_goal_keeps_within_the_velocity_of_its_axis(axis: Any) -> None:
+    one = place(axis, direct=True)
+    one.asked = 1.01 * STEP
+    with pytest.raises(
+        LimitExceeded, match=r"a1: from 0.0 deg to 0.9 deg in 10 ms is 90.9 deg/s, and its limit is 90"
+    ):
+        one.judge(1)
+    assert led(one, 1.9 * STEP, periods=2) == pytest.approx(1.9 * STEP)
+
+
+def test_a_loop_that_was_held_up_does_not_allow_a_leap(axis: Any) -> None:
+    one = place(axis, direct=True)
+    one.asked = (CATCH_UP + 0.1) * STEP
+    with pytest.raises(LimitExceeded, match="its limit is"):
+        one.judge(1000)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_no_order_is_farther_from_the_measured_position_than_max_step(axis: Any, direct: bool) -> None:
+    one = place(axis, direct=direct)
+
+    def pushes() -> None:  # against something that holds the axis at 0
+        for number in range(1, 100):
+            one.asked = number * 0.9 * STEP if direct else 1.0
+            one.judge(1)
+            one.step(1)
+
+    with pytest.raises(LimitExceeded, match=r"a1: the goal .* where it is, and one command may be 20.0 deg"):
+        pushes()
+    assert one.sent is not None
+    assert radians(19) < one.sent <= radians(20)
+    assert one.asked == one.sent  # and there it stays
+    one.judge(1)
+    assert one.step(1) - pi == pytest.approx(one.sent)
+
+
+def test_a_short_hitch_is_made_good_and_a_long_one_begins_anew_at_rest(axis: Any) -> None:
+    one = place(axis)
+    for _ in range(40):
+        before = led(one, 2.0)
+    assert led(one, 2.0, CATCH_UP) - before == pytest.approx(CATCH_UP * STEP, rel=1e-6)
+    before = one.position
+    assert 0 < led(one, 2.0, 500) - before < STEP / 10
+
+
+def test_braking_ends_at_the_follower_s_stopping_point(axis: Any) -> None:
+    one = place(axis)
+    assert not one.halt()
+    for _ in range(40):
+        here = led(one, 2.0)
+    assert one.halt()
+    assert one.asked == pytest.approx(here + radians(90) ** 2 / (2 * radians(360)), rel=1e-6)
+    while not one.arrived:
+        here = led(one, one.asked or 0.0)
+    assert here == pytest.approx(one.asked)
+    assert not one.halt()
+
+
+def test_who_is_stopped_from_elsewhere_shows_it(axis: Any) -> None:
+    one = place(axis)
+    assert not one.interrupted
+    axis.stop()
+    assert one.interrupted
+    one.release()
+    assert not one.interrupted
+    assert (one.asked, one.sent, one.begun) == (None, None, False)
+
+
+def test_a_direct_goal_is_never_braked(axis: Any) -> None:
+    one = place(axis, direct=True)
+    led(one, STEP)
+    assert not one.halt()
+    assert one.arrived

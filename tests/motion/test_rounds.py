@@ -1,0 +1,339 @@
+"""What a loop does, on simulated buses in virtual time: nothing unasked, all on its grid, and every stop heeded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from math import inf, nan, radians
+from typing import Any
+
+import pytest
+
+from motorbus.core.operation import CanFrame, Data
+from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError
+from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.loop import Loop
+from motorbus.motion.rounds import PATIENCE
+from motorbus.session.robot import Robot
+from tests.motion.machines import Heard, machine
+
+RATE = 100.0
+
+
+class Slow(PerfectLine):
+    """Whatever the devices say comes so much later (s); `0` nothing."""
+
+    def __init__(self) -> None:
+        self.by = 0.0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        other = Side.DEVICE if sender is Side.HOST else Side.HOST
+        return [Delivery(at + (self.by if other is Side.HOST else 0.0), other, data)]
+
+
+@contextmanager
+def looping(
+    rate: float = RATE, how: dict[str, Any] | None = None, **made: Any
+) -> Iterator[tuple[Robot, Loop, Any]]:
+    with machine(**made) as (found, sims), Robot.of(found) as robot, robot.loop(rate, **(how or {})) as loop:
+        yield robot, loop, sims
+
+
+def cycles(loop: Loop, count: int, each: Callable[[Any], None] = lambda state: None) -> Any:
+    """So many; gives the last state."""
+    state = None
+    for _ in range(count):
+        state = next(loop)
+        each(state)
+    return state
+
+
+# -- nothing unasked ---------------------------------------------------------------------------------------------
+
+
+def test_entering_and_looking_write_nothing() -> None:
+    with machine(arm="1-3", can="0x21") as (made, sims), Robot.of(made) as robot:
+        sims["arm"].line, sims["can"].line = lines = Heard(), Heard()
+        with robot.loop(RATE) as loop:
+            assert cycles(loop, 5).number == 4
+        assert {data[4] for data in lines[0].sent if isinstance(data, bytes)} <= {
+            0x02,
+            0x82,
+        }  # READ and SYNC READ
+        assert {data.data[0] for data in lines[1].sent if isinstance(data, CanFrame)} == {
+            0x40
+        }  # uploads: nothing is written
+        assert not robot["a1"].engaged
+
+
+def test_only_who_gets_a_goal_gets_torque_and_that_in_a_cycle_of_its_own() -> None:
+    with looping(arm="1-3") as (robot, loop, sims):
+        cycles(loop, 3)
+        loop.goal["a2"] = 0.1
+        state = cycles(loop, 1)
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2, 3)] == [0, 1, 0]
+        assert [robot[name].engaged for name in ("a1", "a2", "a3")] == [False, True, False]
+        assert loop.statistics.begun == 1
+        assert (loop.statistics.overruns, loop.statistics.skipped) == (0, 0)
+        assert state.position["a2"] == pytest.approx(0.0, abs=0.01)  # it does not jump
+
+
+def test_torque_takes_slots_that_nobody_is_blamed_for() -> None:
+    with looping(arm="1-6", rate=400.0) as (_, loop, sims):
+        cycles(loop, 3)
+        sims["arm"].line = slow = Slow()
+        slow.by = 0.002
+        loop.goal.update(dict.fromkeys(loop.axes, 0.1))
+        assert cycles(loop, 1).number > 10
+        slow.by = 0.0
+        assert (loop.statistics.overruns, loop.statistics.skipped, loop.statistics.begun) == (0, 0, 1)
+
+
+# -- the grid ------------------------------------------------------------------------------------------------------
+
+
+def test_cycles_are_a_period_apart_on_all_buses() -> None:
+    with looping(arm="1-2", can="0x21-0x22") as (_, loop, _sims):
+        loop.goal.update(dict.fromkeys(loop.axes, 0.1))
+        first = cycles(loop, 2)
+        last = cycles(loop, 200)
+        assert last.number - first.number == 200
+        assert last.at - first.at == pytest.approx(2.0, abs=0.002)
+        assert loop.statistics.overruns == 0
+        assert set(loop.statistics.buses) == {"arm", "can"}
+        assert loop.statistics.cycle.most < 1 / RATE
+
+
+def test_a_bus_that_is_too_slow_overruns_and_nothing_is_stretched() -> None:
+    with looping(arm="1-2", rate=200.0) as (_, loop, sims):
+        sims["arm"].line = slow = Slow()
+        first = cycles(loop, 1)
+        slow.by = 0.012  # a cycle takes more than two periods
+        cycles(loop, 1)
+        slow.by = 0.0
+        last = cycles(loop, 5)
+        told = loop.statistics
+        assert (told.overruns, told.skipped) == (1, 1)
+        assert last.number - first.number == 7
+        assert last.at - first.at == pytest.approx(7 / 200, abs=0.001)
+        assert told.cycle.most == pytest.approx(0.012, abs=0.001)
+        assert told.lateness.most > 0.002
+
+
+def test_a_body_that_is_too_slow_overruns_too() -> None:
+    with looping(arm="1-2") as (robot, loop, _):
+        numbers = []
+
+        def slow(state: Any) -> None:
+            numbers.append(state.number)
+            if state.number == 3:
+                robot.buses["arm"].link.advance(0.034)  # type: ignore[attr-defined]
+
+        cycles(loop, 7, slow)
+        assert numbers == [0, 1, 2, 3, 6, 7, 8]
+        assert (loop.statistics.overruns, loop.statistics.skipped) == (1, 2)
+
+
+def test_a_movement_makes_a_short_hitch_good() -> None:
+    with looping(arm="1") as (robot, loop, _):
+        loop.goal["a1"] = 2.0
+        cycles(loop, 80)
+        robot.buses["arm"].link.advance(0.024)  # type: ignore[attr-defined]
+        cycles(loop, 1)
+        place = loop._rounds.places["a1"]
+        before = place.sent
+        cycles(loop, 1)
+        assert place.sent - before == pytest.approx(radians(90) / RATE, rel=1e-6)  # type: ignore[operator]
+
+
+# -- who is silent ---------------------------------------------------------------------------------------------------
+
+
+def test_a_missing_reading_is_told_with_the_last_one_and_its_age() -> None:
+    with looping(arm="1-3") as (_, loop, sims):
+        before = cycles(loop, 2)
+        assert before.age == {"a1": 0.0, "a2": 0.0, "a3": 0.0}
+        sims["arm"][2].unplug()
+        state = cycles(loop, 1)
+        assert state.missing == {"a2"}
+        assert state.position["a2"] == before.position["a2"]
+        assert state.age["a2"] == pytest.approx(state.at - before.at, abs=0.001)
+        assert state.age["a1"] == 0.0
+        assert loop.statistics.lost == {"a1": 0, "a2": 1, "a3": 0}
+        sims["arm"][2].plug()
+        assert not cycles(loop, 20).missing
+
+
+def test_who_is_silent_too_long_ends_it_by_name() -> None:
+    with looping(arm="1-3") as (_, loop, sims):
+        cycles(loop, 2)
+        sims["arm"][2].unplug()
+        cycles(loop, PATIENCE)
+        with pytest.raises(NoReply, match=f"a2: no reading in {PATIENCE + 1} cycles"):
+            next(loop)
+        sims["arm"][2].plug()
+        assert not cycles(loop, 20).missing  # it can go on
+
+
+def test_who_is_silent_from_the_beginning_is_refused() -> None:
+    with machine(arm="1-3") as (made, sims), Robot.of(made) as robot:
+        for match in ("a2: node 2 did not answer", "a2: no reading"):
+            sims["arm"][2].unplug()
+            with pytest.raises(NoReply, match=match), robot.loop(RATE):
+                raise AssertionError("entered")
+            sims["arm"][2].plug()
+            robot.budget()  # its settings are known now
+
+
+# -- what is refused -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_a_refused_goal_sends_nothing_and_the_loop_goes_on(direct: bool) -> None:
+    with looping(arm="1-2", how={"direct": direct}) as (_, loop, sims):
+        loop.goal.update({"a1": 0.01, "a2": 0.01})
+        before = cycles(loop, 3)
+        sims["arm"].line = line = Heard()
+        loop.goal.update({"a1": 0.015, "a2": 9.0})
+        with pytest.raises(LimitExceeded, match="a2: the goal 515.7 deg is outside"):
+            next(loop)
+        assert not line.sent
+        assert loop.goal["a2"] == 0.01
+        assert cycles(loop, 3).number == before.number + 3
+
+
+def test_a_direct_goal_that_is_too_far_is_refused() -> None:
+    with looping(arm="1", how={"direct": True}) as (_, loop, _sims):
+        loop.goal["a1"] = 0.0
+        cycles(loop, 2)
+        loop.goal["a1"] = 0.1
+        with pytest.raises(LimitExceeded, match="its limit is 90 deg/s"):
+            next(loop)
+        loop.goal["a1"] = 0.012
+        cycles(loop, 30)
+        assert cycles(loop, 1).position["a1"] == pytest.approx(0.012, abs=0.003)
+
+
+def test_a_rate_that_no_bus_carries_is_refused_with_the_highest() -> None:
+    with machine(arm="1-6", can="0x21") as (made, _), Robot.of(made) as robot:
+        refused = robot.loop(1200.0)
+        with pytest.raises(RequestError, match=r"1200 Hz cannot be: (arm|can) carries \d+\.\d Hz at most"):
+            refused.__enter__()
+        with robot.loop(robot.budget().highest_rate) as loop:
+            assert loop.budget is not None
+            assert loop.budget.fits()
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, nan, inf])
+def test_a_rate_is_a_number_above_nothing(rate: float) -> None:
+    with machine(arm="1") as (made, _), Robot.of(made) as robot, pytest.raises(RequestError, match="rate is"):
+        robot.loop(rate)
+
+
+def test_what_cannot_be_in_a_loop_is_named_or_refused() -> None:
+    with looping(arm="1", lift=True) as (robot, loop, _):
+        assert (loop.axes, loop.without) == (("a1",), ("lift",))
+        with pytest.raises(RequestError, match="lift cannot be led"):
+            loop.goal["lift"] = 0.0
+        with pytest.raises(RequestError, match="elbow is not in this loop"):
+            loop.goal["elbow"] = 0.0
+        for goal in ("0.1", None, True):
+            with pytest.raises(RequestError, match="the goal of a1 is"):
+                loop.goal["a1"] = goal  # type: ignore[assignment]
+        loop.goal["a1"] = 0
+        assert loop.goal["a1"] == 0.0
+        with pytest.raises(RequestError, match="none of these axes"):
+            robot.loop(RATE, "lift")
+        with pytest.raises(RequestError, match="jerk"):
+            robot.loop(RATE, direct=True, jerk=5.0)
+
+
+# -- stopped, and left -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["stop", "disable_torque", "hold"])
+@pytest.mark.parametrize("name", ["a1", "c1"])
+def test_who_is_stopped_from_elsewhere_gets_no_goal_any_more(how: str, name: str) -> None:
+    with looping(arm="1-2", can="0x21") as (robot, loop, _sims):
+        if name == "c1" and how == "disable_torque":
+            assert not hasattr(robot["c1"], how)
+            return
+        loop.goal.update(dict.fromkeys(loop.axes, 0.8))
+        cycles(loop, 30)
+        getattr(robot[name], how)()
+        with pytest.raises(Interrupted, match=f"{name}: stopped from elsewhere"):
+            next(loop)
+        assert name not in loop.goal
+        here = cycles(loop, 5).position
+        there = cycles(loop, 30).position
+        assert there[name] == pytest.approx(here[name], abs=0.03)
+        assert there["a2"] > here["a2"] + 0.2  # the others go on when the loop does
+        loop.goal[name] = 0.8
+        assert cycles(loop, 120).position[name] == pytest.approx(0.8, abs=0.02)
+
+
+def test_an_emergency_stop_in_the_middle_is_the_end_of_all_goals() -> None:
+    with looping(arm="1-2", exit="leave") as (robot, loop, sims):
+        loop.goal.update({"a1": 0.8, "a2": 0.8})
+        cycles(loop, 30)
+        robot.estop()
+        written = sims["arm"][1].memory["goal_position"]
+        with pytest.raises(Interrupted):
+            next(loop)
+        assert not dict(loop.goal)
+        cycles(loop, 5)
+        loop.goal["a1"] = 0.8
+        with pytest.raises(Interrupted):
+            next(loop)
+        assert sims["arm"][1].memory["goal_position"] == written
+        assert sims["arm"][1].memory["torque_enable"] == 0
+
+
+@pytest.mark.parametrize("jerk", [None, 100.0])
+def test_leaving_brakes_whoever_is_under_way(jerk: float | None) -> None:
+    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
+        with suppress(ZeroDivisionError), robot.loop(RATE, jerk=jerk) as loop:
+            loop.goal.update({"a1": 2.0, "a2": 0.0})
+            state = cycles(loop, 60)
+            raise ZeroDivisionError
+        place = loop._rounds.places["a1"]
+        way = place.sent - state.position["a1"]
+        assert 0.5 * radians(90) ** 2 / radians(360) < way < 0.5
+        assert not robot["a1"].under_way
+        sims["arm"].line = line = Heard()
+        robot.buses["arm"].link.advance(0.5)  # type: ignore[attr-defined]
+        assert robot["a1"].position() == pytest.approx(place.sent, abs=0.01)
+        assert all(
+            data[4] in (0x02, 0x82) for data in line.sent if isinstance(data, bytes)
+        )  # nothing but reading any more
+
+
+def test_leaving_what_was_stopped_or_has_not_begun_sends_nothing() -> None:
+    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
+        with robot.loop(RATE):
+            pass
+        with robot.loop(RATE) as loop:
+            loop.goal["a1"] = 1.0
+            cycles(loop, 40)
+            robot["a1"].stop()
+            sims["arm"].line = line = Heard()
+        assert not line.sent
+
+
+def test_leaving_visits_the_other_buses_when_one_is_gone() -> None:
+    with machine(arm="1", can="0x21", exit="leave") as (made, _), Robot.of(made) as robot:
+        loop = robot.loop(RATE)
+
+        def fails() -> None:
+            with loop:
+                loop.goal.update({"a1": 1.0, "c1": 0.6})
+                cycles(loop, 30)
+                robot.buses["arm"].link.unplug()  # type: ignore[attr-defined]
+                raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError) as left:
+            fails()
+        assert "on leaving the loop" in left.value.__notes__[0]
+        assert loop._rounds.places["c1"].arrived
+        assert not robot["c1"].under_way
+        robot.buses["arm"].link.plug()  # type: ignore[attr-defined]

@@ -1,0 +1,89 @@
+"""Teaching by hand: axes are limp, and where they are guided is written down on the grid."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from motorbus.errors import MotionError, RequestError
+from motorbus.motion.trajectory import Trajectory
+from motorbus.session.robot import AsyncRobot, Robot
+from tests.motion.machines import machine
+from tests.motion.test_follow import move
+
+
+def test_what_is_taught_is_on_the_grid_from_0_on() -> None:
+    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        found = robot.teach(seconds=1.0)
+        assert isinstance(found, Trajectory)
+        assert found.times == pytest.approx([number / 50 for number in range(51)])
+        assert set(found.axes) == {"a1", "a2"}
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
+        assert not robot["a1"].engaged
+
+
+def test_where_it_is_guided_is_what_is_written_down() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        axis = robot["a1"]
+        axis.enable_torque()
+        robot.buses["arm"].run(  # type: ignore[attr-defined]  # something else moves it meanwhile
+            axis.able["move"](axis.device, axis.spec.to_device(1.0), wait=False)
+        )
+        found = robot.teach("a1", seconds=2.0, limp=False)
+        places = found.axes["a1"]
+        assert places[0] == pytest.approx(0.0, abs=0.05)
+        assert places[-1] == pytest.approx(1.0, abs=0.02)
+        assert list(places) == sorted(places)
+
+
+def test_a_cycle_in_which_somebody_was_silent_has_no_sample() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        count = [0]
+
+        def over() -> bool:
+            count[0] += 1
+            (sims["arm"][2].unplug if count[0] == 5 else sims["arm"][2].plug)()
+            return count[0] > 40
+
+        found = robot.teach(until=over)
+        assert len(found.times) < 41
+        assert all(round(at * 50, 6) == pytest.approx(round(at * 50)) for at in found.times)
+
+
+def test_too_few_samples_are_told() -> None:
+    few = pytest.raises(MotionError, match="1 samples in 0 s are no trajectory")
+    with machine(arm="1") as (made, _), Robot.of(made) as robot, few:
+        robot.teach(until=lambda: True)
+
+
+def test_what_cannot_be_taught_is_refused_by_name_and_left_out_otherwise() -> None:
+    with machine(arm="1", can="0x21", lift=True) as (made, _), Robot.of(made) as robot:
+        with pytest.raises(RequestError, match="lift cannot be taught"):
+            robot.teach(["a1", "lift"], seconds=1.0)
+        with pytest.raises(RequestError, match="c1 cannot be taught by hand"):
+            robot.teach("c1", seconds=1.0)
+        assert set(robot.teach(seconds=0.1).axes) == {"a1"}
+        assert set(robot.teach(seconds=0.1, limp=False).axes) == {"a1", "c1"}
+    nobody = pytest.raises(RequestError, match="none of these axes can be taught by hand")
+    with machine(can="0x21") as (made, _), Robot.of(made) as robot, nobody:
+        robot.teach(seconds=0.1)
+
+
+def test_it_is_awaited_on_an_async_robot() -> None:
+    async def main() -> Trajectory:
+        with machine(arm="1-2") as (made, _):
+            async with AsyncRobot.of(made) as robot:
+                return await robot.teach(["a2"], seconds=0.2, rate=100)
+
+    found = asyncio.run(main())
+    assert len(found.times) == 21
+    assert set(found.axes) == {"a2"}
+
+
+def test_what_was_taught_by_hand_is_what_a_hand_did() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        move(robot, "a1", 0.3)
+        found = robot.teach(["a1"], seconds=0.2)
+        assert found.axes["a1"][0] == pytest.approx(0.3, abs=0.02)
