@@ -13,7 +13,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, RequestError
+from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
 
@@ -90,8 +90,8 @@ def checked_place(name: str, position: float) -> float:
 def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | None = None) -> Operation[T]:
     """Carry out a movement of one axis and keep account of it: it is engaged, under way, and at rest afterwards.
 
-    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. An error
-    that is `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
+    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. A
+    refusal that is `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
     """
     axis.departs()
     try:
@@ -104,8 +104,11 @@ def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | 
 
 
 def cut_short(axis: AxisVerbs, error: BaseException) -> None:
-    """A movement of this axis ended by an error: it is where it was when nothing has moved, else nobody knows."""
-    if isinstance(error, MotorbusError) and error.unmoved:
+    """A movement of this axis ended by an error: it is where it was when nothing has moved, else nobody knows.
+
+    Of a device that is silent nothing is certain: it may have lost its supply, and been turned.
+    """
+    if isinstance(error, RequestError | MotionError) and error.unmoved:
         axis.stays()
         return
     said = getattr(error, "summary", "") or str(error) or type(error).__name__
