@@ -6,7 +6,18 @@ import argparse
 import sys
 from pathlib import Path
 
-from bench import can_rounds, estimates, machine, report, responder, rounds, startup, stepper_line, syscalls
+from bench import (
+    can_rounds,
+    estimates,
+    machine,
+    report,
+    responder,
+    robot_loop,
+    rounds,
+    startup,
+    stepper_line,
+    syscalls,
+)
 from bench.places import BUILD, ROOT
 from bench.rounds import CANDIDATES, Candidate
 from bench.workloads import WORKLOADS
@@ -65,6 +76,7 @@ def measured(given: argparse.Namespace) -> report.Results:
         can=() if given.only or can_rounds.missing() else can_rounds.rounds(given.count, given.rounds, say),
         forecasts=() if given.only else estimates.costs(given.rounds, say),
         stepper=() if given.only else stepper_line.samples(given.rounds, say),
+        loop=() if given.only else robot_loop.samples(robot_loop.SECONDS, say),
     )
 
 
@@ -73,7 +85,14 @@ def main() -> int:
     given = parsed()
     try:
         results = measured(given)
-    except (responder.NoCompiler, rounds.Failed, stepper_line.Wrong, MotorbusError, OSError) as error:
+    except (
+        responder.NoCompiler,
+        rounds.Failed,
+        stepper_line.Wrong,
+        robot_loop.Wrong,
+        MotorbusError,
+        OSError,
+    ) as error:
         print(f"\n{error}", file=sys.stderr)
         return 1
     say("")

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from bench import can_report, estimates, stepper_line
+from bench import can_report, estimates, robot_loop, stepper_line
 from bench.figures import Spread, cost, ratio
 from bench.rounds import Sample
 from bench.startup import Cost
@@ -35,6 +35,7 @@ class Results(NamedTuple):
     can: Sequence[Sample] = ()
     forecasts: Sequence[estimates.Cost] = ()
     stepper: Sequence[stepper_line.Sample] = ()
+    loop: Sequence[robot_loop.Sample] = ()
 
 
 class Table(NamedTuple):
@@ -124,6 +125,11 @@ def stepper_table(results: Results) -> Table:
     return Table("Stepper, at 9600 baud", stepper_line.COLUMNS, stepper_line.rows(results.stepper))
 
 
+def loop_table(results: Results) -> Table:
+    """What a loop of a robot achieves on a line that takes its time."""
+    return Table("robot.loop, six axes at 1 Mbaud", robot_loop.COLUMNS, robot_loop.rows(results.loop))
+
+
 def tables(results: Results) -> list[Table]:
     """All of them, in reading order."""
     found = list(wire_tables(results))
@@ -137,6 +143,8 @@ def tables(results: Results) -> list[Table]:
         found.append(forecast_table(results))
     if results.stepper:
         found.append(stepper_table(results))
+    if results.loop:
+        found.append(loop_table(results))
     return found
 
 
@@ -191,6 +199,7 @@ def as_json(results: Results) -> str:
         "start_up": [{**start._asdict(), "seconds": start.seconds._asdict()} for start in results.starts],
         "estimates": [{**one._asdict(), "seconds": one.seconds._asdict()} for one in results.forecasts],
         "stepper": [sample._asdict() for sample in results.stepper],
+        "loop": [sample._asdict() for sample in results.loop],
         "missing": results.missing,
     }
     return json.dumps(document, indent=1) + "\n"
@@ -228,7 +237,7 @@ can be measured so.
 Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
 {start}
-{forecasts}{stepper}"""
+{forecasts}{stepper}{loop}"""
 
 _FORECASTS = """
 ## Estimates
@@ -256,6 +265,7 @@ def page(results: Results) -> str:
         start=as_markdown(start_table(results)),
         forecasts=_estimated(results),
         stepper=_on_the_line(results),
+        loop=in_a_loop(results),
     )
 
 
@@ -278,3 +288,21 @@ def _on_the_line(results: Results) -> str:
     if not results.stepper:
         return ""
     return f"{_STEPPER}{as_markdown(stepper_table(results))}\n\n{stepper_line.verdict(results.stepper)}\n"
+
+
+_LOOP = """
+## robot.loop, six axes at 1 Mbaud
+
+The responder again, on which bytes now take their time as on a half-duplex line: 88 of them a cycle, for six goals and
+six positions. Asked for the highest rate that `robot.budget()` names, which is that of the wire, a loop shows what it
+achieves; at 80 % of it no cycle is to be late. *Late* is how long after the beginning of its slot a cycle began on
+average, *cycle* how long it took from there until all readings were in.
+
+"""
+
+
+def in_a_loop(results: Results) -> str:
+    """The part of the page on the loop; "" where it was not measured."""
+    if not results.loop:
+        return ""
+    return f"{_LOOP}{as_markdown(loop_table(results))}\n\n{robot_loop.verdict(results.loop)}\n"

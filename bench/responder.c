@@ -6,7 +6,7 @@
    skipped or doubled reading shows in the values, and every goal that arrives is added up.
 
    With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
-   until the line is free, and an answer is there when its last byte has passed.
+   until the line is free, and each packet of an answer is there when its last byte has passed.
 
    Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
 #define _GNU_SOURCE
@@ -158,17 +158,24 @@ static void wait_for_line(void) {
     while (now() < line_free) continue;
 }
 
+static void send_bytes(int master, const byte *from, size_t count) {
+    for (size_t sent = 0; sent < count;) {
+        ssize_t gone = write(master, from + sent, count - sent);
+        if (gone <= 0) exit(1);
+        sent += (size_t)gone;
+    }
+}
+
+/* On a line that takes its time each packet is there when its last byte has passed, else all are there at once. */
 static void send_answer(int master) {
-    if (byte_time) {
-        pass(filled);
+    for (size_t at = 0, size; byte_time && at < filled; at += size) {
+        size = answer[at + 3] + 4u;
+        pass(size);
         wait_for_line();
-        answered = now();
+        send_bytes(master, answer + at, size);
     }
-    for (size_t sent = 0; sent < filled;) {
-        ssize_t count = write(master, answer + sent, filled - sent);
-        if (count <= 0) exit(1);
-        sent += (size_t)count;
-    }
+    if (!byte_time) send_bytes(master, answer, filled);
+    answered = now();
     filled = 0;
 }
 

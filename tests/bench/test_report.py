@@ -7,6 +7,7 @@ import json
 from bench.estimates import Cost as Estimated
 from bench.figures import Spread
 from bench.report import Results, as_json, as_text, page, spoiled, tables, verdict
+from bench.robot_loop import Sample as Looped
 from bench.rounds import Sample
 from bench.startup import Cost
 from bench.stepper_line import BACKUP
@@ -59,6 +60,11 @@ def test_the_page_holds_every_table() -> None:
     jobs = page(RESULTS._replace(stepper=[Job(BACKUP, 2.0, 1.9, 1.9)]))
     assert f"| {BACKUP} | 2.000 s |" in jobs
     assert "5.0%. At most 15%: reached." in jobs
+    assert "robot.loop" not in text
+    flat = Looped("direct", 1136.4, 1136.4, 1020.0, 5100, 5000, 500, 4e-4, 9.7e-4, 1.2e-4)
+    looped = page(RESULTS._replace(loop=[flat]))
+    assert "| direct | 1136.4 | 1020.0 | 89.8% | 5000 | 500 | 400 | 970 | 120 |" in looped
+    assert "89.8%. At least 88%: reached." in looped
 
 
 def test_the_json_has_every_sample() -> None:

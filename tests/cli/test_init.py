@@ -42,7 +42,8 @@ def test_its_limits_are_those_of_the_device_around_their_middle(run: Run, here: 
         assert run("init", f"{sim.url}#1-2").code == 0
     one, two = Machine.load(here / "motorbus.toml").axes.values()
     assert one.zero == radians(180)
-    assert (one.low, one.high) == (radians(-180), pytest.approx(radians(179.9)))
+    assert one.low == radians(-180)
+    assert one.high == pytest.approx(radians(179.9))
     assert two.zero == pytest.approx(radians(65), abs=0.002)
     assert two.device_limits is not None
     for inside, limit in zip(two.device_limits, (radians(30), radians(100)), strict=True):
@@ -73,11 +74,17 @@ def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:
         assert again.code == 0, again.err
 
 
-def test_of_another_file_the_next_commands_name_it(run: Run, here: Path) -> None:
+def test_of_a_file_that_does_not_count_the_next_commands_name_it(
+    run: Run, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ran = run("init", "feetech:sim", "--output", "bench.toml", "--json")
     assert ran.document["next"][0] == "motorbus info feetech_1 --machine bench.toml"
     assert run("init", "kst:sim", "--machine", "other.toml").code == 0
     assert sorted(path.name for path in here.glob("*.toml")) == ["bench.toml", "other.toml"]
+    monkeypatch.setenv("MOTORBUS_MACHINE", "bench.toml")
+    assert (
+        run("init", "kst:sim", "--json").document["next"][0] == "motorbus info kst_1 --machine motorbus.toml"
+    )
 
 
 def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Path) -> None:

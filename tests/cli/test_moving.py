@@ -43,6 +43,11 @@ def test_a_person_sees_a_table_in_the_units_of_the_axes(bench: Bench, run: Run) 
     assert "started within" in ran.out
 
 
+def test_nothing_has_no_sign(bench: Bench, run: Run) -> None:
+    assert run("move", "a1=-10deg").code == 0
+    assert "-0.0 deg" not in run("move", "a1=0").out
+
+
 def test_a_way_begins_where_the_axis_stands(bench: Bench, run: Run) -> None:
     assert run("move", "a1=10deg").code == 0
     assert run("move", "a1+=5deg", "c1-=2deg").code == 0

@@ -40,7 +40,7 @@ def test_every_verb_that_tells_an_axis_something_counts(verb: str) -> None:
 def test_a_stop_of_the_bus_counts_and_one_of_another_device_does_not() -> None:
     with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
         one, other = Command([robot["a1"]]), Command([robot["a2"]])
-        robot.buses["arm"].run(robot["a1"].able["disable_torque"](robot["a1"].device))  # past the axis
+        robot["a1"].bus.run(robot["a1"].able["disable_torque"](robot["a1"].device))  # past the axis
         assert isinstance(one.lost(), Interrupted)
         assert other.lost() is None
         robot.estop()
@@ -49,7 +49,7 @@ def test_a_stop_of_the_bus_counts_and_one_of_another_device_does_not() -> None:
 
 def test_a_goal_that_is_guarded_does_not_leave_after_a_stop() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
-        axis, bus = robot["a1"], robot.buses["arm"]
+        axis, bus = robot["a1"], robot["a1"].bus
         axis.enable_torque()
         train = bus.run(axis.able["train"]([axis.device], rate=bus.rate))
         mine = Command([axis])
@@ -57,7 +57,7 @@ def test_a_goal_that_is_guarded_does_not_leave_after_a_stop() -> None:
         guarded = mine.guarded(goal)
         assert (guarded.request, guarded.goals, guarded.effect) == (goal.request, goal.goals, goal.effect)
         bus.run(guarded)
-        bus.link.advance(0.001)  # type: ignore[attr-defined]
+        bus.link.advance(0.001)
         assert sims["arm"][1].memory["goal_position"] == 2048 + 65
         axis.stop()
         (goal,) = train.goals({1: axis.spec.to_device(0.2)})
@@ -94,7 +94,7 @@ def test_stopping_visits_those_that_are_still_commanded_and_tells_who_did_not_ac
         mine.depart()
         robot["a1"].disable_torque()
         sims["arm"][2].unplug()
-        errors = robot.buses["arm"].run(mine.stop())
+        errors = robot["a1"].bus.run(mine.stop())
         assert list(errors) == ["a2"]
         assert {name: axis.under_way for name, axis in robot.axes.items()} == {
             "a1": False,

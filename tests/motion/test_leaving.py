@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus import AsyncRobot, MotorbusError, NotHomed, Robot
+from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
 from motorbus.core.operation import Operation, Pause, Together, outcome
 from motorbus.motion import moving
 from motorbus.motion.abreast import Abreast
@@ -171,7 +171,9 @@ def test_an_interruption_takes_the_parking_away_and_says_so() -> None:
             assert robot["a1"].position() == pytest.approx(here, abs=0.01), "and was stopped"
 
 
-def test_after_an_emergency_stop_nothing_is_sent_that_would_be_refused() -> None:
+def test_after_an_emergency_stop_nothing_is_sent_that_would_be_refused(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     axes = {"a1": LIMP, "a2": PARKED}
     with machine(arm="1-3", can="0x25", axes=axes) as (made, sims):
         with Robot.of(made) as robot:
@@ -185,6 +187,7 @@ def test_after_an_emergency_stop_nothing_is_sent_that_would_be_refused() -> None
         assert any("servo 1" in title for title in titles), "torque off goes through"
         assert any("emergency stop is still in force" in text for text in robot.warnings)
         assert any(text.startswith("a2: not parked") for text in robot.warnings)
+        assert "a2: not parked" in caplog.text
 
 
 def test_what_nobody_knows_is_not_parked_and_the_others_are() -> None:
@@ -313,3 +316,16 @@ def _stopped_after(robot: Robot, seconds: float) -> Operation[object]:
 
     yield from Pause(seconds)
     return (yield from stop(robot["a1"]))
+
+
+def test_a_bus_that_is_gone_keeps_no_other_from_being_left() -> None:
+    with machine(arm="1-2", can="0x25", axes={"a1": LIMP, "a2": LIMP}) as (made, sims):
+        robot = Robot.of(made)
+        robot.enable_torque()
+        robot["c1"].departs()
+        robot["c1"].bus.link.unplug()
+        with pytest.raises(LinkLost, match="^c1: "):
+            robot.close()
+        assert [torque(sims, node) for node in (1, 2)] == [0, 0]
+        with Robot.of(made) as robot:
+            assert len(robot.axes) == 3

@@ -126,7 +126,7 @@ def test_a_trajectory_is_judged_by_its_samples_and_by_the_device() -> None:
 
 def test_a_device_is_asked_for_its_limits_and_one_without_has_none() -> None:
     with machine(arm="1", lift=True) as (made, _), Robot.of(made) as robot:
-        arm = robot.buses["arm"].run(limits.of_device(robot["a1"]))
+        arm = robot["a1"].bus.run(limits.of_device(robot["a1"]))
         assert arm is not None
         assert arm == pytest.approx((0.0, radians(360)), abs=0.002)
-        assert robot.buses["stage"].run(limits.of_device(robot["lift"])) is None
+        assert robot["lift"].bus.run(limits.of_device(robot["lift"])) is None

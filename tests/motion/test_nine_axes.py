@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from bench.truth import Truth, Went, watched
 from motorbus.link.memory import NoisyLine
 from motorbus.motion.moved import Moved
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
-from tests.motion.truth import Truth, Went, watched
 
 APART = 0.005
 """s between the first start and the last, at most."""
@@ -106,7 +106,8 @@ def test_nine_axes_start_within_5_ms_and_end_within_2_percent_of_the_time(case: 
         for number, sim in enumerate(sims.values()):
             sim.pace = True
             sim.line = NoisyLine(100 * case.seed + number, delay=JITTER, toward=None)
-        with watched(sims) as truths, Robot.of(made) as robot:
+        truths = watched({bus: sim.simulator for bus, sim in sims.items()})
+        with Robot.of(made) as robot:
             robot["lift"].declare(0.0)
             judged(robot, truths, case.goals, case.options)
             judged(robot, truths, dict.fromkeys(case.goals, 0.0), case.options)

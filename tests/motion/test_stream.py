@@ -18,7 +18,7 @@ from tests.motion.machines import machine
 def train(robot: Robot, bus: str) -> Any:
     axes = [axis for axis in robot.axes.values() if axis.spec.bus == bus]
     wanted = axes[0].able["train"]([axis.device for axis in axes], rate=robot.buses[bus].rate)
-    return robot.buses[bus].run(wanted)
+    return robot[axes[0].name].bus.run(wanted)
 
 
 # -- the grid ----------------------------------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ def test_it_goes_through_while_another_thread_moves() -> None:
 
         thread = Thread(target=move)
         thread.start()
-        while not robot["a1"].under_way:
+        while not robot["a1"].under_way and thread.is_alive():
             thread.join(0.01)
         robot.estop()
         thread.join(10.0)

@@ -61,7 +61,7 @@ class Known(dict[int, Answer | None]):
 
     def stops(self, node: int) -> int:
         """How many stops have left for this node, those for everybody included."""
-        return self._stops[node] + self._stops[None]
+        return self._stops.get(node, 0) + self._stops.get(None, 0)
 
 
 def named(exchange: Exchange[Any]) -> set[int]:

@@ -12,7 +12,7 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
-from motorbus.cli.machine import FILE, is_address, machine_file, shown
+from motorbus.cli.machine import FILE, MachineFile, is_address, machine_file, shown
 from motorbus.cli.parameters import Flag, Silent
 from motorbus.cli.ports import seen
 from motorbus.cli.scan import listen
@@ -333,7 +333,8 @@ def _ends(spec: AxisSpec) -> tuple[str, str]:
 
 def _steps(path: Path, machine: Machine, able: Mapping[str, Met]) -> list[str]:
     """The next commands: look, power, a small move of the first axis, and keep where it stands."""
-    more = "" if path == Path(FILE) else f" --machine {path}"
+    found = MachineFile().path
+    more = "" if found is not None and found.resolve() == path.resolve() else f" --machine {path}"
     first = next((name for name in machine.axes if "position" in able[name].able), next(iter(machine.axes)))
     switch = [f"motorbus torque on {first}{more}"] if "enable_torque" in able[first].able else []
     steps = [f"motorbus info {first}{more}", *switch, f"motorbus move {first}+=5deg{more}"]

@@ -114,8 +114,22 @@ def move(
         return _axes(goals, how, assume, options, output, home=home, yes=yes, dry_run=dry_run)
     if any(_is_relative(text) for text in goals):
         return _moved_by(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
+    return _moved_to(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
+
+
+def _moved_to(
+    texts: tuple[str, ...],
+    bounds: dict[str, float],
+    options: Mapping[str, str],
+    output: Output,
+    *,
+    wait: bool,
+    yes: bool,
+    dry_run: bool,
+) -> Exit:
+    """Devices to positions, those of one bus in the same instant where their family can do that."""
     results = []
-    for bus, wanted in _wanted(goals).items():
+    for bus, wanted in _wanted(texts).items():
         with opened(bus, options, output) as opening:
             ways, rehearsal = _ways(opening, wanted, bounds), dry.DryBus(opening)
             rehearse = partial(_move, rehearsal, wanted, {**bounds, "wait": False})

@@ -281,8 +281,13 @@ def tell(hand: InHand, command: str, moved: Moved) -> None:
 
 
 def _row(name: str, spec: Any, one: Any) -> tuple[str, ...]:
-    places = (spec.show(value) for value in (one.goal, one.present, one.present - one.goal))
+    places = (_unsigned(spec.show(value)) for value in (one.goal, one.present, one.present - one.goal))
     return (name, *places, "estimated" if one.estimated else "")
+
+
+def _unsigned(text: str) -> str:
+    """A place as it is shown; one that is shown as nothing has no sign."""
+    return text if set(text) & set("123456789") else text.removeprefix("-")
 
 
 def _why(limited: Mapping[str, str]) -> str:

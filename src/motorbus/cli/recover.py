@@ -84,7 +84,6 @@ def recover(
     if not bus:
         return _listed(output, more=bool(alone or forget or of or dry_run or options))
     bus, family, _ = target(bus)
-    of = target(of).bus if of else ""
     _keeps_journals(family)
     if forget:
         return _given_up(of or bus, options, output, yes=yes)
@@ -122,6 +121,7 @@ def _journal_elsewhere(of: str) -> Iterator[BusJournal | None]:
     from motorbus import session
     from motorbus.link.lock import PortLock
 
+    of = target(of).bus if of else ""
     kept = session.journal_of(of) if of else None
     if kept is None or kept.path is None:
         yield None

@@ -17,7 +17,7 @@ from motorbus.motion.command import Command
 from motorbus.motion.moved import STILL, Arrived, Track
 from motorbus.motion.plan import Fact, Gone, Planned
 from motorbus.motion.profile.shapes import NOTHING
-from motorbus.motion.stream import LOST, SHOWN, Stream, grains, rate_for
+from motorbus.motion.stream import LOST, SHOWN, Stream, Streamed, grains, rate_for
 
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
@@ -96,7 +96,7 @@ class Led:
         streamed = yield from stream.run((yield from seat.start(lead)), lead)
         for axis in axes:
             axis.arrives()
-        arrived = {axis.name: _seen(axis, facts, planned, streamed.tracks[axis.name]) for axis in axes}
+        arrived = {axis.name: _seen(axis, facts[axis.name].position, planned, streamed) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
 
     def _train(self) -> Operation[Any]:
@@ -179,6 +179,7 @@ class Own:
             self.gone = self._stayed(stood)
             return
         told = yield from Together([self._turned(way), self._watched()])
+        assert told[0] is not None
         self.gone = self._arrived(stood, told[0])
 
     def _turned(self, way: float) -> Operation[Turned]:
@@ -295,12 +296,13 @@ def _within(angle: float, device: limits.Device) -> float:
     return angle if device is None else min(max(angle, device[0]), device[1])
 
 
-def _seen(axis: AxisVerbs, facts: Mapping[str, Fact], planned: Planned, track: Track) -> Arrived:
+def _seen(axis: AxisVerbs, stood: float, planned: Planned, streamed: Streamed) -> Arrived:
     """What the host saw of an axis that was led."""
-    present = track.presents[-1] if track.presents else facts[axis.name].position
-    still = STILL / abs(axis.spec.ratio)
-    moved = abs(present - facts[axis.name].position) > still
-    return Arrived(planned.goals[axis.name], present, False, 0.0, track.rested(still) if moved else 0.0)
+    track, still = streamed.tracks[axis.name], STILL / abs(axis.spec.ratio)
+    present = track.presents[-1] if track.presents else stood
+    if abs(present - stood) <= still:
+        return Arrived(planned.goals[axis.name], present, False, 0.0, 0.0)
+    return Arrived(planned.goals[axis.name], present, False, streamed.started, track.rested(still))
 
 
 def _silent(axis: AxisVerbs) -> NoReply:

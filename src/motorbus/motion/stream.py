@@ -50,8 +50,9 @@ FAR: Final = 0.1
 """rad of the device that an axis may be off where it should be, whatever its speed."""
 FINEST: Final = 1e-5
 """rad of the device; no servo can be told less."""
-SILENCE: Final = 0.15
-"""s for which nothing may be heard of an axis, or three cycles, if those last longer."""
+SILENCE: Final = 0.3
+"""s for which nothing may be heard of an axis, or five cycles, if those last longer: a bus that doubts a device leaves
+it alone for a while, and asks it twice more in this time."""
 SHOWN: Final = 0.25
 """s between two reports of progress."""
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
@@ -79,10 +80,11 @@ class Fate:
 
 
 class Streamed(NamedTuple):
-    """What came of it: a track for each axis by its name, and how the cycles went."""
+    """What came of it: a track for each axis by its name, how the cycles went, and s after the start of the first order."""
 
     tracks: dict[str, Track]
     cycles: Cycles
+    started: float = 0.0
 
 
 class Grid(NamedTuple):
@@ -176,7 +178,8 @@ class Stream:
         self._tracks: dict[str, tuple[list[float], list[float], list[float]]] = {
             axis.name: ([], [], []) for axis in axes
         }
-        self._start = self._reported = 0.0
+        self._start = self._lead = self._first = self._reported = 0.0
+        self._over = False
         self._heard: dict[int, float] = {}
         self._cycles = self._skipped = self._lost = 0
 
@@ -191,48 +194,68 @@ class Stream:
         one that is silent, Interrupted when somebody else has told one of them something or another part has failed.
         """
         self._start = start
+        self._lead = lead
         self._heard = dict.fromkeys(self._axes, start)
-        slot = 0
-        while True:
-            due = start - lead + slot * self._grid.period
-            yield from Pause(max(0.0, due - (yield from Pause(0))))
-            yield from self._cycle(slot)
-            if slot == self._grid.last:
-                break
-            done = (yield from Pause(0)) + lead - start
-            reached = self._grid.after(slot, done)
-            self._skipped += reached - slot - 1
-            slot = reached
+        yield from Together([self._ending(self._tell()), self._ending(self._look())])
         yield from self._settle()
         tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
-        return Streamed(tracks, Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost))
+        cycles = Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost)
+        return Streamed(tracks, cycles, self._first)
 
-    def _cycle(self, slot: int) -> Operation[None]:
-        self._fate.check()
-        self._command.check()
-        last = slot == self._grid.last
-        at = self._course.duration if last else (slot + 1) * self._grid.period
-        orders = [self._command.guarded(one) for one in self._train.goals(self._goals(at))]
-        yield from self._exchanged(orders)
-        self._cycles += 1
-        for axis in self._axes.values():
-            self._check_following(axis)
-        yield from self._report(slot * self._grid.period)
+    def _ending(self, work: Operation[None]) -> Operation[None]:
+        """When one of the two ends, however that comes, the other one ends too."""
+        try:
+            yield from work
+        finally:
+            self._over = True
+
+    def _tell(self) -> Operation[None]:
+        """A goal at each slot of the grid, whatever becomes of the readings."""
+        slot = 0
+        while not self._over:
+            yield from self._until(slot)
+            self._fate.check()
+            self._command.check()
+            last = slot == self._grid.last
+            at = self._course.duration if last else (slot + 1) * self._grid.period
+            goals = [self._command.guarded(one) for one in self._train.goals(self._goals(at))]
+            if slot == 0:
+                self._first = (yield from Pause(0)) + self._lead - self._start
+            yield from _forgiven(goals)
+            self._cycles += 1
+            if last:
+                return
+            reached = yield from self._next(slot)
+            self._skipped += reached - slot - 1
+            slot = reached
+
+    def _look(self) -> Operation[None]:
+        """A reading at each slot, behind the goal. One that has to wait for a doubtful device makes no goal late."""
+        slot = 0
+        while not self._over:
+            yield from self._until(slot)
+            yield from self._read()
+            for axis in self._axes.values():
+                self._check_following(axis)
+            yield from self._report(slot * self._grid.period)
+            slot = yield from self._next(slot)
+
+    def _until(self, slot: int) -> Operation[None]:
+        due = self._start - self._lead + slot * self._grid.period
+        yield from Pause(max(0.0, due - (yield from Pause(0))))
+
+    def _next(self, slot: int) -> Operation[int]:
+        return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
         places = self._course.positions(at)
         return {node: axis.spec.to_device(places[axis.name]) for node, axis in self._axes.items()}
 
-    def _exchanged(self, orders: Sequence[Exchange[Any]]) -> Operation[None]:
-        """Send the orders, read the positions, and keep what was heard."""
-        told = yield from Together([outcome(one) for one in (*orders, *self._train.positions)])
-        heard = set()
-        for one in told:
-            if isinstance(one, Positions):
-                heard |= self._keep(one)
-            elif isinstance(one, MotorbusError) and not isinstance(one, LOST):
-                raise one
+    def _read(self) -> Operation[None]:
+        """Read the positions, and keep what was heard."""
+        told = yield from _forgiven(self._train.positions)
+        heard = {node for one in told if isinstance(one, Positions) for node in self._keep(one)}
         now = yield from Pause(0)
         for node in self._axes.keys() - heard:
             self._lost += 1
@@ -266,7 +289,7 @@ class Stream:
         end = self._start + self._course.duration
         yield from Pause(max(0.0, end - (yield from Pause(0))))
         while True:
-            yield from self._exchanged(())
+            yield from self._read()
             now = yield from Pause(0)
             if all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
@@ -330,7 +353,7 @@ class Stream:
     def _check_heard(self, node: int, now: float) -> None:
         """Raise NoReply for an axis that has been silent for too long."""
         silent = now - self._heard[node]
-        if silent <= max(SILENCE, 3 * self._grid.period):
+        if silent <= max(SILENCE, 5 * self._grid.period):
             return
         axis = self._axes[node]
         raise NoReply(
@@ -339,6 +362,15 @@ class Stream:
             advice="look at the cable and the supply; all of the movement were told to stop",
             node=node,
         )
+
+
+def _forgiven(exchanges: Sequence[Exchange[Any]]) -> Operation[list[Any]]:
+    """What came of each; one that was lost is an error among the values, every other error is raised."""
+    told = yield from Together([outcome(one) for one in exchanges])
+    for one in told:
+        if isinstance(one, MotorbusError) and not isinstance(one, LOST):
+            raise one
+    return told
 
 
 def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:

@@ -74,6 +74,9 @@ class OpenAsyncBus(AsyncBus):
                 await self.run(test)
             except MotorbusError as silence:
                 LOG.debug("echo test: %s", silence.summary)
+            except BaseException:  # cancelled: whoever is not let in is not shown out either
+                await self.close()
+                raise
             _tell_echo(self)
         return self
 

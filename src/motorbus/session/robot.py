@@ -35,6 +35,7 @@ from motorbus.motion.loop import awaiting_loop, blocking_loop, looped
 from motorbus.motion.machine import NAME, Machine
 from motorbus.motion.recognition import recognise
 from motorbus.motion.teach import teach
+from motorbus.session.buses import LOG
 from motorbus.session.plan import Plan, loaded
 from motorbus.session.stopping import estop, reset
 
@@ -88,6 +89,8 @@ class RobotVerbs(Body):
     def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
         """Say what leaving did not achieve: as an error, or as a note of what is being raised already."""
         self._said = tuple(leaving.said)
+        for text in leaving.said:
+            LOG.warning("%s", text)
         error = leaving.error
         if others is not None:
             for text in (*leaving.said, *([f"leaving failed: {error}"] if error is not None else [])):

@@ -7,12 +7,10 @@ every question about the past has an exact answer.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from motorbus.core.family import Simulator
-from motorbus.simulation.named import Simulation
 
 COARSE, FINE = 0.004, 0.0001
 """s between two looks at where a motor was, and at the moment that was searched."""
@@ -73,17 +71,14 @@ class Truth:
         return since
 
 
-@contextmanager
-def watched(sims: Mapping[str, Simulation]) -> Iterator[dict[tuple[str, int], Truth]]:
-    """Keep the movements of all motors of these buses, by bus and id."""
-    truths = {(bus, node): Truth() for bus, sim in sims.items() for node in sim.simulator.nodes}
-    for bus, sim in sims.items():
-        _listen(sim.simulator, {node: truths[bus, node] for node in sim.simulator.nodes})
-    yield truths
+def watched(simulators: Mapping[str, Simulator]) -> dict[tuple[str, int], Truth]:
+    """Keep the movements of all motors of these simulated buses from now on; by bus and id."""
+    return {(bus, node): truth for bus, one in simulators.items() for node, truth in listened(one).items()}
 
 
-def _listen(simulator: Simulator, truths: Mapping[int, Truth]) -> None:
-    """Look at every motor after each thing that happens on its bus."""
+def listened(simulator: Simulator) -> dict[int, Truth]:
+    """Keep the movements of all motors of a simulated bus from now on, by id: look after each thing that happens."""
+    truths = {node: Truth() for node in simulator.nodes}
     inner: Any = simulator
     receive, advance = inner.receive, inner.advance
 
@@ -102,6 +97,7 @@ def _listen(simulator: Simulator, truths: Mapping[int, Truth]) -> None:
 
     look(0.0)
     inner.receive, inner.advance = received, advanced
+    return truths
 
 
 def _piece(node: Any) -> tuple[object, Callable[[float], float]]:
