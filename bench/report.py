@@ -295,8 +295,9 @@ _LOOP = """
 
 The responder again, on which bytes now take their time as on a half-duplex line: 88 of them a cycle, for six goals and
 six positions. Asked for the highest rate that `robot.budget()` names, which is that of the wire, a loop shows what it
-achieves; at 80 % of it no cycle is to be late. *Late* is how long after the beginning of its slot a cycle began on
-average, *cycle* how long it took from there until all readings were in.
+achieves; at 80 % of it no cycle is to be late. Loop and responder run with real-time priority where that is permitted,
+as a control loop would; whatever else the machine does meanwhile shows all the same. *Late* is how long after the
+beginning of its slot a cycle began on average, *cycle* how long it took from there until all readings were in.
 
 """
 

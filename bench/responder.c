@@ -6,7 +6,7 @@
    skipped or doubled reading shows in the values, and every goal that arrives is added up.
 
    With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
-   until the line is free, and each packet of an answer is there when its last byte has passed.
+   until the line is free, and an answer is there when its last byte has passed.
 
    Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
 #define _GNU_SOURCE
@@ -166,16 +166,14 @@ static void send_bytes(int master, const byte *from, size_t count) {
     }
 }
 
-/* On a line that takes its time each packet is there when its last byte has passed, else all are there at once. */
+/* On a line that takes its time all of it is there when its last byte has passed. */
 static void send_answer(int master) {
-    for (size_t at = 0, size; byte_time && at < filled; at += size) {
-        size = answer[at + 3] + 4u;
-        pass(size);
+    if (byte_time) {
+        pass(filled);
         wait_for_line();
-        send_bytes(master, answer + at, size);
+        answered = now();
     }
-    if (!byte_time) send_bytes(master, answer, filled);
-    answered = now();
+    send_bytes(master, answer, filled);
     filled = 0;
 }
 

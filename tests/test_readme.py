@@ -1,7 +1,7 @@
 """What the README shows works as it stands there: every command is run, on simulated devices behind real ports.
 
 Its Python runs in `test_docs`. Here the ports of its commands are exchanged for pseudo-terminals with simulated devices
-of the same ids behind them, and nothing else is.
+of the same ids behind them, and nothing else is. The same goes for the page on a machine.
 """
 
 from __future__ import annotations
@@ -20,16 +20,21 @@ from pathlib import Path
 import pytest
 
 from motorbus.cli.simulated import Simulated
+from motorbus.motion.machine import Machine
+from motorbus.session import prepare
 
 ROOT = Path(__file__).resolve().parent.parent
-LINES = [
-    line[2:].partition("  #")[0].strip()
-    for block in re.findall(
-        r"^```console\n(.*?)^```", (ROOT / "README.md").read_text(encoding="utf-8"), re.M | re.S
-    )
-    for line in block.splitlines()
-    if line.startswith("$ motorbus ")
-]
+MACHINE_PAGE = ROOT / "docs" / "how-to" / "machine.md"
+
+
+def lines(page: Path) -> list[str]:
+    """The commands that a page shows."""
+    blocks = re.findall(r"^```console\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
+    shown = [line for block in blocks for line in block.splitlines() if line.startswith("$ motorbus ")]
+    return [line[2:].partition("  #")[0].strip() for line in shown]
+
+
+LINES = lines(ROOT / "README.md")
 PORTS = {
     "feetech": (re.compile(r"feetech:/dev/ttyACM0"), "1-6"),
     "kst": (re.compile(r"kst:can://slcan/dev/ttyACM\d"), "0x25"),
@@ -72,7 +77,9 @@ def ports(request: pytest.FixtureRequest, folder: Path) -> Iterator[dict[str, st
     with ExitStack() as stack:
         found = {}
         for family, (pattern, ids) in PORTS.items():
-            if pattern.search(line) or (family == "feetech" and NAMED.search(line)):
+            if pattern.search(line) or (
+                family == "feetech" and NAMED.search(line) and "readme" in request.node.name
+            ):
                 child = Simulated(
                     family, ids=ids, link=folder / family, control=str(folder / f"{family}.control")
                 )
@@ -80,7 +87,7 @@ def ports(request: pytest.FixtureRequest, folder: Path) -> Iterator[dict[str, st
         yield found
 
 
-def machine(folder: Path, address: str) -> None:
+def write_machine(folder: Path, address: str) -> None:
     """The machine of the README, by the names that it uses."""
     names = ("base", "shoulder", "elbow", "wrist", "roll", "gripper")
     text = f'format = 1\n[bus.arm]\naddress = "{address}"\n'
@@ -136,15 +143,21 @@ def shortened(line: str) -> str:
     return re.sub(r"--seconds \d+", "--seconds 1", line).replace("--baud all", "--baud all --ids 1-6")
 
 
+def test_its_machine_file_describes_a_machine() -> None:
+    (text,) = re.findall(
+        r"^```toml\n(.*?)^```", (ROOT / "README.md").read_text(encoding="utf-8"), re.M | re.S
+    )
+    machine = Machine.parse(text, check_address=lambda address: prepare(address, {}))
+    assert (list(machine.buses), list(machine.axes)) == (["arm"], ["shoulder"])
+
+
 def test_there_are_commands_to_run() -> None:
     assert len(LINES) > 25
     assert sum(bool(NAMED.search(line)) for line in LINES) >= 8
 
 
-@pytest.mark.parametrize("line", LINES)
-def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder: Path) -> None:
-    if NAMED.search(line):
-        machine(folder, ports["feetech"])
+def worked(line: str, ports: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """The command on these ports; where a person would have been asked, that person says yes."""
     meant = shortened(line).replace("/tmp/", f"{folder}/")
     for family, address in ports.items():
         meant = PORTS[family][0].sub(address, meant)
@@ -153,7 +166,21 @@ def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder:
             carried_out(f"motorbus stepper write feed.toml {ports['stepper']} --yes", folder).returncode == 0
         )
     ran = carried_out(meant, folder)
-    if "nobody agreed" in ran.stderr or "wave.csv" in ran.stderr:
-        ran = carried_out(meant, folder, "--yes")  # a person would have been asked
+    return carried_out(meant, folder, "--yes") if "nobody agreed" in ran.stderr else ran
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder: Path) -> None:
+    if NAMED.search(line):
+        write_machine(folder, ports["feetech"])
+    ran = worked(line, ports, folder)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout
+
+
+@pytest.mark.parametrize("line", lines(MACHINE_PAGE))
+def test_a_command_of_the_page_on_a_machine_works(line: str, ports: dict[str, str], folder: Path) -> None:
+    (folder / "motorbus.toml").write_bytes((ROOT / "examples" / "motorbus.toml").read_bytes())
+    ran = worked(line, ports, folder)
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout

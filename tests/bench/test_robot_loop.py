@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from itertools import pairwise
 
 import pytest
@@ -18,6 +19,7 @@ from bench.robot_loop import (
     judged,
     rows,
     sample,
+    urgent,
     verdict,
 )
 from motorbus.motion.machine import Machine
@@ -61,6 +63,13 @@ def test_the_goals_are_within_what_an_axis_may_do() -> None:
         fastest = max(abs(after[name] - before[name]) for before, after in pairwise(ways))
         assert fastest * 1136 < spec.max_velocity
         assert max(way[name] for way in ways) < math.radians(100)
+
+
+def test_priority_is_given_back() -> None:
+    before = os.sched_getscheduler(0)
+    with urgent() as permitted:
+        assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == permitted
+    assert os.sched_getscheduler(0) == before
 
 
 def test_the_verdict_is_of_the_worst() -> None:

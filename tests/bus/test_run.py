@@ -304,3 +304,48 @@ def test_a_clean_up_that_cannot_end_is_given_up() -> None:
     assert bus.link.now() < 1000
     assert bus.run(position(1)) == 1
     assert responder.dead == set()
+
+
+@pytest.mark.parametrize(
+    ("rest", "reached"), [(0.4, True), (1.9, True), (5.0, True), (29.0, True), (31.0, False)]
+)
+def test_a_clean_up_that_waits_for_something_to_come_to_rest_gets_its_time(
+    rest: float, reached: bool
+) -> None:
+    bus, responder = memory_bus()
+
+    def turning() -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            yield from Pause(rest)
+            yield from write(1, 0, 9)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(bus, turning(), 2)
+    assert (responder.memory[1][0] == 9) is reached
+
+
+def test_a_second_ctrl_c_takes_that_time_away() -> None:
+    bus, _ = memory_bus()
+    presses, turn = [2, 3], bus.relay.turn
+    count = 0
+
+    def pressed() -> None:
+        nonlocal count
+        count += 1
+        if count in presses:
+            raise KeyboardInterrupt
+        turn()
+
+    def turning() -> Operation[None]:
+        try:
+            yield from Pause(0.1)
+            yield from Pause(1e9)
+        finally:
+            yield from Pause(20.0)
+
+    bus.relay.turn = pressed  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        bus.run(turning())
+    assert bus.link.now() < 1.0

@@ -169,7 +169,8 @@ BAD = {
     ),
     "stop": ("a9", "a1 a9", "ready", "arm#254", "arm#x", "arm#", "a1#1", "arm,baud=1", "nobody:x", "a1=1"),
     "torque": (
-        "", "on", "sideways a1", "on a9", "on ready", "on a1 arm#1", "off can", "off a9", "on a1=1", "on arm#254", "on c1", "on a1 lift",
+        "", "on", "sideways a1", "on a9", "on ready", "on a1 arm#1", "off can", "off a9", "on a1=1",
+        "on arm#254", "on c1", "on a1 lift",
         "on a1 --colour red",
     ),
     "init": (

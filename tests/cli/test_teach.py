@@ -25,7 +25,8 @@ def test_what_was_taught_stands_in_the_file(bench: Bench, run: Run) -> None:
     assert "hold what could sag" in ran.err
     taught = Trajectory.load("wave.csv", bench.machine.axes)
     assert list(taught.axes) == ["a1", "a2"]
-    assert (len(taught.times), taught.duration) == (41, pytest.approx(2.0))
+    assert len(taught.times) == 41
+    assert taught.duration == pytest.approx(2.0)
     assert taught.axes["a1"][0] == pytest.approx(0.349, abs=0.01)
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.operation import Data
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError, Stalled
-from motorbus.link.base import Side
+from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from motorbus.motion.stream import Fate, Grid, grains, rate_for
 from motorbus.session.robot import Robot
@@ -107,6 +108,32 @@ def test_a_line_that_is_late_costs_slots_and_no_time() -> None:
         assert moved.duration == 2.0
         assert robot.buses["arm"].link.now() - before < 2.5
         assert moved.tracks["a1"].error < 0.02
+
+
+class Without(PerfectLine):
+    """A line that loses one packet of goals, by its number from 1 on."""
+
+    def __init__(self, number: int) -> None:
+        self.seen = 0
+        self._number = number
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST and isinstance(data, bytes) and data[4] == 0x83 and data[5] == 42:
+            self.seen += 1
+            if self.seen == self._number:
+                return []
+        return super().carry(sender, data, at)
+
+
+@pytest.mark.parametrize("number", [1, 60, 99, 100])
+def test_a_goal_that_is_lost_is_made_good_by_the_next_one_the_last_one_too(number: int) -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        sims["arm"].line = line = Without(number)
+        moved = robot.move({"a1": 0.5}, duration=1.0)
+        robot.buses["arm"].link.advance(0.1)  # type: ignore[attr-defined]
+        assert line.seen >= 100
+        assert moved.axes["a1"].present == pytest.approx(0.5, abs=0.005)
+        assert sims["arm"][1].memory["goal_position"] == sims["arm"][1].raw_position == 2048 + 326
 
 
 def test_one_step_farther_than_the_axis_may_be_from_its_goal_ends_the_movement() -> None:

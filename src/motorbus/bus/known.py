@@ -20,7 +20,8 @@ class Known(dict[int, Answer | None]):
     """Nodes with their last answer that told a position.
 
     `rate` is the bit rate at which one was last heard. `frames` stop everybody known, without a position: they are
-    made when a node becomes known, for the case that a stop cannot make new ones.
+    made when a node becomes known, for the case that a stop cannot make new ones. `stopping` counts the stops that
+    have left, whomever they were for.
     """
 
     def __init__(self, family: Family, rate: int) -> None:
@@ -29,6 +30,7 @@ class Known(dict[int, Answer | None]):
         self.rate = rate
         self.frames = family.stop({})
         self._stops: Counter[int | None] = Counter()  # those for everybody under None
+        self.stopping = 0
 
     def hear(self, node: int, position: Answer | None, rate: int) -> None:
         """This node has answered, or has been ordered to move (None)."""
@@ -48,6 +50,7 @@ class Known(dict[int, Answer | None]):
         nodes = named(exchange)
         if exchange.rank is Rank.STOP:
             self._stops.update(nodes or (None,))
+            self.stopping += 1
             return
         for node in nodes & set(self) if nodes else list(self):  # one that names nobody may move everybody
             self[node] = None

@@ -33,6 +33,8 @@ T = TypeVar("T")
 
 CLEAN_UP = 2.0  # s for the clean-up steps of an interrupted operation
 HURRY = 0.25  # s when it is interrupted once more
+LONG = 0.5  # s; a pause of a clean-up from here on is no polling: something must come to rest, and it gets its time
+PATIENCE = 30.0  # s that such pauses may add at most
 
 Notify = Callable[[object], None]
 
@@ -86,6 +88,7 @@ class Run(Generic[T]):
         self.interruption: BaseException | None = None
         self.thrown = False
         self.deadline = inf
+        self.patience = 0.0
         self.root = Branch(operation, None)
 
     # -- forward --------------------------------------------------------------------------------------------
@@ -169,6 +172,9 @@ class Run(Generic[T]):
             return listener
         timer = Timer(owner, self.wake)
         timer.deadline = self.now() + wish.seconds
+        if LONG <= wish.seconds <= self.patience:
+            self.patience -= wish.seconds
+            self.deadline += wish.seconds
         return timer
 
     def _await(self, branch: Branch, ticket: Ticket) -> None:
@@ -223,7 +229,9 @@ class Run(Generic[T]):
         if self.interruption is None:
             self.interruption = interruption
             self.deadline = self.now() + CLEAN_UP
+            self.patience = PATIENCE
         else:
+            self.patience = 0.0
             self.deadline = min(self.deadline, self.now() + HURRY)
         if not self.thrown:  # or a second interruption fell into the throwing of the first
             self._throw(self.root, self.interruption)

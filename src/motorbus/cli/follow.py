@@ -87,7 +87,7 @@ def follow(
         if limp := [name for name in pairs if hasattr(hand.robot[name], "disable_torque")]:
             output.note(f"{', '.join(limp)}: the torque goes off now, and stays off: hold what could sag")
         with hand.working("following"), asked_to_end() as ended:
-            until = counted(hand, ended, rate, span)
+            until = counted(hand, "following", ended, rate, span)
             followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until)
     _tell(followed, output)
     return Exit.OK

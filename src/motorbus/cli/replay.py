@@ -19,6 +19,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from motorbus.cli.robot import InHand
     from motorbus.motion.machine import AxisSpec
+    from motorbus.motion.moved import Moved
     from motorbus.motion.trajectory import Trajectory
 
 app = App(
@@ -72,15 +73,12 @@ def replay(
     options
         Any option of the buses, as a flag.
     """
-    from motorbus.motion.trajectory import Trajectory
-
     share = units.parse(speed, "load") if speed else 1.0
     if not share > 0 or repeat < 1 or not smooth >= 0:
         raise RequestError(
             "--speed must be above 0, --repeat at least 1 and --smooth not below 0", advice="nothing was sent"
         )
-    wanted = Trajectory.load(file, machine().axes)
-    wanted = wanted.smoothed(smooth) if smooth else wanted
+    wanted = _read(file, smooth)
     _judge(wanted.scaled(1 / share))
     with robot(list(wanted.axes), options, output) as hand:
         _led(hand, wanted)
@@ -93,7 +91,15 @@ def replay(
             with hand.working(f"replaying {number + 1} of {repeat}" if repeat > 1 else "replaying"):
                 moved = hand.robot.replay(wanted, speed=share)
         tell(hand, "replay", moved)
+        output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
     return Exit.OK
+
+
+def _read(file: Path, smooth: float) -> Trajectory:
+    from motorbus.motion.trajectory import Trajectory
+
+    wanted = Trajectory.load(file, machine().axes)
+    return wanted.smoothed(smooth) if smooth else wanted
 
 
 def _judge(wanted: Trajectory) -> None:
@@ -115,6 +121,11 @@ def _led(hand: InHand, wanted: Trajectory) -> None:
             expected="axes that can be led",
             advice="leave its column out, and `motorbus move` it; nothing was sent",
         )
+
+
+def _worst(hand: InHand, moved: Moved) -> str:
+    axes = hand.robot.machine.axes
+    return ", ".join(f"{name} {axes[name].show(track.worst)}" for name, track in moved.tracks.items())
 
 
 def _plan(hand: InHand, wanted: Trajectory, present: dict[str, float]) -> Exit:

@@ -89,14 +89,11 @@ def teach(
         if limp:
             output.note("the torque goes off now, and stays off: hold what could sag")
         with hand.working("recording"), asked_to_end() as ended:
-            until = counted(hand, ended, rate, span)
+            until = counted(hand, "recording", ended, rate, span)
             taught = hand.robot.teach(
                 axes if names else None, seconds=span, rate=rate, until=until, limp=limp
             )
-    taught = taught.smoothed(smooth) if smooth else taught
-    with usable(output_, "written"):
-        output_.write_text(taught.text(machine().axes), encoding="utf-8")
-    _tell(taught, output_, output)
+    _keep(taught.smoothed(smooth) if smooth else taught, output_, output)
     return Exit.OK
 
 
@@ -115,17 +112,20 @@ def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
         )
 
 
-def counted(hand: InHand, ended: Callable[[], bool], rate: float, span: float | None) -> Callable[[], bool]:
+def counted(
+    hand: InHand, what: str, ended: Callable[[], bool], rate: float, span: float | None
+) -> Callable[[], bool]:
     """The same question, asked once in each cycle, which also shows for how long that has been going on."""
     cycles = 0
 
     def asked() -> bool:
         nonlocal cycles
         cycles += 1
-        seconds = cycles / rate
         if cycles % max(1, round(rate / 10)) == 0:
+            seconds = cycles / rate
             done, total = (seconds, span) if span else (0.0, 1.0)
-            hand.heard(Progress(round(1000 * done), round(1000 * total), f"{seconds:.1f} s"))
+            text = f"{what}  {seconds:.1f} s{'' if span else ', Enter ends it'}"
+            hand.heard(Progress(round(1000 * done), round(1000 * total), text))
         return ended()
 
     return asked
@@ -149,8 +149,11 @@ def _plan(hand: InHand, axes: list[str], *, limp: bool) -> Exit:
     return Exit.OK
 
 
-def _tell(taught: Trajectory, file: Path, output: Output) -> None:
+def _keep(taught: Trajectory, file: Path, output: Output) -> None:
+    """Write it into its file, and say how far each axis went."""
     axes = machine().axes
+    with usable(file, "written"):
+        file.write_text(taught.text(axes), encoding="utf-8")
     reach = {name: (min(places), max(places)) for name, places in taught.axes.items()}
     facts = [{"name": name, "low": low, "high": high} for name, (low, high) in reach.items()]
     samples = len(taught.times)

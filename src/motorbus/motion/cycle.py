@@ -44,6 +44,7 @@ class Part:
         self.began = self.ended = 0.0
         self.abreast: Final = len({exchange.lane for exchange in self.reads}) > 1
         self._stops: dict[int, int] = {}
+        self._stopping = 0
 
     @property
     def now(self) -> float:
@@ -123,8 +124,10 @@ class Part:
         yield from train.begin(
             {axis.spec.node: abs(axis.spec.rate_to_device(axis.spec.max_velocity)) for axis in axes}
         )
-        stops = self.bus.turns.known.stops
-        self._stops.update((place.node, stops(place.node)) for place in fresh)
+        known = self.bus.turns.known
+        if self._stopping != known.stopping and not self.stopped():
+            self._stopping = known.stopping
+        self._stops.update((place.node, known.stops(place.node)) for place in fresh)
         for place in fresh:
             angle: float = yield from place.axis.able["position"](place.axis.device)
             place.begin(place.axis.spec.from_device(angle))
@@ -144,6 +147,8 @@ class Part:
         ]
 
     def _stopped_since(self, stops: Stops) -> MotorbusError | None:
+        if self.bus.turns.known.stopping == self._stopping:
+            return None
         for node, before in self._stops.items():
             if stops(node) != before and self.places[node].begun:
                 return stopped([self.places[node].name])

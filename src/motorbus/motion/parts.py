@@ -39,7 +39,7 @@ NO_WAY: Final = 1e-9
 def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
     """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
     led = "train" in axes[0].able
-    work: Led | Own = Led(journey, party, axes) if led else Own(journey, party, axes[0])
+    work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     yield from afterwards(_failing(journey, work.run()), lambda: _ended(journey, work))
     assert work.gone is not None
     return work.gone
@@ -54,13 +54,13 @@ def _failing(journey: Journey, work: Operation[None]) -> Operation[None]:
         raise
 
 
-def _ended(journey: Journey, work: Led | Own) -> Operation[None]:
+def _ended(journey: Journey, work: LedPart | OwnPart) -> Operation[None]:
     """Stop what was begun and has not arrived."""
     if work.begun and work.gone is None:
         journey.unstopped.update((yield from work.command.stop()))
 
 
-class Led:
+class LedPart:
     """The axes of one bus, led along the course."""
 
     def __init__(self, journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> None:
@@ -150,7 +150,7 @@ class Led:
         yield from train.begin({node: abs(speed) for node, speed in speeds.items()})
 
 
-class Own:
+class OwnPart:
     """An axis that moves by a profile of its own, from where it is reckoned to be."""
 
     def __init__(self, journey: Journey, party: str, axis: AxisVerbs) -> None:

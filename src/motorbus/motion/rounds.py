@@ -225,13 +225,18 @@ class Rounds:
 
     def _judge(self, periods: int) -> None:
         """Before anything is sent: has somebody been stopped, and may all goals be sent?"""
-        halted = [place for place in self._all if place.interrupted]
-        if halted:
-            for place in halted:
-                place.release()
-            raise stopped([place.name for place in halted])
+        for place in self._all:
+            axis = place.axis
+            if place.begun and not (axis.under_way and axis.engaged):
+                self._release_interrupted()
         for place in self._all:
             place.judge(periods)
+
+    def _release_interrupted(self) -> None:
+        halted = [place for place in self._all if place.interrupted]
+        for place in halted:
+            place.release()
+        raise stopped([place.name for place in halted])
 
     def _unbegun(self) -> dict[str, list[Place]]:
         """Who has a goal and no torque yet, by bus."""

@@ -12,7 +12,7 @@ another bus of the same movement that has failed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil, floor
+from math import ceil, floor, inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.bus.face import BusFace
@@ -80,7 +80,7 @@ class Fate:
 
 
 class Streamed(NamedTuple):
-    """What came of it: a track for each axis by its name, how the cycles went, and s after the start of the first order."""
+    """What came of it: a track for each axis by its name, how the cycles went, and when (s) the first order left."""
 
     tracks: dict[str, Track]
     cycles: Cycles
@@ -213,15 +213,14 @@ class Stream:
         """A goal at each slot of the grid, whatever becomes of the readings."""
         slot = 0
         while not self._over:
-            yield from self._until(slot)
+            now = yield from self._until(slot)
+            if slot == 0:
+                self._first = now + self._lead - self._start
             self._fate.check()
             self._command.check()
             last = slot == self._grid.last
             at = self._course.duration if last else (slot + 1) * self._grid.period
-            goals = [self._command.guarded(one) for one in self._train.goals(self._goals(at))]
-            if slot == 0:
-                self._first = (yield from Pause(0)) + self._lead - self._start
-            yield from _forgiven(goals)
+            yield from self._order(at)
             self._cycles += 1
             if last:
                 return
@@ -240,12 +239,16 @@ class Stream:
             yield from self._report(slot * self._grid.period)
             slot = yield from self._next(slot)
 
-    def _until(self, slot: int) -> Operation[None]:
+    def _until(self, slot: int) -> Operation[float]:
+        """Wait for a slot; gives the moment (s). Nobody may wait between this and what is sent, or others go first."""
         due = self._start - self._lead + slot * self._grid.period
-        yield from Pause(max(0.0, due - (yield from Pause(0))))
+        return (yield from Pause(max(0.0, due - (yield from Pause(0)))))
 
     def _next(self, slot: int) -> Operation[int]:
         return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
+
+    def _order(self, at: float) -> Operation[None]:
+        yield from _forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -288,15 +291,20 @@ class Stream:
         period = max(self._grid.period, 0.005)
         end = self._start + self._course.duration
         yield from Pause(max(0.0, end - (yield from Pause(0))))
+        exact = False
         while True:
             yield from self._read()
             now = yield from Pause(0)
-            if all(self._arrived(axis, now - end) for axis in self._axes.values()):
+            exact = exact or all(self._off(axis) <= STILL for axis in self._axes.values())
+            if exact and all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
             if now - end > SETTLE:
                 self._check_arrived()
             self._fate.check()
             self._command.check()
+            if not exact:
+                yield from self._order(self._course.duration)  # the last goal may have been lost on the wire
+                exact = True
             yield from Pause(period)
         if self._reports:
             total = round(1000 * self._course.duration)
@@ -314,8 +322,9 @@ class Stream:
 
     def _off(self, axis: AxisVerbs) -> float:
         """How far it was last seen from its goal, in rad of the device."""
+        *_, presents = self._tracks[axis.name]
         goal = self._course.positions(self._course.duration)[axis.name]
-        return abs(self._tracks[axis.name][2][-1] - goal) * abs(axis.spec.ratio)
+        return abs(presents[-1] - goal) * abs(axis.spec.ratio) if presents else inf
 
     # -- what must not be ----------------------------------------------------------------------------------------------
 
@@ -335,11 +344,7 @@ class Stream:
     def _check_arrived(self) -> None:
         """Raise Stalled for those that are not in position."""
         goals = self._course.positions(self._course.duration)
-        short = [
-            axis
-            for axis in self._axes.values()
-            if not self._tracks[axis.name][2] or self._off(axis) > TOLERANCE
-        ]
+        short = [axis for axis in self._axes.values() if self._off(axis) > TOLERANCE]
         for axis in short[:1]:
             spec = axis.spec
             raise Stalled(

@@ -119,6 +119,10 @@ def test_people_see_and_say_positions_in_their_unit(
     assert spec.show(position) == shown
 
 
+def test_nothing_has_no_sign() -> None:
+    assert (axis().show(-0.0), axis().show(-0.0001), axis().show(-0.01)) == ("0.0 deg", "0.0 deg", "-0.6 deg")
+
+
 def test_a_length_is_no_position_of_an_axis_that_turns() -> None:
     with pytest.raises(RequestError, match="measures length"):
         axis().parse("5 mm")

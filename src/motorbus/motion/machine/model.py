@@ -235,7 +235,8 @@ class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """A position in the unit in which people see this axis: `-45.0 deg`, `12.50 mm`."""
         scale = units.SCALES[POSITION.of(self.linear)][self.unit]
         decimals = {"deg": 1, "mm": 2, "turn": 3}.get(self.unit, 4)
-        return f"{position / scale:.{decimals}f} {self.unit}"
+        text = f"{position / scale:.{decimals}f}"
+        return f"{text if float(text) else text.removeprefix('-')} {self.unit}"
 
 
 class GroupSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -146,7 +146,10 @@ def _check_speed(node: Node, speed: float) -> None:
 
 
 class _Seat(NamedTuple):
-    """What a goal of one servo is reckoned by; `lowest` and `highest` are what its register can say, in rad."""
+    """What a goal of one servo is reckoned by; `lowest` and `highest` are what its register can say, in rad.
+
+    `codes` are the bytes of raw goals that were encoded before.
+    """
 
     id: int
     node: Node
@@ -157,6 +160,7 @@ class _Seat(NamedTuple):
     highest: float
     low: float
     high: float
+    codes: dict[int, bytes]
 
 
 class _Packet:
@@ -175,7 +179,7 @@ class _Packet:
     def exchange(self, to: Mapping[int, float]) -> Exchange[None]:
         """The packet with these goals (rad)."""
         goals, items = [], []
-        for id, node, row, factor, scale, lowest, highest, low, high in self._seats:
+        for id, node, row, factor, scale, lowest, highest, low, high, codes in self._seats:
             value = to[id]
             if type(value) is float and lowest <= value <= highest:
                 raw = round(value / factor / scale)
@@ -183,7 +187,10 @@ class _Packet:
             else:  # a whole number, or what is none: as `position_goal` says
                 raw, goal = position_goal(node, row, value)
             goals.append(goal)
-            items.append((id, row.encode(raw)))
+            code = codes.get(raw)
+            if code is None:
+                code = codes[raw] = row.encode(raw)
+            items.append((id, code))
         request = wire.sync_write(self._address, items)
         return unanswered(request, Effect.MOTION, tuple(goals), refusal=self._refusal)
 
@@ -208,4 +215,4 @@ def _seat(node: Node) -> _Seat:
     assert goal.high is not None
     lowest, highest = float(node.value(row, row.low)), float(node.value(row, row.high))
     factor = node.settings.factors[row.name]
-    return _Seat(node.node, node, row, factor, row.scale, lowest, highest, goal.low, goal.high)
+    return _Seat(node.node, node, row, factor, row.scale, lowest, highest, goal.low, goal.high, {})
