@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from motorbus.cli.exits import Exit
 from motorbus.cli.simulated import Simulated
 from motorbus.motion.machine import Machine
 from motorbus.session import prepare
@@ -169,18 +170,21 @@ def worked(line: str, ports: dict[str, str], folder: Path) -> subprocess.Complet
     return carried_out(meant, folder, "--yes") if "nobody agreed" in ran.stderr else ran
 
 
+def judge(line: str, ran: subprocess.CompletedProcess[str]) -> None:
+    """It succeeded; figures of a loop are told too when a host that was held up has lost a reading."""
+    held_up = "loop-stats" in line and ran.returncode == Exit.PARTIAL and "readings lost" in ran.stderr
+    assert ran.returncode == 0 or held_up, ran.stderr
+    assert ran.stdout
+
+
 @pytest.mark.parametrize("line", LINES)
 def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder: Path) -> None:
     if NAMED.search(line):
         write_machine(folder, ports["feetech"])
-    ran = worked(line, ports, folder)
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout
+    judge(line, worked(line, ports, folder))
 
 
 @pytest.mark.parametrize("line", lines(MACHINE_PAGE))
 def test_a_command_of_the_page_on_a_machine_works(line: str, ports: dict[str, str], folder: Path) -> None:
     (folder / "motorbus.toml").write_bytes((ROOT / "examples" / "motorbus.toml").read_bytes())
-    ran = worked(line, ports, folder)
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout
+    judge(line, worked(line, ports, folder))

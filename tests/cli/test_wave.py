@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from motorbus.cli import wave
+from motorbus.cli.output import Output
+from motorbus.errors import RequestError
 from tests.cli.conftest import Run
 
 pytestmark = pytest.mark.usefixtures("state_folder")
@@ -50,6 +52,12 @@ def test_without_matplotlib_it_goes_on(run: Run, tmp_path: Path, monkeypatch: py
 
 def test_ids_that_are_none_end_with_2(run: Run) -> None:
     assert run(*WAVE, "--ids", "x").code == 2
+
+
+def test_there_is_no_wave_of_what_cannot_be_led(tmp_path: Path) -> None:
+    with pytest.raises(RequestError, match="no loop to show"):
+        wave.waved("stepper", "1", 1.0, tmp_path / "x.png", Output())
+    assert list(tmp_path.glob("*.png")) == []
 
 
 def test_the_wave_starts_and_ends_at_rest_and_is_smooth() -> None:

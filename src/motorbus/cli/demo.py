@@ -28,7 +28,7 @@ app = App(
 Six FEETECH servos, two KST servos on CAN and the linear axis of a stepper
 controller are one machine: a file describes it, and all nine axes start and
 end together, there and back. What the stepper axis did is reckoned, for it
-tells no position: it is called estimated. Takes about 25 s, most of it for the
+tells no position: it is called estimated. Takes about 20 s, most of it for the
 stepper controller, which is told its movements at 9600 bit/s. --family shows
 the devices of one bus instead: servos in a loop as fast as the wire allows, a
 stepper controller with a program.

@@ -60,8 +60,8 @@ def waved(family: str, ids: str, duration: float, picture: Path, output: Output)
     nodes = session.parse_ids(ids)
     with served(family, ids, output) as bus, opened(bus, {}, output) as opening:
         found = _found(bus, opening, nodes, output)
-        _introduce(opening, found, output)
         train = _led(opening, found)
+        _introduce(opening, found, output)
         course = _moved(opening, train, duration, output)
     drawn = _drawn(picture, course, found, output)
     _sum_up(bus, course, found, drawn, output)
@@ -78,7 +78,8 @@ def served(family: str, ids: str, output: Output) -> Iterator[str]:
 
 def _found(bus: str, opening: Bus, nodes: Sequence[int], output: Output) -> list[Found]:
     """Ask the ids that are there, and some that are not, as a real scan would."""
-    asked = tuple(range(min(1, *nodes), max(nodes) + 10))
+    alone = opening.family.link.only is not None
+    asked = () if alone else tuple(range(min(1, *nodes), max(nodes) + 10))
     with output.progress("scanning") as bar:
         found = opening.run(opening.family.scan(asked), report=lambda event: scan.listen(event, [], bar))
     if not found:
