@@ -11,7 +11,7 @@ from motorbus.motion.moved import Arrived, Moved, Track
 
 WENT = {"a": Went(100.0, 10.0, 12.0, 10.1, 11.9), "b": Went(-50.0, 10.002, 12.01, 10.1, 11.8)}
 MOVED = Moved(
-    2.0, dict.fromkeys(WENT, Arrived(1.0, 1.0, False, 0.0, 2.0)), tracks=dict.fromkeys(WENT, Track())
+    2.0, dict.fromkeys(WENT, Arrived(1.0, 1.0, False, 0.0, 2.0, 0.0)), tracks=dict.fromkeys(WENT, Track())
 )
 
 

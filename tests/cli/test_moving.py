@@ -40,7 +40,7 @@ def test_a_person_sees_a_table_in_the_units_of_the_axes(bench: Bench, run: Run) 
     assert "10.0 deg" in ran.out
     assert "5.00 mm" in ran.out
     assert "estimated" in ran.out
-    assert "started within" in ran.out
+    assert "orders left within" in ran.out
 
 
 def test_nothing_has_no_sign(bench: Bench, run: Run) -> None:

@@ -75,7 +75,7 @@ def test_a_person_is_told_of_each_axis(
     assert out.startswith("Found (simulated)\n")
     for name in nine.AXES:
         assert out.count(f"\n{name} ") == 3
-    for words in ("STS3215", "70.0 deg", "90.00 mm", "estimated", "started within", "nine.png (simulated)"):
+    for words in ("STS3215", "70.0 deg", "90.00 mm", "estimated", "orders left within", "nine.png (simulated)"):
         assert words in out
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 
 import pytest
 
-from motorbus import AsyncRobot, RequestError, Robot
+from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.operation import Operation, Pause
 from motorbus.motion.axes import AsyncAxis, Axis
 from motorbus.motion.axis import ability
@@ -172,8 +173,11 @@ def test_a_place_that_is_none_is_not_declared(place: object) -> None:
             robot["lift"].declare(place)  # type: ignore[arg-type]
         assert robot["lift"].estimated is None
         robot["lift"].departs()
-        with pytest.raises(RequestError, match="is moving"):
+        with pytest.raises(RequestError, match="nobody knows that it rests"):
             robot["lift"].declare(0.0)
+        robot["lift"].stop()
+        robot["lift"].declare(0.0)
+        assert robot["lift"].estimated == 0.0
 
 
 def test_people_see_what_it_is() -> None:
@@ -207,3 +211,38 @@ def test_an_axis_of_which_nothing_is_known_can_nothing() -> None:
         bare = Axis(robot["a1"].bus, "a1", made.axes["a1"], robot["a1"].device, {})
         assert bare.capabilities == frozenset()
         assert isinstance(robot, Body)
+
+
+def test_a_verb_shows_what_it_is_called_and_what_it_takes() -> None:
+    with machine(arm="1", lift=True) as (made, _), Robot.of(made) as robot:
+        assert robot["a1"].move.__name__ == "move"
+        assert robot["a1"].move.__qualname__ == "Axis.move"
+        assert list(inspect.signature(robot["a1"].move).parameters) == [
+            "to",
+            "velocity",
+            "acceleration",
+            "duration",
+        ]
+        assert list(inspect.signature(robot.positions).parameters) == ["names"]
+        assert robot.positions.__name__ == "positions"
+
+
+def test_what_an_axis_lacks_is_not_listed() -> None:
+    with machine(arm="1", lift=True) as (made, _), Robot.of(made) as robot:
+        assert {"temperature", "move", "name"} <= set(dir(robot["a1"]))
+        assert not {"home", "run", "declare"} & set(dir(robot["a1"]))
+        assert {"home", "run", "declare"} <= set(dir(robot["lift"]))
+        assert not {"temperature", "position"} & set(dir(robot["lift"]))
+
+
+def test_whatever_goes_wrong_names_the_axis() -> None:
+    with machine(arm="1", lift=True) as (made, sims), Robot.of(made) as robot:
+        robot["lift"].declare(0.1)
+        with pytest.raises(RequestError, match="^lift: this move is less than one pulse"):
+            robot["lift"].move_by(1e-9)
+        with pytest.raises(RequestError, match="^lift: this move is less than one pulse"):
+            robot.move({"lift": 0.1000001})
+        sims["arm"][1].unplug()
+        with pytest.raises(NoReply, match="^a1: "):
+            robot["a1"].position()
+        sims["arm"][1].plug()

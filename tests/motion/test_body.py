@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from motorbus import RequestError, Robot
 from motorbus.core.operation import Pause
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
-from tests.motion.machines import machine
+from tests.motion.machines import listened, machine, said
 
 
 def test_names_stand_for_axes_each_once_in_their_order() -> None:
@@ -17,7 +20,6 @@ def test_names_stand_for_axes_each_once_in_their_order() -> None:
         assert list(robot.chosen("upper")) == ["a1", "a2", "a3"]
         assert list(robot.chosen(["lift", "a2", "arm"])) == ["lift", "a2", "a1", "a3"]
         assert list(robot.chosen(name for name in ("c1", "c1"))) == ["c1"]
-        assert robot.chosen([]) == {}
 
 
 def test_what_is_not_there_or_not_open_is_refused() -> None:
@@ -52,3 +54,25 @@ def test_the_clock_of_the_robot_is_at_0_when_it_is_made() -> None:
         assert later.origins["arm"] >= 1.5
         assert later.origins["arm"] == robot.buses["arm"].link.now()
         assert robot.origins["arm"] < 1.0
+
+
+def test_what_is_no_name_is_one_clear_error_and_sends_nothing() -> None:
+    with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
+        listened(sims)
+        number: Any = 3
+        uses: list[tuple[Callable[[], object], str]] = [
+            (lambda: robot.positions(number), "3 is not a name"),
+            (lambda: robot.positions(["a1", number]), "3 is not a name"),
+            (lambda: robot[number], "3 is not a name"),
+            (lambda: robot.stop([]), "no axis is named"),
+            (lambda: robot.move({}), "no axis is named"),
+            (lambda: robot.move({number: 0.1}), "3 is not a name"),
+            (lambda: robot.move("a1"), "'a1' is not a mapping of goals"),  # type: ignore[arg-type]
+            (lambda: Robot.of(made, number), "3 is not a name"),
+            (lambda: Robot.of(made, []), "no axis is named"),
+            (lambda: Robot.of("m.toml"), "is not a machine"),  # type: ignore[arg-type]
+        ]
+        for use, told in uses:
+            with pytest.raises(RequestError, match=told):
+                use()
+        assert said(sims) == []

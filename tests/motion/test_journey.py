@@ -65,7 +65,7 @@ def failed(
 def test_nobody_moves_when_one_is_silent_from_the_beginning() -> None:
     with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
         sims["arm"][2].unplug()
-        with pytest.raises(NoReply, match=r"a2 \(arm#2\) does not answer, so nobody moves"):
+        with pytest.raises(NoReply, match=r"a2 \(arm#2\) does not answer, so this movement does not begin"):
             robot.move(GOALS)
         assert robot.positions(["a1", "c1"]) == pytest.approx({"a1": 0.0, "c1": 0.0}, abs=0.002)
         assert sims["arm"][1].memory["torque_enable"] == 0

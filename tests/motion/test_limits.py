@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from fractions import Fraction
 from math import inf, nan, pi, radians
+from typing import Any
 
 import pytest
 
@@ -11,7 +14,7 @@ from motorbus.motion import limits
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.motion.machines import listened, machine, said
 
 SHOULDER = AxisSpec(
     device="arm#1",
@@ -130,3 +133,41 @@ def test_a_device_is_asked_for_its_limits_and_one_without_has_none() -> None:
         assert arm is not None
         assert arm == pytest.approx((0.0, radians(360)), abs=0.002)
         assert robot["lift"].bus.run(limits.of_device(robot["lift"])) is None
+
+
+@pytest.mark.parametrize("value", ["1", None, True, b"1", [1.0], 10**400])
+def test_what_is_no_number_is_one_error_of_the_request(value: object) -> None:
+    with machine(arm="1", lift=True) as (made, sims), Robot.of(made) as robot:
+        robot["lift"].declare(0.1)
+        arm, lift = robot["a1"], robot["lift"]
+        listened(sims)
+        figure: Any = value
+        orders: list[Callable[[], object]] = [
+            lambda: arm.move(figure),
+            lambda: arm.move_by(figure),
+            lambda: arm.jog(figure, 1.0),
+            lambda: arm.jog(0.1, figure),
+            lambda: lift.move_by(figure),
+            lambda: lift.jog(0.01, figure),
+            lambda: lift.declare(figure),
+            lambda: robot.move({"a1": figure}),
+            lambda: robot.move({"a1": 0.1}, speed=figure),
+        ]
+        if value is not None:
+            orders += [
+                lambda: arm.move(0.1, velocity=figure),
+                lambda: arm.move(0.1, acceleration=figure),
+                lambda: lift.move_by(0.01, velocity=figure),
+                lambda: robot.move({"a1": 0.1}, duration=figure),
+            ]
+        for order in orders:
+            with pytest.raises(RequestError, match="expected: a number"):
+                order()
+        assert said(sims) == []
+        assert lift.estimated == 0.1
+
+
+def test_a_number_of_another_library_is_one() -> None:
+    third: Any = Fraction(1, 3)
+    limits.check_number("its goal", third)
+    assert limits.limits_for("shoulder", SHOULDER, velocity=third).velocity == third

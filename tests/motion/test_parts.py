@@ -69,6 +69,6 @@ def test_a_stepper_that_has_no_way_to_go_is_not_even_asked() -> None:
         sims["stage"].simulator.receive = counted  # type: ignore[method-assign]
         moved = robot.move({"a1": 0.3, "lift": 0.1})
         assert heard == 0
-        assert moved.axes["lift"] == (0.1, 0.1, True, 0.0, 0.0)
+        assert moved.axes["lift"] == (0.1, 0.1, True, 0.0, 0.0, 0.1)
         assert robot["lift"].estimated == 0.1
         assert not robot["lift"].engaged

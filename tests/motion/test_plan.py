@@ -13,7 +13,7 @@ def test_an_axis_of_which_only_its_place_is_known_has_no_limits_and_no_grain() -
 
 
 def test_a_part_without_led_axes_has_no_cycles() -> None:
-    gone = Gone({"lift": Arrived(0.1, 0.1, True, 0.0, 1.0)}, {"lift": Track(estimated=True)})
+    gone = Gone({"lift": Arrived(0.1, 0.1, True, 0.0, 1.0, 0.1)}, {"lift": Track(estimated=True)})
     assert gone.cycles is None
 
 

@@ -12,7 +12,7 @@ from motorbus.core.operation import Operation, Pause, Together, outcome
 from motorbus.motion import axis as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.reckoning import Reckoning, is_reckoned
+from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned
 from tests.motion.machines import listened, machine, said
 
 FAR = {"lift": {"low": "0 mm", "high": "2000 mm", "max_step": "500 mm"}}
@@ -23,17 +23,18 @@ def test_it_begins_unknown_and_is_what_was_declared_and_what_came_after() -> Non
     assert found.position is None
     assert "nobody has said" in str(found)
     found.declare(1.0)
-    found.depart()
+    movement = Movement()
+    movement.place = found.depart()
     assert found.position is None, "while it moves nobody knows"
-    found.arrive(0.5)
+    found.arrive(movement.after(0.5))
     assert found.position == 1.5
     assert "estimated" in str(found)
 
 
 def test_what_is_unknown_stays_unknown_after_a_movement() -> None:
-    found = Reckoning()
-    found.depart()
-    found.arrive(0.5)
+    found, movement = Reckoning(), Movement()
+    movement.place = found.depart()
+    found.arrive(movement.after(0.5))
     assert found.position is None
     assert "nobody has said" in found.why
 
@@ -41,9 +42,15 @@ def test_what_is_unknown_stays_unknown_after_a_movement() -> None:
 def test_a_movement_that_was_refused_leaves_it_where_it_was() -> None:
     found = Reckoning()
     found.declare(1.0)
-    found.depart()
-    found.stay()
+    found.arrive(found.depart())
     assert found.position == 1.0
+
+
+def test_where_an_earlier_movement_did_not_say_how_it_ended_nobody_knows_where_the_next_one_began() -> None:
+    found = Reckoning()
+    found.declare(1.0)
+    found.depart()
+    assert found.depart() == (None, "a movement was interrupted")
 
 
 def test_what_needs_the_position_is_told_why_there_is_none() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +140,53 @@ def test_an_async_robot_that_cannot_be_opened_gives_all_back() -> None:
             sims["arm"][2].plug()
             async with AsyncRobot.of(made) as robot:
                 assert len(robot.axes) == 3
+
+    asyncio.run(main())
+
+
+def test_a_robot_that_is_closed_says_so() -> None:
+    with machine(arm="1-2") as (made, _):
+        robot = Robot.of(made)
+        robot.close()
+        robot.close()
+        uses: list[Callable[[], object]] = [
+            robot.__enter__,
+            robot.positions,
+            robot.stop,
+            robot.estop,
+            robot.reset,
+            lambda: robot["a1"],
+            lambda: robot.move({"a1": 0.1}),
+            lambda: robot.loop(50.0).__enter__(),
+        ]
+        for use in uses:
+            with pytest.raises(RequestError, match="the machine is closed") as caught:
+                use()
+            assert "load it again" in str(caught.value)
+
+
+def test_an_async_robot_that_was_not_entered_says_so() -> None:
+    async def main() -> None:
+        with machine(arm="1-2") as (made, sims):
+            robot = AsyncRobot.of(made)
+            for use in (robot.estop, robot.reset, lambda: robot["a1"]):
+                with pytest.raises(RequestError, match="the machine is not open"):
+                    use()
+            for verb in (robot.positions, robot.stop, lambda: robot.move({"a1": 0.1})):
+                with pytest.raises(RequestError, match="use `async with`"):
+                    await verb()
+            sims["arm"][2].unplug()
+            with pytest.raises(NoReply):
+                await robot.__aenter__()
+            assert dict(robot.axes) == {}
+            with pytest.raises(RequestError, match="not open"):
+                await robot.positions()
+            sims["arm"][2].plug()
+            async with robot:
+                assert await robot.positions()
+                with pytest.raises(RequestError, match="open already"):
+                    await robot.__aenter__()
+                assert await robot.positions()
 
     asyncio.run(main())
 

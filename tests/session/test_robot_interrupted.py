@@ -10,6 +10,7 @@ from motorbus import AsyncRobot, Robot
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import Cut, Heard, machine
+from tests.motion.tracing import Line, interrupted
 
 GOALS = {"a1": 0.5, "a2": -0.5, "c1": 0.4}
 HELD = {"c1": {"exit": "hold"}}
@@ -63,3 +64,27 @@ def test_async(steps: int, again: int) -> None:
                 assert len(robot.axes) == 4
 
     asyncio.run(main())
+
+
+FILES = ("session/robot.py", "motion/leaving.py", "motion/conductor.py")
+
+
+def test_ctrl_c_at_any_line_of_leaving_keeps_no_axis_from_letting_go_and_no_port_from_being_free() -> None:
+    tried: set[Line] = set()
+    left = 0
+    while True:
+        with machine(arm="1-2", lift=True, exit="torque_off", axes={"lift": {"exit": "hold"}}) as (
+            made,
+            sims,
+        ):
+            robot = Robot.of(made)
+            robot.enable_torque()
+            where = interrupted(robot.close, FILES, tried)
+            robot.close()  # as what fell before anything had begun
+            assert not any(sims["arm"][node].memory["torque_enable"] for node in (1, 2)), where
+            with Robot.of(made) as again:
+                assert len(again.axes) == 3
+        if where is None:
+            break
+        left += 1
+    assert left > 40

@@ -43,6 +43,21 @@ def test_a_bus_that_is_gone_keeps_no_other_from_being_stopped() -> None:
         reset(robot)
 
 
+def test_whatever_goes_wrong_on_a_bus_is_told_beside_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+
+        def broken() -> None:
+            raise OSError("the socket is gone")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(robot.buses["can"], "estop", broken)
+            found = robot.estop()
+        assert found["can"].promise == "nothing: OSError: the socket is gone"
+        assert found["can"].silent == (0x25,)
+        assert sims["arm"][2].memory["torque_enable"] == 0
+
+
 def test_a_silent_node_is_told() -> None:
     with machine(arm="1-3") as (made, sims), Robot.of(made) as robot:
         sims["arm"][2].unplug()

@@ -7,6 +7,7 @@ if its key and its exact length are due, nothing trails behind it, and its node 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from motorbus.bus import verdict
@@ -25,6 +26,7 @@ from motorbus.core.operation import (
     Answer,
     CanFrame,
     Data,
+    Due,
     Exchange,
     Noise,
     Notice,
@@ -84,31 +86,31 @@ class Air:
         exchange = flight.exchange
         if exchange.other is not None and self.trust.alike(exchange):
             exchange = flight.exchange = exchange.other()
-        suspected = flight.spoiled == "echo" or flight.echo_checked
-        echo_checked = suspected and self.echo.present is False
-        flight.reset()
+        echo_checked = (flight.spoiled == "echo" or flight.echo_checked) and self.echo.present is False
+        if flight.left:
+            flight.reset()
         flight.echo_checked = echo_checked
-        self.trust.ask(exchange, now)
-        start = max(now, self._free_at)
-        air = self.family.air_time(exchange, self.rate)
-        flight.sent_at = now
-        flight.left = True
-        flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
+        start, air = max(now, self._free_at), self.family.air_time(exchange, self.rate)
+        flight.sent_at, flight.left = now, True
+        awaited = exchange.replies != ()
+        if awaited:
+            self.trust.ask(exchange, now)
+            flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
+            flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
         if self.window > 1:
             self._share_wire(flight, air)
-        flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
-        if exchange.replies == ():
-            self._free_at = start + air
-        else:
+        if awaited:
             self._flying[exchange.lane] = flight
+        else:
+            self._free_at = start + air
         if exchange.effect or exchange.goals:
             self.known.order(exchange, self.rate)
         if isinstance(exchange.request, bytes):
             self.echo.sent(exchange.request, flight.parent is not None or exchange is self.echo.test)
-        self._count_sent(exchange)
+        self.statistics.asked(exchange.replies)
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", exchange.request))
-        if exchange.replies == ():
+        if not awaited:
             self._settle(flight, flight.answer(now))
         return exchange.request
 
@@ -125,13 +127,6 @@ class Air:
     def expect_echo(self, exchange: Exchange[Any]) -> None:
         """This exchange, sent when the bus is opened, shows whether the adapter echoes."""
         self.echo.test = exchange
-
-    def _count_sent(self, exchange: Exchange[Any]) -> None:
-        if exchange.replies is ANY or not exchange.replies:
-            self.statistics.other["sent"] += 1
-            return
-        for due in exchange.replies:
-            self.statistics.of(due.node).sent += 1
 
     # -- what comes in --------------------------------------------------------------------------------------
 
@@ -191,7 +186,8 @@ class Air:
     def _take_reply(self, reply: Reply, now: float) -> None:
         flight = self._flying.get(reply.lane)
         if flight is None:
-            self._unawaited(reply, now)
+            if not self._late(reply) and not self._everyones(reply):
+                self._nobodys(reply, now)
         elif reply.data in self.echo.recent and not flight.echo_checked:
             self.echo.doubted()
             flight.spoiled = "echo"
@@ -221,10 +217,6 @@ class Air:
             flight.disbelieve(reply)
             self.statistics.other["unexpected"] += 1
         else:
-            self._nobodys(reply, now)
-
-    def _unawaited(self, reply: Reply, now: float) -> None:
-        if not self._late(reply) and not self._everyones(reply):
             self._nobodys(reply, now)
 
     def _everyones(self, reply: Reply) -> bool:
@@ -358,29 +350,37 @@ class Air:
 
     def _echo_settled(self, flight: Flight) -> None:
         """A test of the echo has ended: nothing but its answer came, or nothing at all. Or an answer came first."""
-        test = flight.parent is not None or flight.exchange is self.echo.test or self.echo.disproved
-        if test and self.echo.present is None and not flight.noise:
+        if self.echo.present is not None or flight.noise:
+            return
+        if flight.parent is not None or flight.exchange is self.echo.test or self.echo.disproved:
             self.echo.excluded()
 
     def _believe(self, flight: Flight, answer: Answer, now: float) -> None:
         dues = flight.exchange.replies
         if dues is ANY:
             if flight.exchange.lane == EVERY_LANE:  # who obeyed everyone's order must be stopped, too
-                for node in dict.fromkeys(reply.lane for reply in answer.replies):
-                    self.known.hear(node, None, self.rate)
+                self.known.hear_all([reply.lane for reply in answer.replies], None, self.rate)
             return
-        for index, due in enumerate(dues):
+        heard: Sequence[Due] = self._heard_of(flight, now) if answer.missing else dues
+        if flight.exchange.rank is not Rank.STOP:  # what a stop cut short may still answer
+            self.trust.believe(*heard, barrier=flight.parent is not None)
+        self.statistics.answered(heard, now - flight.sent_at)
+        nodes = [due.node for due in heard]
+        self.known.hear_all(nodes, answer if flight.exchange.tells_position else None, self.rate)
+
+    def _heard_of(self, flight: Flight, now: float) -> list[Due]:
+        """Whose replies count; the others are noted as missing, or as not to be believed."""
+        heard = []
+        for index, due in enumerate(flight.exchange.replies):  # type: ignore[arg-type]  # never ANY here
             if index in flight.got and due.node not in flight.unbelieved:
-                if flight.rank is not Rank.STOP:  # what a stop cut short may still answer
-                    self.trust.believe(due, barrier=flight.parent is not None)
-                self.statistics.of(due.node).answered(now - flight.sent_at)
-                self.known.hear(due.node, answer if flight.exchange.tells_position else None, self.rate)
-            else:
-                if index not in flight.got:
-                    self.trust.missed(flight.exchange.lane, due, now, self._quiet)
-                elif not self.trust.of(due.node).silent:
-                    self.trust.of(due.node).quiet_until = now + self._quiet
-                self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
+                heard.append(due)
+                continue
+            if index not in flight.got:
+                self.trust.missed(flight.exchange.lane, due, now, self._quiet)
+            elif not self.trust.of(due.node).silent:
+                self.trust.of(due.node).quiet_until = now + self._quiet
+            self.statistics.of(due.node).errors[verdict.fault(flight)] += 1
+        return heard
 
     def _lost_try(self, lane: int, flight: Flight, now: float) -> None:
         kind = verdict.fault(flight)

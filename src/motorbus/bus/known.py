@@ -7,6 +7,7 @@ and nothing has set it moving since: holding a device at a place it has left wou
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 from motorbus.core.family import Family
@@ -34,26 +35,33 @@ class Known(dict[int, Answer | None]):
 
     def hear(self, node: int, position: Answer | None, rate: int) -> None:
         """This node has answered, or has been ordered to move (None)."""
+        self.hear_all((node,), position, rate)
+
+    def hear_all(self, nodes: Iterable[int], position: Answer | None, rate: int) -> None:
+        """The same of several, which one answer told of."""
         self.rate = rate
-        if node not in self:
-            self[node] = position
-            self.frames = self.family.stop(dict.fromkeys(self))
-        elif position is not None:
-            self[node] = position
+        for node in nodes:
+            if node not in self:
+                self[node] = position
+                self.frames = self.family.stop(dict.fromkeys(self))
+            elif position is not None:
+                self[node] = position
 
     def order(self, exchange: Exchange[Any], rate: int) -> None:
         """An exchange leaves that may set something moving: whom it orders is known, and is not where it was."""
-        for goal in exchange.goals:
-            self.hear(goal.node, None, rate)
+        ordered = [goal.node for goal in exchange.goals]
+        if ordered:
+            self.hear_all(ordered, None, rate)
         if exchange.effect not in MOVING:
             return
-        nodes = named(exchange)
         if exchange.rank is Rank.STOP:
-            self._stops.update(nodes or (None,))
+            self._stops.update(named(exchange) or (None,))
             self.stopping += 1
             return
-        for node in nodes & set(self) if nodes else list(self):  # one that names nobody may move everybody
-            self[node] = None
+        nodes = named(exchange) if exchange.replies else ordered
+        for node in nodes or list(self):  # one that names nobody may move everybody
+            if node in self:
+                self[node] = None
 
     def fresh(self, now: float) -> dict[int, Answer | None]:
         """Everybody, with the last position if that is fresh, else None."""
@@ -69,8 +77,10 @@ class Known(dict[int, Answer | None]):
 
 def named(exchange: Exchange[Any]) -> set[int]:
     """Who answers this exchange, or is ordered something by it; empty where it may be for everybody."""
-    dues = () if exchange.replies is ANY else exchange.replies
-    return {due.node for due in dues} | {goal.node for goal in exchange.goals}
+    nodes = {goal.node for goal in exchange.goals}
+    if exchange.replies is not ANY:
+        nodes.update([due.node for due in exchange.replies])
+    return nodes
 
 
 def withdraws(stop: Exchange[Any], exchange: Exchange[Any]) -> bool:

@@ -6,7 +6,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+
+from motorbus.core.operation import ANY, Any_, Due
 
 BUCKETS = 24
 
@@ -21,11 +24,6 @@ class NodeStatistics:
     errors: Counter[str] = field(default_factory=Counter)
     latency: list[int] = field(default_factory=lambda: [0] * BUCKETS)
 
-    def answered(self, seconds: float) -> None:
-        """One good reply after this time."""
-        self.ok += 1
-        self.latency[min(int(seconds * 1e6).bit_length(), BUCKETS - 1)] += 1
-
 
 @dataclass(slots=True)
 class Statistics:
@@ -33,6 +31,23 @@ class Statistics:
 
     nodes: dict[int, NodeStatistics] = field(default_factory=dict)
     other: Counter[str] = field(default_factory=Counter)
+
+    def asked(self, dues: tuple[Due, ...] | Any_) -> None:
+        """A request has left that calls for these replies; one that calls for none, or for any, belongs to no node."""
+        if dues is ANY or not dues:
+            self.other["sent"] += 1
+            return
+        for due in dues:
+            self.of(due.node).sent += 1
+
+    def answered(self, dues: Iterable[Due], seconds: float) -> None:
+        """A good reply of each of these, all of them after this time."""
+        bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
+        nodes = self.nodes
+        for due in dues:
+            ledger = nodes[due.node]
+            ledger.ok += 1
+            ledger.latency[bucket] += 1
 
     def of(self, node: int) -> NodeStatistics:
         """This node's ledger, a new one at its first exchange."""

@@ -94,6 +94,7 @@ class Flight(Ticket):
         "last",
         "left",
         "noise",
+        "ordered",
         "parent",
         "put_aside",
         "sent_at",
@@ -125,6 +126,7 @@ class Flight(Ticket):
         """Forget what the last try brought."""
         self.sent_at = 0.0
         self.got: dict[int, Reply] = {}
+        self.ordered = 0  # so many came first and in the order due
         self.last: Reply | None = None
         self.put_aside: Reply | None = None
         self.noise: list[tuple[str, bytes]] = []
@@ -143,20 +145,25 @@ class Flight(Ticket):
         if dues is ANY:
             self.got[len(self.got)] = reply
             return True
-        size = len(reply.data)
-        for index, (_, key, length) in enumerate(dues):
-            if key == reply.key and length == size and index not in self.got:
-                self.got[index] = self.last = reply
-                self.complete = len(self.got) == len(dues) or bool(
-                    self.unbelieved and self._all_believed_here()
-                )
-                return True
-        return False
+        _, its, data = reply
+        got, size = self.got, len(data)
+        index = len(got)
+        if index == self.ordered and index < len(dues) and dues[index][1:] == (its, size):
+            self.ordered += 1  # the usual case, without a search
+        else:
+            for index, (_, key, length) in enumerate(dues):
+                if key == its and length == size and index not in got:
+                    break
+            else:
+                return False
+        got[index] = self.last = reply
+        self.complete = len(got) == len(dues) or bool(self.unbelieved and self._all_believed_here())
+        return True
 
     def put_reply_aside(self) -> None:
         """The one reply is suspect: wait for another, but keep it."""
         ((_, self.put_aside),) = self.got.items()
-        self.got, self.last, self.complete = {}, None, False
+        self.got, self.ordered, self.last, self.complete = {}, 0, None, False
 
     def take_back(self) -> None:
         """The reply put aside is the answer after all."""
@@ -198,7 +205,8 @@ class Flight(Ticket):
         if dues is ANY:
             return Answer(tuple(got.values()), (), at)
         if len(got) == len(dues) and not self.unbelieved:
-            return Answer(tuple([got[i] for i in range(len(dues))]), (), at)
+            in_order = self.ordered == len(dues)
+            return Answer(tuple(got.values() if in_order else [got[i] for i in range(len(dues))]), (), at)
         here = [i for i, due in enumerate(dues) if i in got and due.node not in self.unbelieved]
         missing = tuple(due.node for i, due in enumerate(dues) if i not in here)
         return Answer(tuple(got[i] for i in here), missing, at)

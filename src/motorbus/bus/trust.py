@@ -87,20 +87,23 @@ class Trust:
             del trust.outstanding[next(iter(trust.outstanding))]
         trust.quiet_until = now + quiet
 
-    def believe(self, due: Due, barrier: bool) -> None:
-        """This reply is accepted. Only a probe (`barrier`) vouches for a node with replies outstanding.
+    def believe(self, *dues: Due, barrier: bool) -> None:
+        """These replies are accepted. Only a probe (`barrier`) vouches for a node with replies outstanding.
 
         Nor does a long run of equal replies vouch for itself on CAN, where they have one length only: each might be
         the answer to the question before. So a run ends in a probe, which no older reply can answer.
         """
-        trust = self.nodes[due.node]
-        trust.run = trust.run + 1 if trust.length == due.length else 1
-        trust.length = due.length
-        if barrier:
-            trust.outstanding.clear()
-        if not trust.outstanding and not (self.frames and self._monotonous(trust, due, barrier)):
-            trust.tainted = False
-            trust.silent = 0
+        nodes, frames = self.nodes, self.frames
+        for due in dues:
+            node, _, length = due
+            trust = nodes[node]
+            trust.run = trust.run + 1 if trust.length == length else 1
+            trust.length = length
+            if barrier:
+                trust.outstanding.clear()
+            if not trust.outstanding and not (frames and self._monotonous(trust, due, barrier)):
+                trust.tainted = False
+                trust.silent = 0
 
     def _monotonous(self, trust: NodeTrust, due: Due, barrier: bool) -> bool:
         """Has this node given the same kind of reply so often that it must be probed?"""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import re
 import signal
 import sys
@@ -127,6 +128,7 @@ In a folder with a motorbus.toml, buses, axes and groups go by their names:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line (without the program's name) and return its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    _fill_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console that lacks "²" must not end the program
@@ -139,6 +141,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if code is None:
             raise
         return _report(error, code, output)
+
+
+def _fill_closed_streams() -> None:
+    """What the shell has closed (`>&-`) is None here, and its number would be given to the next port."""
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")
 
 
 @contextmanager

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.machine import axes_called
+from motorbus.cli.machine import axes_called, name_of
 from motorbus.cli.target import able, everyone, face, gathered, offers, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import LinkError, MotorbusError, NoReply, PortBusy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
@@ -27,11 +27,13 @@ def each(
     output: Output,
     *,
     dry_run: bool = False,
+    unknown: Sequence[MotorbusError] = (),
 ) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
 
     Where a family has no such verb nothing is opened: RequestError. A bus that fails keeps nobody on another waiting. A
-    dry run shows what would be sent, and sends none of it.
+    bus that is called by its name means the devices of its axes, be they silent, and whoever else answers. A dry run
+    shows what would be sent, and sends none of it. `unknown` are errors of words that meant nobody.
     """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
@@ -39,27 +41,53 @@ def each(
     for name in wanted:
         offers(target(name).family, verb)
     for name, nodes in wanted.items():
+        expected = nodes or tuple(node for bus, node in called if bus == name)
         there: list[dict[str, Any]] = []
         try:
             with opened(name, options, output) as bus:
-                visited = everyone(name, bus, nodes, output)
                 rehearsal = DryBus(bus)
-                for node in visited:
+                for node in _visited(name, bus, expected, output, others=not nodes):
                     carrier = rehearsal.apart() if dry_run else bus
                     there.append({"bus": name, "id": node, **_tried(carrier, node, verb, errors)})
                 if dry_run:
                     show(rehearsal, output)
         except MotorbusError as error:
-            if len(wanted) == 1:
+            _advise(error, name)
+            if len(wanted) == 1 and not there and not unknown:
                 raise
-            there += _unvisited(name, nodes[len(there) :] or (None,), error, errors)
+            there += _unvisited(name, expected[len(there) :] or (None,), error, errors)
         results += [{**one, **_named(called, name, one["id"])} for one in there]
-    if dry_run:
-        return _verdict(errors, len(results))
-    output.document(f"motorbus.{verb}/1", {"devices": results})
-    shown = [(_shown(one), one.get("error") or one.get("promise") or what) for one in results]
-    output.table("", ["device", "result"], shown)
-    return _verdict(errors, len(results))
+    if not dry_run:
+        output.document(f"motorbus.{verb}/1", {"devices": results})
+        shown = [(_shown(one), one.get("error") or one.get("promise") or what) for one in results]
+        output.table("", ["device", "result"], shown)
+    return _verdict([*errors, *unknown], len(results) + len(unknown))
+
+
+def _visited(
+    name: str, bus: Bus, expected: tuple[int, ...], output: Output, *, others: bool
+) -> Iterator[int]:
+    """Those who ought to be there, answer or not, and then the others who answer. Raises NoReply for nobody at all."""
+    yield from expected
+    if not others:
+        return
+    try:
+        found = everyone(name, bus, (), output)
+    except NoReply:
+        if not expected:
+            raise
+        return
+    yield from (node for node in found if node not in expected)
+
+
+def _advise(error: MotorbusError, bus: str) -> None:
+    """Say what reaches the devices of a bus that another process holds."""
+    if isinstance(error, PortBusy):
+        ends = f", or SIGTERM to process {error.owner}," if error.owner is not None else ""
+        error.advice += (
+            f". If it is a motorbus command, Ctrl-C there{ends} ends it: its axes stop, and those whose `exit` is "
+            f"hold keep their torque; `motorbus estop {name_of(bus)}` stops the bus at once, and cuts the torque"
+        )
 
 
 def _unvisited(
@@ -92,9 +120,14 @@ def _tried(bus: Bus | DryBus, node: int, verb: str, errors: list[MotorbusError])
     return {"done": True, **({"promise": promise.value} if isinstance(promise, Enum) else {})}
 
 
-def _verdict(errors: list[MotorbusError], visited: int) -> Exit:
+def _verdict(errors: Sequence[MotorbusError], visited: int) -> Exit:
+    """Raises Partial, or where nobody did as asked the first error, with the others as its notes."""
     if not errors:
         return Exit.OK
+    summaries = list(dict.fromkeys(error.summary for error in errors))
     if len(errors) == visited:
+        for other in summaries[1:]:
+            errors[0].add_note(f"also: {other}")
         raise errors[0]
-    raise Partial("; ".join(dict.fromkeys(error.summary for error in errors)))
+    advice = "; ".join(dict.fromkeys(error.advice for error in errors if error.advice))
+    raise Partial("; ".join(summaries), advice=advice)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 from cyclopts import App, Parameter
 
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.machine import machine_file
+from motorbus.cli.machine import axes_called, machine_file
 from motorbus.cli.output import Output
-from motorbus.cli.target import Target, everyone, gathered, opened, said, target, targets
+from motorbus.cli.rough import forgiving
+from motorbus.cli.target import everyone, gathered, opened, said, target, targets
 from motorbus.core.operation import Effect
 from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
+    from motorbus.core.family import Family
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
@@ -70,11 +72,32 @@ def estop(
     options
         Any option of the bus string, as a flag.
     """
-    stops = _stop_each(targets(bus), options, output) if bus else _stop_all(options, output)
+    with forgiving((bus,) if bus else (), output):
+        stops = _stop_each(_wanted(bus), options, output) if bus else _stop_all(options, output)
     output.document("motorbus.estop/1", {"buses": stops})
     for one in stops:
         output.text("\n  ".join(_lines(one)))
     return _verdict(stops)
+
+
+class Wanted(NamedTuple):
+    """A bus to be stopped, its family, whom to name on it, and whether whoever else is there is stopped too."""
+
+    bus: str
+    family: Family
+    nodes: tuple[int, ...]
+    others: bool
+
+
+def _wanted(word: str) -> list[Wanted]:
+    """What a word means; by the name of a bus the devices of its axes are named, and whoever else is there is meant."""
+    called = axes_called((word,))
+    return [
+        Wanted(
+            one.bus, one.family, one.nodes or tuple(id_ for at, id_ in called if at == one.bus), not one.nodes
+        )
+        for one in targets(word)
+    ]
 
 
 def _lines(one: dict[str, Any]) -> list[str]:
@@ -84,7 +107,7 @@ def _lines(one: dict[str, Any]) -> list[str]:
     return [f"{one['bus']}: {one['error'] or heard}", *(line for line in more if line)]
 
 
-def _stop(wanted: Target, options: dict[str, str], output: Output) -> dict[str, Any]:
+def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
     from motorbus import session
     from motorbus.link.lock import PortLock
 
@@ -109,7 +132,7 @@ def _ask(port: str) -> StopOutcome:
     return request_estop(socket_path(port))
 
 
-def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> dict[str, Any]:
+def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
     """Nobody offers the stop: send it from here, then have each device that was named confirm it."""
     with opened(wanted.bus, options, output) as opening:
         _meet(opening, wanted, output)
@@ -124,14 +147,14 @@ def _stop_ourselves(wanted: Target, options: dict[str, str], output: Output) -> 
     return _facts(wanted.bus, "this process", outcome, note)
 
 
-def _meet(opening: Bus, wanted: Target, output: Output) -> None:
+def _meet(opening: Bus, wanted: Wanted, output: Output) -> None:
     """Where a device can be stopped only at a place that is known, ask it, or everyone, where it is."""
     needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
     if not needs or not all(needs):
         return
     called = faces.offer(opening.family.name, "ping_everyone")
-    nodes = wanted.nodes or (called(opening) if called else ()) or everyone(wanted.bus, opening, (), output)
-    for node in nodes:
+    found = [*wanted.nodes, *(called(opening) if called and wanted.others else ())]
+    for node in dict.fromkeys(found or everyone(wanted.bus, opening, (), output)):
         for exchange in opening.family.stop({node: None}).exchanges:
             with suppress(MotorbusError):  # the stop itself will say who is silent
                 opening.run(exchange)
@@ -151,7 +174,7 @@ def _confirms(opening: Bus, node: int) -> bool:
     return bool(answers) and all(answers)
 
 
-def _stop_each(wanted: list[Target], options: dict[str, str], output: Output) -> list[dict[str, Any]]:
+def _stop_each(wanted: list[Wanted], options: dict[str, str], output: Output) -> list[dict[str, Any]]:
     """Several buses one after the other; one that is out of reach keeps nobody waiting."""
     if len(wanted) == 1:
         return [_stop(wanted[0], options, output)]
@@ -187,7 +210,7 @@ def _stop_all(options: dict[str, str], output: Output) -> list[dict[str, Any]]:
     return stops + (_stop_each([one for _, one in mine], options, output) if mine else [])
 
 
-def _of_machine(options: dict[str, str], output: Output) -> list[tuple[str, Target]]:
+def _of_machine(options: dict[str, str], output: Output) -> list[tuple[str, Wanted]]:
     """The buses of the machine file with the devices of its axes, each behind the name of its port."""
     from motorbus import session
     from motorbus.link.lock import real_name
@@ -200,7 +223,7 @@ def _of_machine(options: dict[str, str], output: Output) -> list[tuple[str, Targ
     except MotorbusError as error:  # whoever is held must be stopped all the same
         output.note(f"note: the machine file is of no help: {error.summary}")
         return []
-    wanted = [Target(bus, target(bus).family, nodes[bus]) for bus in nodes]
+    wanted = [Wanted(bus, target(bus).family, nodes[bus], others=True) for bus in nodes]
     return [(real_name(session.lock_name(one.bus, said(options))), one) for one in wanted]
 
 

@@ -162,15 +162,24 @@ def addresses(text: str) -> list[str]:
 
 
 def axes_called(words: Iterable[str]) -> dict[tuple[str, int], str]:
-    """For devices that are named by their axes, or by groups: the name of the axis by address of the bus and id."""
+    """For devices that are named by axes, groups or buses: the name of the axis by address of the bus and id."""
     found: dict[tuple[str, int], str] = {}
     for word in words:
         known = machine() if is_name(word) else None
-        for axis in known.axes_of(word) if known is not None and word not in known.buses else ():
+        for axis in known.axes_of(word) if known is not None else ():
             assert known is not None
             spec = known.axes[axis]
             found[known.buses[spec.bus].address, spec.node] = axis
     return found
+
+
+def name_of(address: str) -> str:
+    """What a bus is called in the machine file; its address where there is none, or it is not in there."""
+    try:
+        buses = machine().buses if machine_file().path is not None else {}
+    except RequestError:
+        buses = {}
+    return next((name for name, bus in buses.items() if bus.address == address), address)
 
 
 def axes_named(words: Sequence[str]) -> list[str]:

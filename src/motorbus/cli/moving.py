@@ -276,7 +276,7 @@ def tell(hand: InHand, command: str, moved: Moved) -> None:
     output.table("", ["axis", ">goal", ">present", ">error", ""], rows)
     text = f"{moved.duration:.3g} s ({_why(limited)})"
     if len(moved.axes) > 1:
-        text += f"; started within {_ms(moved.started_apart)}, ended within {_ms(moved.ended_apart)} of each other"
+        text += f"; orders left within {_ms(moved.started_apart)}, ended within {_ms(moved.ended_apart)} of each other"
     output.text(text)
 
 

@@ -153,7 +153,7 @@ def draw(path: Path, machine: Machine, movements: Sequence[Movement], output: Ou
     starts = _ms(max(moved.started_apart for _, moved in movements))
     ends = _ms(max(moved.ended_apart for _, moved in movements))
     title = f"{len(machine.axes)} axes on {len(machine.buses)} buses move as one"
-    title += f": started within {starts}, ended within {ends}"
+    title += f": orders left within {starts}, ended within {ends}"
     close, pauses = drawn_together(movements)
     try:
         with usable(path, "written"):
@@ -225,7 +225,7 @@ def sum_up(
         output.text(f"picture: {picture} (simulated)")
 
 
-COLUMNS: Final = ("axis", ">goal", ">present", "", ">started", ">ended", ">furthest from goal")
+COLUMNS: Final = ("axis", ">goal", ">present", "", ">order left", ">ended", ">furthest from goal")
 
 
 def _row(name: str, spec: AxisSpec, moved: Moved) -> tuple[object, ...]:

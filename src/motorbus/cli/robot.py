@@ -1,12 +1,12 @@
 """The machine of a command, open: its axes by name, what it reports as a bar, and what becomes of them at the end.
 
 A command is one step of somebody's work, not the end of it. So when it has done what it was told, its axes stay as it
-left them. When it ends in any other way, each axis ends as its `exit` in the machine file says.
+left them. When it ends in any other way, each axis ends as its `exit` in the machine file says; that is told.
 """
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
 from msgspec import structs
@@ -40,22 +40,12 @@ class InHand:
 
     @contextmanager
     def working(self, what: str) -> Iterator[None]:
-        """Show a bar of this name while the robot works. Whoever ends that is told where the axes stand."""
+        """Show a bar of this name while the robot works."""
         with self.output.progress(what) as self._bar:
             try:
                 yield
-            except KeyboardInterrupt as error:
-                with suppress(MotorbusError):
-                    error.add_note(f"stopped; {self.stand()}")
-                raise
             finally:
                 self._bar = Bar()
-
-    def stand(self) -> str:
-        """Where the axes are that can say so: `shoulder is at 12.5 deg, lift at 3.00 mm (estimated)`."""
-        places = self.robot.positions()
-        told = [f"{name} at {place(self.robot, name, at)}" for name, at in places.items()]
-        return f"now {', '.join(told)}"
 
     def heard(self, event: object) -> None:
         """An event of an operation on any of the buses."""
@@ -84,12 +74,13 @@ def robot(axes: Sequence[str], options: Mapping[str, str], output: Output) -> It
 
     Raises RequestError for what is wrong with file or options, and what opening raises.
     """
-    from motorbus.session.robot import Robot
+    from motorbus.cli.left import ToldRobot
 
     wanted = with_options(machine(), axes, options)
     hand = InHand(output)
     try:
-        with Robot.of(wanted, axes, report=hand.heard) as hand.robot:
+        with ToldRobot.of(wanted, axes, report=hand.heard) as robot:
+            robot.output, hand.robot = output, robot
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
                 output.note(f"note: {warning}")

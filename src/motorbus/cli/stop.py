@@ -10,7 +10,9 @@ from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_named, machine_file
 from motorbus.cli.output import Output
-from motorbus.errors import PortBusy
+from motorbus.cli.rough import forgiving
+from motorbus.cli.target import targets
+from motorbus.errors import RequestError
 
 app = App(
     name="stop",
@@ -20,9 +22,13 @@ stop whatever happens, and may sag, say `motorbus estop`. A stepper controller
 is told to end its project and to stop its motor; that both were accepted is
 all that is ever known of it.
 
-By the names of a machine file: an axis, a group, or a bus with whoever answers
-on it; with no name at all, every axis of the machine. Every bus is visited,
-whatever happens on another.
+By the names of a machine file: an axis, a group, or a bus, which means its
+axes and whoever else answers on it; with no name at all, every axis of the
+machine. Everyone is visited, whatever happens to another: who is silent, and a
+name that nobody knows, are told of with exit code 6.
+
+It cannot stop what another process moves, for a bus has one owner: Ctrl-C
+there, or SIGTERM to it, does; `motorbus estop` reaches it from any shell.
 
 Examples:
 
@@ -52,10 +58,28 @@ def stop(
     options
         Any option of the bus string, as a flag.
     """
-    wanted = devices or (tuple(axes_named(())) if machine_file().path else ())
-    try:
-        return each("stop", "stop", wanted, options, output, dry_run=dry_run)
-    except PortBusy as error:
-        # a port that a foreign program holds is out of reach for that, too
-        error.advice += "; `motorbus estop BUS` reaches it where a motorbus process holds it"
-        raise
+    with forgiving(devices, output):
+        wanted = devices or (tuple(axes_named(())) if machine_file().path else ())
+        known, unknown = _understood(wanted)
+        return each("stop", "stop", known, options, output, dry_run=dry_run, unknown=unknown)
+
+
+def _understood(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[RequestError]]:
+    """The words that mean a device, and the errors of the others: whoever is known is stopped all the same.
+
+    Raises RequestError when none means any.
+    """
+    errors: list[RequestError] = []
+    known: list[str] = []
+    for word in words:
+        try:
+            targets(word)
+        except RequestError as error:
+            errors.append(error)
+        else:
+            known.append(word)
+    if errors and not known:
+        raise errors[0]
+    for error in errors:
+        error.advice = error.advice.replace("nothing was sent", "the others were visited")
+    return tuple(known), errors

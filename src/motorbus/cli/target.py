@@ -85,15 +85,20 @@ def device(text: str) -> Target:
 
 
 def gathered(texts: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """Several targets by bus, in the order they were named, each node once. Raises RequestError for none."""
+    """Several targets by bus, in the order they were named, each node once; () for whom a whole bus was named.
+
+    Raises RequestError for none.
+    """
     found: dict[str, dict[int, None]] = {}
+    whole: set[str] = set()
     for one in (one for text in texts for one in targets(text)):
         found.setdefault(one.bus, {}).update(dict.fromkeys(one.nodes))
+        whole |= set() if one.nodes else {one.bus}
     if not found:
         raise RequestError(
             "which bus?", expected="BUS or BUS#ID, as feetech:/dev/ttyACM0#3, or a name of the machine file"
         )
-    return {bus: tuple(nodes) for bus, nodes in found.items()}
+    return {bus: () if bus in whole else tuple(nodes) for bus, nodes in found.items()}
 
 
 @contextmanager

@@ -157,6 +157,11 @@ class Timing(Protocol):
         Raises Interrupted when somebody cannot take part.
         """
 
+    def fails(self, error: BaseException) -> None:
+        """It does not begin, or has not come to its end, for this error: to be said at once, before cleaning up, so
+        that the others do not go on meanwhile.
+        """
+
 
 class Turned(NamedTuple):
     """A movement that a device made by its own profile: all *estimated*, for nothing told of it.

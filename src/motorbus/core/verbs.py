@@ -7,6 +7,7 @@ classes over one list. What is a method here is always I/O; nothing that costs a
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.operation import Runnable
@@ -41,12 +42,27 @@ class Awaiting:
         self.bus = bus
 
 
+def dressed(
+    call: Callable[P, T], name: str, function: Callable[..., object], owner: object
+) -> Callable[P, T]:
+    """A method that shows its name, what its function says of itself, and what it takes, without the first of it."""
+    call.__name__ = name
+    call.__qualname__ = f"{type(owner).__name__}.{name}"
+    call.__doc__ = function.__doc__
+    call.__wrapped__ = partial(function, owner)  # type: ignore[attr-defined]
+    return call
+
+
 class verb(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a driver function: blocking on a `Blocking` device, awaitable on an `Awaiting` one."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
         self.function = function
+        self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
 
     @overload
     def __get__(self, device: None, owner: type) -> Self: ...
@@ -62,5 +78,4 @@ class verb(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
         def call(*args: P.args, **kwargs: P.kwargs) -> Any:
             return device.bus.run(function(device, *args, **kwargs))
 
-        call.__doc__ = self.__doc__
-        return call
+        return dressed(call, self.name, function, device)

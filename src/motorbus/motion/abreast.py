@@ -11,6 +11,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.operation import Runnable
+from motorbus.core.verbs import dressed
 from motorbus.errors import MotorbusError
 
 P = ParamSpec("P")
@@ -56,7 +57,11 @@ class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verb
 
     def __init__(self, function: Callable[Concatenate[Any, P], Abreast[T]]) -> None:
         self.function = function
+        self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
 
     @overload
     def __get__(self, machine: None, owner: type) -> Self: ...
@@ -72,8 +77,7 @@ class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verb
         def call(*args: P.args, **kwargs: P.kwargs) -> Any:
             return machine.conductor.run(function(machine, *args, **kwargs))
 
-        call.__doc__ = self.__doc__
-        return call
+        return dressed(call, self.name, function, machine)
 
 
 def settled(results: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
 from motorbus.core.family import State
 from motorbus.core.operation import Operation, Runnable
 from motorbus.core.verbs import verb
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.machine import AxisSpec
-from motorbus.motion.reckoning import Reckoning, checked_place, is_reckoned
+from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
+from motorbus.motion.several import named, names
 
 if TYPE_CHECKING:
     from enum import Enum
@@ -30,13 +32,31 @@ ESTIMATED: Final = "estimated"
 """Which of these is among the capabilities of an axis says whether its position is measured or reckoned."""
 
 
+def _telling(
+    function: Callable[Concatenate[Any, P], Runnable[T]],
+) -> Callable[Concatenate[Any, P], Runnable[T]]:
+    """The same, whose errors name the axis that they befell."""
+
+    @wraps(function)
+    def told(axis: Any, /, *args: P.args, **kwargs: P.kwargs) -> Operation[T]:
+        try:
+            return (yield from function(axis, *args, **kwargs))
+        except MotorbusError as error:
+            found = error if names(error, axis.name) else named(axis.name, error)
+            if found is error:
+                raise
+            raise found from error
+
+    return told
+
+
 class ability(verb[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """A verb that an axis has only if its device has one of the capabilities that it `needs`, one or several names."""
 
     def __init__(
         self, needs: str | tuple[str, ...], function: Callable[Concatenate[Any, P], Runnable[T]]
     ) -> None:
-        super().__init__(function)
+        super().__init__(_telling(function))
         self.needs = (needs,) if isinstance(needs, str) else needs
 
     def there(self, axis: AxisVerbs) -> bool:
@@ -44,9 +64,6 @@ class ability(verb[P, T]):  # noqa: N801 - reads as a word in a list of verbs
         return any(one in axis.able for one in self.needs)
 
     if not TYPE_CHECKING:
-
-        def __set_name__(self, owner: type, name: str) -> None:
-            self.name = name
 
         def __get__(self, axis: Any, owner: type) -> Any:
             if axis is not None and not self.there(axis):
@@ -88,7 +105,7 @@ class AxisVerbs:
         self.engaged = False
         self.under_way = False
         self.orders = 0
-        self._before = (False, False)
+        self._movement: Movement | None = None
         self.recognised(able)
 
     def recognised(self, able: Able, model: str = "") -> None:
@@ -102,16 +119,22 @@ class AxisVerbs:
     @property
     def capabilities(self) -> frozenset[str]:
         """The names of its verbs, and `feedback` where its device measures its position, else `estimated`."""
-        verbs = {
-            name
-            for kind in type(self).__mro__
-            for name, one in vars(kind).items()
-            if isinstance(one, ability) and one.there(self)
-        }
+        verbs = {name for name, one in self._verbs().items() if one.there(self)}
         tells = (
             {FEEDBACK} if "position" in self.able else {ESTIMATED} if self.reckoning is not None else set()
         )
         return frozenset(verbs | tells)
+
+    def _verbs(self) -> dict[str, ability[..., Any]]:
+        """All that an axis may have."""
+        kinds = [vars(kind) for kind in type(self).__mro__]
+        return {name: one for kind in kinds for name, one in kind.items() if isinstance(one, ability)}
+
+    def __dir__(self) -> list[str]:
+        absent = {name for name, one in self._verbs().items() if not one.there(self)}
+        if self.reckoning is None:
+            absent.add("declare")
+        return sorted(set(super().__dir__()) - absent)
 
     @property
     def estimated(self) -> float | None:
@@ -119,12 +142,19 @@ class AxisVerbs:
         return None if self.reckoning is None else self.reckoning.position
 
     def _declare(self, position: float) -> None:
+        assert self.reckoning is not None
+        place = checked_place(self.name, position)
+        if self._moved():
+            raise _is_moving(self.name)
         if self.under_way:
             raise RequestError(
-                f"{self.name} is moving", expected="an axis at rest", advice="wait for it, or stop it first"
+                f"{self.name}: nobody knows that it rests",
+                expected="an axis at rest",
+                cause="a movement of it did not come to its end",
+                advice="stop it first; nothing was sent",
             )
-        assert self.reckoning is not None
-        self.reckoning.declare(checked_place(self.name, position))
+        self.orders += 1
+        self.reckoning.declare(place)
 
     if TYPE_CHECKING:
 
@@ -145,30 +175,74 @@ class AxisVerbs:
 
     # -- what movements tell -------------------------------------------------------------------------------------------
 
-    def departs(self) -> None:
-        """A movement begins from here. Where the position is reckoned it is not known until `arrives`."""
+    def departs(self, movement: Movement | None = None) -> None:
+        """A movement begins from here; whoever says later how it ended gives it here, and back then.
+
+        Where the position is reckoned it is not known until `arrives`. Raises as `refuse_under_way`.
+        """
+        self.refuse_under_way()
         self.orders += 1
-        self._before = self.engaged, self.under_way
+        begun = Movement(accounted=False) if movement is None else movement
+        begun.engaged, begun.under_way = self.engaged, self.under_way
+        if self.reckoning is not None:
+            begun.place = (self.reckoning.position, self.reckoning.why)
+        self._movement = begun
         self.engaged = self.under_way = True
         if self.reckoning is not None:
-            self.reckoning.depart()
+            begun.place = self.reckoning.depart()
 
-    def arrives(self, way: float | None = None) -> None:
-        """The movement came to its end; on a reckoned axis after so much `way` (rad, m, with its sign)."""
-        self.under_way = False
-        if self.reckoning is not None and way is not None:
-            self.reckoning.arrive(way)
+    def refuse_under_way(self) -> None:
+        """Raise RequestError while a movement of a reckoned axis goes on: nobody knows from where another would begin.
 
-    def stays(self) -> None:
+        Once the axis has accepted a stop the next one may begin, and nobody knows where it is then.
+        """
+        if self._moved() and self._movement is not None and not self._movement.stopped:
+            raise _is_moving(self.name)
+
+    def arrives(self, movement: Movement | None = None, place: Place | None = None) -> None:
+        """The movement came to its end; a reckoned axis is at this `place` now."""
+        if movement is None or movement is self._movement:
+            if self.reckoning is not None and place is not None:
+                self.reckoning.arrive(place)
+            self.under_way = False
+            self._movement = None
+
+    def stays(self, movement: Movement | None = None) -> None:
         """The movement was refused before anything was sent: all is as it was."""
-        self.engaged, self.under_way = self._before
-        if self.reckoning is not None:
-            self.reckoning.stay()
+        before = self._movement
+        if before is not None and movement in (None, before):
+            if self.reckoning is not None:
+                self.reckoning.arrive(before.place)
+            self.engaged, self.under_way = before.engaged, before.under_way
+            self._movement = None
 
-    def fails(self, why: str) -> None:
-        """The movement ended otherwise: it may be moving still, and where a reckoned axis is is not known."""
-        if self.reckoning is not None:
-            self.reckoning.forget(why)
+    def fails(self, why: str, movement: Movement | None = None) -> None:
+        """The movement ended otherwise: unless stopped it may go on, and nobody knows where a reckoned axis is."""
+        if movement is None or movement is self._movement:
+            if self.reckoning is not None:
+                self.reckoning.forget(why)
+            self.under_way = self.under_way and not (movement is not None and movement.stopped)
+            self._movement = None
+
+    def stopped(self) -> None:
+        """It accepted a stop. Whoever moves a reckoned axis says when that has come to its end."""
+        if self._movement is not None and self._moved():
+            self._movement.stopped = True
+        else:
+            self.under_way = False
+
+    def _moved(self) -> bool:
+        """Whether somebody moves it, and is going to say how far a reckoned axis went."""
+        return self.reckoning is not None and self._movement is not None and self._movement.accounted
+
+
+def _is_moving(name: str) -> RequestError:
+    return RequestError(
+        f"{name} is moving",
+        expected="an axis at rest",
+        cause="where it is is reckoned from the end of one movement to the end of the next",
+        advice="wait for it, or stop it first; nothing was sent",
+    )
 
 
 # -- what it tells -------------------------------------------------------------------------------------------------
@@ -255,7 +329,7 @@ def stop(axis: AxisVerbs) -> Operation[Enum]:
     """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
     axis.orders += 1
     promise: Enum = yield from axis.able["stop"](axis.device)
-    axis.under_way = False
+    axis.stopped()
     return promise
 
 
@@ -263,6 +337,6 @@ def hold(axis: AxisVerbs) -> Operation[None]:
     """Stay here, with torque: torque on without a jump where there is a switch for it, else a stop."""
     if "enable_torque" in axis.able:
         yield from enable_torque(axis)
+        axis.under_way = False
     else:
         yield from stop(axis)
-    axis.under_way = False

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from motorbus.bus.face import BusFace
+from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.machine import Machine
@@ -17,14 +18,23 @@ from motorbus.motion.machine import Machine
 class Body:
     """`machine` as its file says; `buses` that are open, and the `axes` on them, by their names.
 
-    The clock of the robot is at 0 when this is made; `origins` says what the clock of each bus showed then (s).
+    The clock of the robot is at 0 when this is made; `origins` says what the clock of each bus showed then (s), or
+    shows when an earlier one is to go on.
     """
 
-    def __init__(self, machine: Machine, buses: Mapping[str, BusFace], axes: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        buses: Mapping[str, BusFace],
+        axes: Mapping[str, Any],
+        origins: Mapping[str, float] | None = None,
+    ) -> None:
         self.machine: Final = machine
         self.buses: Final = buses
-        self.axes: Final = axes
-        self.origins: Final = {name: bus.link.now() for name, bus in buses.items()}
+        self.axes = axes
+        self.origins: Final[Mapping[str, float]] = (
+            {name: bus.link.now() for name, bus in buses.items()} if origins is None else origins
+        )
 
     def chosen(self, names: str | Iterable[str] | None = None) -> dict[str, Any]:
         """The axes that these names of axes, groups and buses stand for, each once; None: all that are open.
@@ -33,8 +43,7 @@ class Body:
         """
         if names is None:
             return dict(self.axes)
-        wanted = (names,) if isinstance(names, str) else tuple(names)
-        found = dict.fromkeys(axis for name in wanted for axis in self.machine.axes_of(name))
+        found = dict.fromkeys(axis for name in named(names) for axis in self.machine.axes_of(name))
         for name in found:
             if name not in self.axes:
                 raise RequestError(
@@ -46,6 +55,7 @@ class Body:
 
     def axis(self, name: str) -> Any:
         """The axis of this name. Raises RequestError when the machine has none, or it was not opened."""
+        (name,) = named([name])
         if name in self.axes:
             return self.axes[name]
         found = self.chosen(name)
@@ -61,3 +71,19 @@ class Body:
         for axis in axes.values():
             found[axis.spec.bus].append(axis)
         return {name: ones for name, ones in found.items() if ones}
+
+
+def named(names: str | Iterable[str]) -> tuple[str, ...]:
+    """One name or several. Raises RequestError for none, and for what is no name."""
+    found: tuple[object, ...] = (
+        tuple(names) if isinstance(names, Iterable) and not isinstance(names, str) else (names,)
+    )
+    words = tuple(name for name in found if isinstance(name, str))
+    if not words or len(words) < len(found):
+        wrong = next((name for name in found if not isinstance(name, str)), None)
+        raise RequestError(
+            f"{shown(wrong)} is not a name" if found else "no axis is named",
+            expected="names of axes, groups or buses",
+            advice="leave them out for all axes; nothing was sent",
+        )
+    return words

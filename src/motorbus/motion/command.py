@@ -7,17 +7,33 @@ which it leaves, whether the command is still with those who made it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Generator, Iterable
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from motorbus.core.operation import Exchange, Operation, Stops, Together, outcome
+from motorbus.core.operation import (
+    Alone,
+    Effect,
+    Exchange,
+    Operation,
+    Rank,
+    Refusal,
+    Runnable,
+    Step,
+    Stops,
+    Together,
+    outcome,
+)
 from motorbus.errors import Interrupted, MotorbusError
 
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.reckoning import Movement
 
 T = TypeVar("T")
-_COPIED = ("lane", "rank", "effect", "goals", "timeout", "repeatable", "tells_position")
+
+GUARDED: Final = frozenset({Effect.TORQUE, Effect.MOTION})
+"""What an exchange does to the world that nobody may do any more once the command is lost."""
 
 
 class Command:
@@ -28,18 +44,29 @@ class Command:
 
     def __init__(self, axes: Iterable[AxisVerbs]) -> None:
         self.axes = tuple(axes)
-        self._orders: dict[str, int] = {}
+        self._known = self.axes[0].bus.turns.known if self.axes else None
+        self._stopping = self._stopped_by_now()
         self._stops = {axis.name: _stops(axis) for axis in self.axes}
+        self._orders: dict[str, int] = {}
+        self._counts: tuple[tuple[AxisVerbs, int], ...] = ()
         self._count()
 
     def _count(self) -> None:
         self._orders = {axis.name: axis.orders for axis in self.axes}
+        self._counts = tuple((axis, axis.orders) for axis in self.axes)
 
-    def depart(self) -> None:
-        """A movement begins: from here on it is known that they move. Raises Interrupted as `check`."""
+    def _stopped_by_now(self) -> int:
+        """How many stops have left on the bus, for whomever: while there are no more, nobody has to be looked at."""
+        return 0 if self._known is None else self._known.stopping
+
+    def depart(self, movement: Movement | None = None) -> None:
+        """A movement begins: from here on it is known that they move. Raises Interrupted as `check`.
+
+        Of an axis that is reckoned a `movement` is kept account of: `AxisVerbs.departs`.
+        """
         self.check()
         for axis in self.axes:
-            axis.departs()
+            axis.departs(movement)
         self._count()
 
     def held(self) -> list[AxisVerbs]:
@@ -55,41 +82,102 @@ class Command:
 
     def lost(self) -> MotorbusError | None:
         """The error for an axis that somebody else has told something since; None when there is none."""
+        stopping = self._stopped_by_now()
+        if stopping == self._stopping:
+            for axis, orders in self._counts:
+                if axis.orders != orders:
+                    return _lost(axis)
+            return None
         for axis in self.axes:
             if axis.orders != self._orders[axis.name] or self._stopped(axis):
-                return Interrupted(
-                    f"{axis.name}: the movement was ended by another order",
-                    cause="it was stopped, let go or told to move from elsewhere",
-                    advice="the others of the movement were stopped; give the order again if it is still wanted",
-                    node=axis.spec.node,
-                )
+                return _lost(axis)
+        self._stopping = stopping  # those were for others
         return None
 
     def guarded(self, exchange: Exchange[T]) -> Exchange[T]:
         """The same exchange, which does not leave once the command is lost."""
-        own = exchange.refusal
+        own, other = exchange.refusal, exchange.other
+        return Exchange(
+            exchange.request,
+            exchange.replies,
+            exchange.read,
+            lane=exchange.lane,
+            rank=exchange.rank,
+            effect=exchange.effect,
+            goals=exchange.goals,
+            timeout=exchange.timeout,
+            repeatable=exchange.repeatable,
+            tells_position=exchange.tells_position,
+            refusal=self._refusal if own is None else partial(self._either, own),
+            other=None if other is None else lambda: self.guarded(other()),
+        )
 
-        def refusal(stops: Stops) -> MotorbusError | None:
-            return (own(stops) if own is not None else None) or self.lost()
+    def _refusal(self, _: Stops) -> MotorbusError | None:
+        return self.lost()
 
-        rest: dict[str, Any] = {name: getattr(exchange, name) for name in _COPIED}
-        if (other := exchange.other) is not None:
-            rest["other"] = lambda: self.guarded(other())
-        return Exchange(exchange.request, exchange.replies, exchange.read, refusal=refusal, **rest)
+    def _either(self, own: Refusal, stops: Stops) -> MotorbusError | None:
+        return own(stops) or self.lost()
 
-    def stop(self) -> Operation[dict[str, MotorbusError]]:
-        """Stop those that nobody else has told anything since; gives the error of each that did not accept, by name."""
-        axes = self.held()
+    def watched(self, operation: Runnable[T]) -> Operation[T]:
+        """The same operation, of which nothing that moves or gives torque leaves once the command is lost.
+
+        It is for what takes several exchanges, as getting ready does: whoever lets an axis go in the middle of that
+        must find it limp afterwards. Each such exchange is `guarded`, also those that are said together or alone; what
+        stops or lets go (`Rank.STOP`) always leaves. Raises Interrupted in the place of an exchange that did not leave.
+        """
+        steps: Generator[Step, Any, T] = iter(operation)
+        advance: Callable[[], Step] = partial(next, steps)
+        try:
+            while True:
+                try:
+                    step = advance()
+                except StopIteration as end:
+                    value: T = end.value
+                    return value
+                try:
+                    advance = partial(steps.send, (yield from self._watching(step)))
+                except GeneratorExit:
+                    raise
+                except BaseException as error:
+                    advance = partial(steps.throw, error)
+        finally:
+            steps.close()
+
+    def _watching(self, step: Step) -> Step:
+        if isinstance(step, Exchange):
+            return self.guarded(step) if step.effect in GUARDED and step.rank is not Rank.STOP else step
+        if isinstance(step, Together):
+            return Together([self.watched(one) for one in step.operations])
+        if isinstance(step, Alone):
+            return Alone(self.watched(step.operation))
+        return step
+
+    def stop(self, *, anew: bool = False) -> Operation[dict[str, MotorbusError]]:
+        """Stop those that nobody else has told anything since; gives the error of each that did not accept, by name.
+
+        With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
+        """
+        axes = [axis for axis, orders in self._counts if axis.orders == orders] if anew else self.held()
         ended = yield from Together([outcome(axis.able["stop"](axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)
         }
         for axis in axes:
-            axis.under_way = axis.under_way and axis.name in errors
+            if axis.name not in errors:
+                axis.stopped()
         return errors
 
     def _stopped(self, axis: AxisVerbs) -> bool:
         return _stops(axis) != self._stops[axis.name]
+
+
+def _lost(axis: AxisVerbs) -> Interrupted:
+    return Interrupted(
+        f"{axis.name}: the movement was ended by another order",
+        cause="it was stopped, let go or told to move from elsewhere",
+        advice="the others of the movement were stopped; give the order again if it is still wanted",
+        node=axis.spec.node,
+    )
 
 
 def _stops(axis: AxisVerbs) -> int:

@@ -52,6 +52,11 @@ class Journey:
         self._facts: Final = Meeting[Mapping[str, Fact]](self._parties)
         self._beat: Final = Beat(self._parties)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its axes."""
+        return tuple(self._axes)
+
     # -- as work on buses ----------------------------------------------------------------------------------------------
 
     def abreast(self) -> Abreast[Moved]:

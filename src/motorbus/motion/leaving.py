@@ -2,8 +2,10 @@
 
 Only axes that were given torque or moved from here are concerned, and each does what the machine file says of it. What
 moves is stopped first, whatever happens to some; then what is to be limp lets go; parking comes last, for it takes its
-time. An interruption while this goes on takes the parking away and nothing else. Blocking and async robots carry out
-the same steps, so they are said as what comes next.
+time. An interruption while this goes on takes the parking away; stops and letting go are gone on with. What it cuts off
+on a bus has its clean-up there, and that a further one cuts short too: a device whose settings were borrowed for a
+movement may keep them until `recover`. Blocking and async robots carry out the same steps, so they are said as what
+comes next.
 """
 
 from __future__ import annotations
@@ -80,7 +82,7 @@ class Leaving:
         latched = [name for name in moving if self._latched(name)]
         if latched and not self._tries:
             self.said.append(
-                f"{', '.join(latched)}: nothing was sent, for the emergency stop is still in force"
+                f"{', '.join(latched)}: not stopped once more, for the emergency stop is still in force"
             )
         return [name for name in moving if name not in latched]
 

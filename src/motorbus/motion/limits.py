@@ -12,6 +12,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from motorbus.core import units
+from motorbus.core.entry import shown
 from motorbus.core.operation import Operation
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.machine import AxisSpec
@@ -56,8 +57,20 @@ def bounds(spec: AxisSpec, device: Device = None) -> Bounds:
     return Bounds(max(low, ends[0]), min(high, ends[1]), "the device" if soft else "the axis and its device")
 
 
+def check_number(what: str, value: object) -> None:
+    """Raise RequestError for what is no number at all: text, None, True. One of another library is a number."""
+    try:
+        if not isinstance(value, bool | str | bytes):
+            float(value)  # type: ignore[arg-type]
+            return
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise RequestError(f"{what} is {shown(value)}", expected="a number", advice=NOTHING)
+
+
 def check_finite(name: str, what: str, value: float) -> None:
-    """Raise LimitExceeded unless it is a finite number."""
+    """Raise RequestError for what is no number, LimitExceeded for one that is not finite."""
+    check_number(f"{name}: its {what}", value)
     if not isfinite(value):
         raise LimitExceeded(
             f"{name}: its {what} is {value}", expected="a finite number", advice=f"give a number; {NOTHING}"
@@ -125,7 +138,10 @@ def limits_for(
     check_speed(speed)
     own = Limits.of(spec)
     for what, figure in (("velocity", velocity), ("acceleration", acceleration)):
-        if figure is not None and not figure > 0:
+        if figure is None:
+            continue
+        check_number(f"{name}: {what}", figure)
+        if not figure > 0:
             raise RequestError(f"{name}: {what} is {figure}", expected="a number above 0", advice=NOTHING)
     if velocity is not None:
         check_velocity(name, spec, velocity)
@@ -139,6 +155,7 @@ def limits_for(
 
 def check_speed(speed: float) -> None:
     """Raise RequestError unless it is a share of what is allowed: above 0, at most 1."""
+    check_number("speed", speed)
     if not 0 < speed <= 1:
         raise RequestError(f"speed is {speed}", expected="above 0, at most 1", advice=NOTHING)
 

@@ -130,12 +130,12 @@ class Loop(LoopFace):
     ) -> None:
         super().__init__(body, rate, axes, exactly=True, **how)
         self._conductor = conductor
-        self._only: Bus | None = None
 
     def __enter__(self) -> Self:
         _carried(self._rounds.entering(), self._run)
         buses = [part.bus for part in self._rounds.parts.values()]
-        self._only = buses[0] if len(buses) == 1 and isinstance(buses[0], Bus) else None
+        if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
+            self._rounds.only = buses[0]
         return self
 
     def __iter__(self) -> Self:
@@ -152,11 +152,12 @@ class Loop(LoopFace):
 
     def _run(self, work: Abreast[Any]) -> Any:
         """On the only bus there is by the short way, else by the conductor."""
-        if self._only is None or self._rounds.parts_abreast:
+        only = self._rounds.only
+        if only is None:
             return self._conductor.run(work)
         ((bus, operation),) = work.operations.items()
         try:
-            found = straight(self._only, operation)  # type: ignore[arg-type]  # the work of a loop are generators
+            found = straight(only, operation)  # type: ignore[arg-type]  # the work of a loop are generators
         except MotorbusError as failure:
             found = failure
         return work.combine({bus: found})

@@ -102,3 +102,9 @@ class Seat:
         moment = max(ready.values()) + NOTICE + self._origin
         yield from Pause(max(0.0, moment - lead - (yield from Pause(0))))
         return moment
+
+    def fails(self, error: BaseException) -> None:
+        """See `core.family.Timing`. Those who have begun already see to that themselves."""
+        self._beat.fail(
+            error if isinstance(error, MotorbusError) else Interrupted(str(error) or type(error).__name__)
+        )

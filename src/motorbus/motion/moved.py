@@ -56,9 +56,10 @@ class Track(NamedTuple):
 class Arrived(NamedTuple):
     """One axis: its `goal` and where it is at `present` (rad, m), `estimated` or measured.
 
-    `started` and `ended` are s after the common start: when the order left that set it moving, and when it was first
-    seen where it rests; both 0 where it had no way to go. Of an axis that is estimated, when its own profile began and
-    ended.
+    `started` and `ended` are s after the common start: when the order was gone that set it moving, acknowledged where
+    that is done, and when it was first seen where it rests; both 0 where it had less than two of its counts to go. A
+    servo may think before it moves: nobody sees when it does. Of an axis that is estimated, when its own profile began
+    and ended. `stood` is where it was before (rad, m).
     """
 
     goal: float
@@ -66,6 +67,7 @@ class Arrived(NamedTuple):
     estimated: bool
     started: float
     ended: float
+    stood: float
 
 
 class Cycles(NamedTuple):
@@ -96,7 +98,7 @@ class Moved:
 
     @property
     def started_apart(self) -> float:
-        """s between the first start and the last, of those that had a way to go."""
+        """s between the first order and the last that set one moving, of those that had a way to go."""
         return _apart([one.started for one in self._moved()])
 
     @property
@@ -116,9 +118,7 @@ class Moved:
         count = f"{len(self.axes)} {'axis' if len(self.axes) == 1 else 'axes'}"
         text = f"{count} moved in {self.duration:.3f} s"
         if len(self.axes) > 1:
-            text += (
-                f", started within {_shown(self.started_apart)} and ended within {_shown(self.ended_apart)}"
-            )
+            text += f", orders left within {_shown(self.started_apart)} and ended within {_shown(self.ended_apart)}"
         skipped = sum(one.skipped for one in self.cycles.values())
         if skipped:
             text += f"; {skipped} {'slot was' if skipped == 1 else 'slots were'} skipped"

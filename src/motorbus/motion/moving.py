@@ -6,16 +6,18 @@ raise what is wrong with them before anything is sent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from math import copysign, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
+from motorbus.core.entry import shown
 from motorbus.core.operation import Operation, outcome
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.journey import Journey
-from motorbus.motion.moved import Moved
+from motorbus.motion.moved import Arrived, Moved
 from motorbus.motion.plan import Fact, Planned
 from motorbus.motion.profile import Kind, Limiting, Limits, Move, Profile, Synchronised, synchronised
 from motorbus.motion.profile.shapes import NOTHING
@@ -87,7 +89,8 @@ class PointToPoint(NamedTuple):
         whole = synchronised(moves, kind=self.kind, duration=duration)
         grains = {name: facts[name].grain / abs(axis.spec.ratio) for name, axis in self.axes.items()}
         speeds = {name: profile.peak for name, profile in whole.profiles.items()}
-        return Planned(Crisp(whole, grains), goals, speeds, self.limits, whole.limited_by)
+        ways = {name: abs(move.goal - move.start) for name, move in moves.items()}
+        return Planned(Crisp(whole, grains), goals, ways, speeds, self.limits, whole.limited_by)
 
 
 class Along(NamedTuple):
@@ -102,9 +105,30 @@ class Along(NamedTuple):
         specs = {name: axis.spec for name, axis in self.axes.items()}
         limits.check_course(self.trajectory, specs, {name: fact.device for name, fact in facts.items()})
         own = {name: Limits.of(spec) for name, spec in specs.items()}
-        goals = {name: places[-1] for name, places in self.trajectory.axes.items()}
-        speeds = {name: one.velocity for name, one in own.items()}
-        return Planned(self.trajectory, goals, speeds, own, Limiting("", "duration"))
+        samples = self.trajectory.axes
+        goals = {name: places[-1] for name, places in samples.items()}
+        ways = {name: max(places) - min(places) for name, places in samples.items()}
+        speeds = {name: _peak(self.trajectory.times, places) for name, places in samples.items()}
+        return Planned(self.trajectory, goals, ways, speeds, own, Limiting("", "duration"))
+
+
+class Approach(NamedTuple):
+    """To where a trajectory begins. All of that is judged before anybody goes there. See `journey.Plan`."""
+
+    way: PointToPoint
+    then: Along
+    asked: float | None = None
+
+    def planned(self, facts: Mapping[str, Fact], duration: float | None = None) -> Planned:
+        """The movement to its beginning; raises LimitExceeded as either of the two does."""
+        self.then.planned(facts)
+        return self.way.planned(facts, duration)
+
+
+def _peak(times: Sequence[float], places: Sequence[float]) -> float:
+    """The highest speed between two samples (rad/s, m/s)."""
+    ways = zip(pairwise(places), pairwise(times), strict=True)
+    return max(abs(there - here) / (later - at) for (here, there), (at, later) in ways)
 
 
 # -- several axes ------------------------------------------------------------------------------------------------------
@@ -180,7 +204,8 @@ def replay(
     point only. Raises LimitExceeded for the first sample that goes beyond a limit; else as `move`.
     """
     plan, first = _replayed(body, trajectory, speed)
-    approach = Journey(*_moving(body, first, None, "trapezoid", min(speed, 1.0)))
+    axes, way, origins = _moving(body, first, None, "trapezoid", min(speed, 1.0))
+    approach = Journey(axes, Approach(way, plan), origins, rate)
     journey = Journey(plan.axes, plan, body.origins, rate)
     buses = dict.fromkeys(axis.spec.bus for axis in plan.axes.values())
 
@@ -189,6 +214,7 @@ def replay(
             yield from approach.on(bus)
         except BaseException as error:
             journey.fail(approach.fate.failure or error)
+            journey.unstopped.update(approach.unstopped)
             raise
         return list((yield from journey.on(bus)))
 
@@ -199,6 +225,10 @@ def _moving(
     body: Body, goals: Mapping[str, float], duration: float | None, kind: Kind, speed: float
 ) -> tuple[Mapping[str, AxisVerbs], PointToPoint, Mapping[str, float]]:
     """What a journey to these goals is made of, as far as it can be judged without asking anybody."""
+    if not isinstance(goals, Mapping):
+        raise RequestError(
+            f"{shown(goals)} is not a mapping of goals", expected='as {"shoulder": 0.5}', advice=NOTHING
+        )
     if not goals:
         raise RequestError("no axis is named", expected="a goal for one or more", advice=NOTHING)
     axes = {name: body.axis(name) for name in goals}
@@ -215,6 +245,7 @@ def _moving(
 
 def _replayed(body: Body, course: Course, speed: float) -> tuple[Along, dict[str, float]]:
     """What a replay is made of, and where it begins."""
+    limits.check_number("speed", speed)
     if not (isfinite(speed) and speed > 0):
         raise RequestError(f"speed is {speed}", expected="a finite number above 0", advice=NOTHING)
     trajectory = course if isinstance(course, Trajectory) else sampled(course, USUAL)
@@ -262,7 +293,7 @@ def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Op
         return (yield from reckoning.move_by(axis, way, velocity=velocity))
     limits.check_finite(axis.name, "way", way)
     own = limits.limits_for(axis.name, axis.spec, velocity=velocity)
-    return _way((yield from _alone(axis, _by(way), own)), axis.name)
+    return _gone((yield from _alone(axis, _by(way), own)).axes[axis.name])
 
 
 def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
@@ -274,6 +305,7 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
     if "train" not in axis.able:
         return (yield from reckoning.jog(axis, velocity, seconds))
     limits.check_velocity(axis.name, axis.spec, velocity)
+    limits.check_number(f"{axis.name}: its seconds", seconds)
     if not (isfinite(seconds) and seconds > 0) or not velocity:
         raise RequestError(
             f"{axis.name}: {velocity} for {seconds} s is no jog",
@@ -283,7 +315,7 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
     own = limits.limits_for(axis.name, axis.spec, velocity=abs(velocity))
     ramp = min(own.velocity / own.acceleration, seconds / 2)
     way = copysign(own.acceleration * ramp * (seconds - ramp), velocity)
-    return _way((yield from _alone(axis, _by(way), own)), axis.name)
+    return _gone((yield from _alone(axis, _by(way), own)).axes[axis.name])
 
 
 def _alone(
@@ -297,10 +329,9 @@ def _alone(
     return journey.combine({axis.spec.bus: told})
 
 
-def _way(moved: Moved, name: str) -> float:
+def _gone(arrived: Arrived) -> float:
     """How far it has gone (rad, m)."""
-    presents = moved.tracks[name].presents
-    return moved.axes[name].present - presents[0] if presents else 0.0
+    return arrived.present - arrived.stood
 
 
 def _to(goal: float) -> Callable[[float], float]:
@@ -314,5 +345,8 @@ def _by(way: float) -> Callable[[float], float]:
 def _check(kind: Kind, duration: float | None) -> None:
     if kind not in KINDS:
         raise RequestError(f"{kind!r} is no kind of profile", expected=" or ".join(KINDS), advice=NOTHING)
-    if duration is not None and not (isfinite(duration) and duration > 0):
+    if duration is None:
+        return
+    limits.check_number("duration", duration)
+    if not (isfinite(duration) and duration > 0):
         raise RequestError(f"duration is {duration}", expected="a finite number of s above 0", advice=NOTHING)

@@ -6,6 +6,7 @@ Both go through the same steps, and both end in one of two ways: all of it has a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from inspect import GEN_CLOSED, getgeneratorstate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions, Turned
@@ -16,8 +17,9 @@ from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moved import STILL, Arrived, Track
 from motorbus.motion.plan import Fact, Gone, Planned
-from motorbus.motion.profile.shapes import NOTHING
-from motorbus.motion.stream import LOST, SHOWN, Stream, Streamed, grains, rate_for
+from motorbus.motion.reckoning import Movement, cut_short
+from motorbus.motion.several import named, names
+from motorbus.motion.stream import LOST, SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
@@ -34,30 +36,54 @@ TRIES: Final = 3
 """How often all are asked where they are before one that has said nothing is taken for silent."""
 NO_WAY: Final = 1e-9
 """rad or m; an axis that has less to go stays where it is."""
+STEPS: Final = 2
+"""How many of its smallest steps an axis has to go at least for its beginning and its end to count."""
+NEAR: Final = 3
+"""Its smallest steps; so near to its goal no axis need come."""
 
 
 def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
     """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
-    yield from afterwards(_failing(journey, work.run()), lambda: _ended(journey, work))
+    yield from afterwards(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
     assert work.gone is not None
     return work.gone
 
 
-def _failing(journey: Journey, work: Operation[None]) -> Operation[None]:
-    """Let the other parts know when this one fails."""
+def _failing(journey: Journey, axes: Sequence[AxisVerbs], work: Operation[None]) -> Operation[None]:
+    """Let the other parts know when this one fails; whose device it was is told by the name of the axis."""
     try:
         yield from work
+    except MotorbusError as error:
+        told = _told(journey, axes, error)
+        journey.fail(told)
+        if told is error:
+            raise
+        raise told from error
     except BaseException as error:
         journey.fail(error)
         raise
 
 
+def _told(journey: Journey, axes: Sequence[AxisVerbs], error: MotorbusError) -> MotorbusError:
+    """The same error, which names the axis that it befell, unless it names one of the movement already."""
+    failure = journey.fate.failure
+    if failure is not None and failure.__cause__ is error:  # told already; what was noted since belongs to it
+        failure.__notes__ = list(getattr(error, "__notes__", ()))
+        return failure
+    if failure is not None:
+        return error
+    if any(names(error, name) for name in journey.names):
+        return error
+    whose = [axis.name for axis in axes if len(axes) == 1 or axis.spec.node == error.node]
+    return named(whose[0], error) if whose else error
+
+
 def _ended(journey: Journey, work: LedPart | OwnPart) -> Operation[None]:
     """Stop what was begun and has not arrived."""
     if work.begun and work.gone is None:
-        journey.unstopped.update((yield from work.command.stop()))
+        journey.unstopped.update((yield from work.stop()))
 
 
 class LedPart:
@@ -71,6 +97,10 @@ class LedPart:
         self._party: Final = party
         self._axes: Final = axes
         self._bus: Final = axes[0].bus
+
+    def stop(self) -> Operation[dict[str, MotorbusError]]:
+        """See `Command.stop`."""
+        return (yield from self.command.stop())
 
     def run(self) -> Operation[None]:
         """See `part`."""
@@ -87,6 +117,7 @@ class LedPart:
             planned.course,
             rate=rate,
             speeds=planned.speeds,
+            within={axis.name: _within(axis, facts[axis.name], planned) for axis in axes},
             command=self.command,
             fate=journey.fate,
             reports=journey.reports(self._party),
@@ -96,7 +127,7 @@ class LedPart:
         streamed = yield from stream.run((yield from seat.start(lead)), lead)
         for axis in axes:
             axis.arrives()
-        arrived = {axis.name: _seen(axis, facts[axis.name].position, planned, streamed) for axis in axes}
+        arrived = {axis.name: _seen(axis, facts[axis.name], planned, streamed) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
 
     def _train(self) -> Operation[Any]:
@@ -115,7 +146,7 @@ class LedPart:
         angles = yield from self._angles(train)
         found = yield from Together([limits.of_device(axis) for axis in self._axes])
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
-        possible = {node: _within(angles[node], device) for node, device in devices.items()}
+        possible = {node: _inside(angles[node], device) for node, device in devices.items()}
         steps = grains(train, possible)
         facts = {
             axis.name: Fact(axis.spec.from_device(angles[node]), devices[node], steps[node])
@@ -144,6 +175,9 @@ class LedPart:
             _check_still(axis, facts[axis.name].position, axis.spec.from_device(angles[axis.spec.node]))
         self.command.depart()
         self.begun = True
+        yield from self.command.watched(self._begin(train))
+
+    def _begin(self, train: Any) -> Operation[None]:
         for axis in self._axes:
             yield from single.cap(axis)
         speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in self._axes}
@@ -159,16 +193,20 @@ class OwnPart:
         self._journey: Final = journey
         self._axis: Final = axis
         self._timing: Final = Kept(journey, party, axis)
-        self._over = False
 
     @property
     def begun(self) -> bool:
         """Whether it may have been told to move."""
         return self._timing.moment is not None
 
+    def stop(self) -> Operation[dict[str, MotorbusError]]:
+        """See `Command.stop`. Its driver has stopped it already, and tells nobody whether that was accepted."""
+        return (yield from self.command.stop(anew=self._axis.under_way))
+
     def run(self) -> Operation[None]:
         """See `part`."""
         axis, timing = self._axis, self._timing
+        axis.refuse_under_way()
         assert axis.reckoning is not None
         stood = axis.reckoning.known(axis.name)
         yield from timing.meet(stood)
@@ -178,14 +216,15 @@ class OwnPart:
             yield from timing.start(0.0)
             self.gone = self._stayed(stood)
             return
-        told = yield from Together([self._turned(way), self._watched()])
+        turned = self._turned(way)
+        told = yield from Together([turned, self._watched(turned)])
         assert told[0] is not None
         self.gone = self._arrived(stood, told[0])
 
     def _turned(self, way: float) -> Operation[Turned]:
-        axis, spec = self._axis, self._axis.spec
-        self.command.depart()
+        axis, spec, movement = self._axis, self._axis.spec, Movement()
         try:
+            self.command.depart(movement)
             turned: Turned = yield from axis.able["keep_time"](
                 axis.device,
                 way * spec.ratio,
@@ -193,22 +232,20 @@ class OwnPart:
                 velocity=abs(spec.rate_to_device(self._timing.planned.limits[axis.name].velocity)),
                 acceleration=abs(spec.rate_to_device(self._timing.planned.limits[axis.name].acceleration)),
             )
+            axis.arrives(movement, movement.after(turned.angle / spec.ratio))
         except BaseException as error:
             if self.begun:
-                axis.fails(f"a movement did not come to its end: {getattr(error, 'summary', error)}")
+                cut_short(axis, movement, error)
             else:
-                axis.stays()
+                axis.stays(movement)
             raise
-        finally:
-            self._over = True
-        axis.arrives(turned.angle / spec.ratio)
         return turned
 
-    def _watched(self) -> Operation[None]:
+    def _watched(self, turned: Operation[Turned]) -> Operation[None]:
         """While it is under way: stop it when another part fails, and tell how far all of it is."""
         journey, timing = self._journey, self._timing
         reported = -SHOWN
-        while not self._over:
+        while getgeneratorstate(turned) != GEN_CLOSED:  # however that came to its end
             now = yield from Pause(LOOK)
             if timing.moment is None:
                 continue
@@ -221,7 +258,7 @@ class OwnPart:
                 yield from Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
 
     def _stayed(self, stood: float) -> Gone:
-        arrived = Arrived(self._timing.planned.goals[self._axis.name], stood, True, 0.0, 0.0)
+        arrived = Arrived(self._timing.planned.goals[self._axis.name], stood, True, 0.0, 0.0, stood)
         return Gone({self._axis.name: arrived}, {self._axis.name: Track(estimated=True)})
 
     def _arrived(self, stood: float, turned: Turned) -> Gone:
@@ -230,7 +267,7 @@ class OwnPart:
         began = turned.start - timing.moment
         ended = began + turned.duration
         present = stood + turned.angle / axis.spec.ratio
-        arrived = Arrived(timing.planned.goals[axis.name], present, True, began, ended)
+        arrived = Arrived(timing.planned.goals[axis.name], present, True, began, ended, stood)
         count = int(max(ended, timing.duration) / DRAWN) + 1
         times = (*(number * DRAWN for number in range(count)), max(ended, timing.duration))
         goals = tuple(timing.planned.course.positions(at)[axis.name] for at in times)
@@ -249,29 +286,35 @@ class Kept:
         self.duration = 0.0
         self.moment: float | None = None
         self._journey: Final = journey
-        self._name: Final = axis.name
+        self._axis: Final = axis
         self._seat: Final[Seat] = journey.seat(party, axis.spec.bus)
         self._facts: Mapping[str, Fact] = {}
 
     def meet(self, position: float) -> Operation[None]:
         """Say where it stands (rad, m), and get to know what the movement shall be."""
-        self._facts = yield from self._journey.meet(self.party, {self._name: Fact(position)})
+        self._facts = yield from self._journey.meet(self.party, {self._axis.name: Fact(position)})
         self.planned = self._journey.outlined(self._facts)
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
         """See `core.family.Timing`."""
-        self._journey.check_asked(self._name, shortest)
+        self._journey.check_asked(self._axis.name, shortest)
         least = max(shortest, self.planned.course.duration)
         self.duration = yield from self._seat.agreed(least, lambda others: max(others, fitted(others)))
-        self._journey.needs[self._name] = max(shortest, fitted(least))
+        self._journey.needs[self._axis.name] = max(shortest, fitted(least))
         self.planned = self._journey.agreed(self._facts, self.duration)
         return self.duration
 
     def start(self, lead: float) -> Operation[float]:
         """See `core.family.Timing`."""
         moment = yield from self._seat.start(lead)
+        self._journey.fate.check()  # all were ready, and one of them may have been stopped since
         self.moment = moment
         return moment
+
+    def fails(self, error: BaseException) -> None:
+        """See `core.family.Timing`."""
+        told = _told(self._journey, [self._axis], error) if isinstance(error, MotorbusError) else error
+        self._journey.fail(told)
 
 
 def _any(duration: float) -> float:
@@ -286,28 +329,43 @@ def _check_still(axis: AxisVerbs, stood: float, stands: float) -> None:
             f"{axis.name} is moving: it was at {axis.spec.show(stood)}, and is at {axis.spec.show(stands)}",
             expected="an axis at rest, for a movement begins from rest",
             cause="another movement leads it, or it is moved by hand",
-            advice=f"wait for it, or stop it first; {NOTHING}",
+            advice="wait for it, or stop it first; nobody was moved, others of the movement may have torque by now",
             node=axis.spec.node,
         )
 
 
-def _within(angle: float, device: limits.Device) -> float:
+def _inside(angle: float, device: limits.Device) -> float:
     """An angle (rad) that its device can be told, this one if that may be."""
     return angle if device is None else min(max(angle, device[0]), device[1])
 
 
-def _seen(axis: AxisVerbs, stood: float, planned: Planned, streamed: Streamed) -> Arrived:
+def _seen(axis: AxisVerbs, fact: Fact, planned: Planned, streamed: Streamed) -> Arrived:
     """What the host saw of an axis that was led."""
     track, still = streamed.tracks[axis.name], STILL / abs(axis.spec.ratio)
-    present = track.presents[-1] if track.presents else stood
-    if abs(present - stood) <= still:
-        return Arrived(planned.goals[axis.name], present, False, 0.0, 0.0)
-    return Arrived(planned.goals[axis.name], present, False, streamed.started, track.rested(still))
+    present = track.presents[-1] if track.presents else fact.position
+    went = _goes(axis, fact, planned)
+    began, ended = (streamed.started, track.rested(still)) if went else (0.0, 0.0)
+    return Arrived(planned.goals[axis.name], present, False, began, ended, fact.position)
+
+
+def _goes(axis: AxisVerbs, fact: Fact, planned: Planned) -> bool:
+    """Whether it goes so far that its first step and its last can be told apart."""
+    return planned.ways[axis.name] * abs(axis.spec.ratio) >= STEPS * fact.grain
+
+
+def _within(axis: AxisVerbs, fact: Fact, planned: Planned) -> float:
+    """How near to its goal it must come (rad of the device): on a tiny way so near that it has moved.
+
+    Who has no way to go stands as it stands: under its load it gives way a little when it gets torque.
+    """
+    if not _goes(axis, fact, planned):
+        return TOLERANCE
+    return min(TOLERANCE, max(NEAR * fact.grain, planned.ways[axis.name] * abs(axis.spec.ratio) / 2))
 
 
 def _silent(axis: AxisVerbs) -> NoReply:
     return NoReply(
-        f"{axis.name} ({axis.spec.device}) does not answer, so nobody moves",
+        f"{axis.name} ({axis.spec.device}) does not answer, so this movement does not begin",
         cause="its cable, its supply, or another device in between",
         advice="look at the cable and the supply; nothing was sent that moves anything",
         node=axis.spec.node,

@@ -115,14 +115,16 @@ class Place:
             if not self._low <= asked <= self._high:
                 limits.check_goal(self.name, self.axis.spec, asked, device=self._device)
             if self._direct:
-                self._judge_way(asked, periods)
+                since = self.position if self.sent is None else self.sent
+                if abs(asked - since) > self._way or abs(asked - self.position) > self._far:
+                    self._judge_way(asked, since, periods)
         except LimitExceeded:
             self.asked = self._passed
             raise
         self._passed = asked
 
-    def _judge_way(self, asked: float, periods: int) -> None:
-        since, periods = self.position if self.sent is None else self.sent, min(periods, CATCH_UP)
+    def _judge_way(self, asked: float, since: float, periods: int) -> None:
+        periods = min(periods, CATCH_UP)
         way, far = abs(asked - since), abs(asked - self.position)
         if way > self._way * periods:
             raise self._too_fast(asked, since, periods)

@@ -29,11 +29,13 @@ class Fact(NamedTuple):
 class Planned(NamedTuple):
     """A course, where it ends (rad, m), and what decides how long it takes.
 
-    `speeds` are the highest of each axis on it, `limits` what each may do in this movement (rad/s, m/s and per s²).
+    `ways` are how far each axis goes on it (rad, m), `speeds` the highest of each, `limits` what each may do in this
+    movement (rad/s, m/s and per s²).
     """
 
     course: Course
     goals: Mapping[str, float]
+    ways: Mapping[str, float]
     speeds: Mapping[str, float]
     limits: Mapping[str, Limits]
     limited_by: Limiting

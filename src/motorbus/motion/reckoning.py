@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 from motorbus.core.operation import Operation, Runnable
 from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
@@ -22,8 +22,30 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+Place: TypeAlias = "tuple[float | None, str]"
+"""Where an axis is (rad, m), None while that is not known, and then why."""
+
 NEVER_SAID: Final = "nobody has said where it is since it was opened"
 UNDER_WAY: Final = "it is moving"
+CUT_SHORT: Final = "a movement was interrupted"
+
+
+class Movement:
+    """One movement of an axis, and what was before it. Whoever moves the axis makes one, and gives it back at the end.
+
+    So an end counts for the movement that it is of, also when another one has begun behind a stop. `accounted` is false
+    where nobody is going to say how far it went; `stopped` is true once the axis has accepted a stop meanwhile.
+    """
+
+    def __init__(self, *, accounted: bool = True) -> None:
+        self.accounted: Final = accounted
+        self.stopped = self.engaged = self.under_way = False
+        self.place: Place = (None, NEVER_SAID)
+
+    def after(self, way: float) -> Place:
+        """Where the axis is when it went so far (rad, m, with its sign)."""
+        position, why = self.place
+        return (None, why) if position is None else (position + way, "")
 
 
 class Reckoning:
@@ -32,7 +54,6 @@ class Reckoning:
     def __init__(self) -> None:
         self.position: float | None = None
         self.why = NEVER_SAID
-        self._before: tuple[float | None, str] = (None, NEVER_SAID)
 
     def declare(self, position: float) -> None:
         """It stands there, as somebody knows who has seen it."""
@@ -42,20 +63,18 @@ class Reckoning:
         """Nobody knows any more where it is, and this is why."""
         self.position, self.why = None, why
 
-    def depart(self) -> None:
-        """A movement begins. Until it has come to its end nothing is known."""
-        if self.why != UNDER_WAY:
-            self._before = self.position, self.why
+    def depart(self) -> Place:
+        """A movement begins: gives where it was. Until that has come to its end nothing is known.
+
+        Where an earlier one has not said how it ended nobody knows where it was.
+        """
+        before = (None, CUT_SHORT) if self.why == UNDER_WAY else (self.position, self.why)
         self.forget(UNDER_WAY)
+        return before
 
-    def stay(self) -> None:
-        """The movement was refused before anything was sent: it is where it was."""
-        self.position, self.why = self._before
-
-    def arrive(self, way: float) -> None:
-        """The movement came to its end: it is so far (rad, m, with its sign) from where it was."""
-        before, why = self._before
-        self.position, self.why = (None, why) if before is None else (before + way, "")
+    def arrive(self, place: Place) -> None:
+        """The movement came to its end, or was refused before anything was sent: it is there."""
+        self.position, self.why = place
 
     def known(self, name: str) -> float:
         """Where it is. Raises NotHomed, with the reason, while that is not known."""
@@ -80,39 +99,43 @@ def is_reckoned(able: Iterable[str]) -> bool:
 
 def checked_place(name: str, position: float) -> float:
     """A position that a person declares. Raises RequestError for what cannot be one."""
-    if isinstance(position, bool) or not isinstance(position, int | float) or not isfinite(position):
+    limits.check_number(f"{name}: its position", position)
+    if not isfinite(position):
         raise RequestError(f"{name}: {position!r} is not a finite number", expected="a position in rad or m")
     if abs(position) > FARTHEST:
         raise RequestError(f"{name}: {position:g} is too far", expected=f"at most {FARTHEST:g} rad or m")
     return float(position)
 
 
-def journey(axis: AxisVerbs, movement: Runnable[T], way: Callable[[T], float] | None = None) -> Operation[T]:
+def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement, T], Place]) -> Operation[T]:
     """Carry out a movement of one axis and keep account of it: it is engaged, under way, and at rest afterwards.
 
-    `way` gives, from what the movement returned, how far the axis has gone (rad, m); a reckoned axis needs it. A
-    refusal that is `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
+    `place` gives, from what was before and what the movement returned, where the axis is then. A refusal that is
+    `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
+
+    Raises RequestError, with nothing sent, while another movement of a reckoned axis is under way.
     """
-    axis.departs()
+    movement = Movement()
     try:
-        told = yield from movement
+        axis.departs(movement)
+        told = yield from work
+        axis.arrives(movement, place(movement, told))
     except BaseException as error:
-        cut_short(axis, error)
+        cut_short(axis, movement, error)
         raise
-    axis.arrives(way(told) if way is not None else None)
     return told
 
 
-def cut_short(axis: AxisVerbs, error: BaseException) -> None:
+def cut_short(axis: AxisVerbs, movement: Movement, error: BaseException) -> None:
     """A movement of this axis ended by an error: it is where it was when nothing has moved, else nobody knows.
 
     Of a device that is silent nothing is certain: it may have lost its supply, and been turned.
     """
     if isinstance(error, RequestError | MotionError) and error.unmoved:
-        axis.stays()
+        axis.stays(movement)
         return
     said = getattr(error, "summary", "") or str(error) or type(error).__name__
-    axis.fails(f"a movement did not come to its end: {said}")
+    axis.fails(f"a movement did not come to its end: {said}", movement)
 
 
 # -- verbs of axes whose device moves by a profile of its own ------------------------------------------------------
@@ -127,13 +150,9 @@ def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Op
     """
     check_way(axis, way)
     rate = _rate(axis, velocity)
-    ratio = axis.spec.ratio
-    told = yield from journey(
-        axis,
-        axis.able["move_by"](axis.device, way * ratio, velocity=rate),
-        lambda told: _turned(told, way * ratio) / ratio,
+    return (
+        yield from _gone(axis, axis.able["move_by"](axis.device, way * axis.spec.ratio, velocity=rate), way)
     )
-    return _turned(told, way * ratio) / ratio
 
 
 def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
@@ -145,10 +164,7 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
     limits.check_velocity(axis.name, axis.spec, velocity)
     way = velocity * seconds
     check_way(axis, way)
-    ratio = axis.spec.ratio
-    jog_ = axis.able["jog"](axis.device, velocity * ratio, seconds)
-    told = yield from journey(axis, jog_, lambda told: _turned(told, way * ratio) / ratio)
-    return _turned(told, way * ratio) / ratio
+    return (yield from _gone(axis, axis.able["jog"](axis.device, velocity * axis.spec.ratio, seconds), way))
 
 
 def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
@@ -158,16 +174,8 @@ def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
     when the switch did not come; else as the device's own verb.
     """
     options = {} if deadline is None else {"deadline": deadline}
-    axis.departs()
-    try:
-        yield from axis.able["home"](axis.device, **options)
-    except BaseException as error:
-        cut_short(axis, error)
-        raise
-    axis.arrives(0.0)
     place = axis.spec.from_device(0.0)
-    if axis.reckoning is not None:
-        axis.reckoning.declare(place)
+    yield from journey(axis, axis.able["home"](axis.device, **options), lambda *_: (place, ""))
     return place
 
 
@@ -178,10 +186,10 @@ def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> Operat
     tell. Raises as the device's own verb.
     """
     options = {} if timeout is None else {"timeout": timeout}
-    told = yield from journey(axis, axis.able["run"](axis.device, number, **options), lambda _: 0.0)
-    if axis.reckoning is not None:
-        axis.reckoning.forget(f"program {number} has moved it")
-    return told
+    moved = f"program {number} has moved it"
+    return (
+        yield from journey(axis, axis.able["run"](axis.device, number, **options), lambda *_: (None, moved))
+    )
 
 
 def check_way(axis: AxisVerbs, way: float) -> None:
@@ -206,6 +214,8 @@ def check_way(axis: AxisVerbs, way: float) -> None:
 
 def _rate(axis: AxisVerbs, velocity: float | None) -> float:
     """How fast the device is to turn (rad/s)."""
+    if velocity is not None:
+        limits.check_number(f"{axis.name}: velocity", velocity)
     if velocity is not None and not velocity > 0:
         raise RequestError(
             f"{axis.name}: velocity is {velocity}",
@@ -217,6 +227,10 @@ def _rate(axis: AxisVerbs, velocity: float | None) -> float:
     return abs(axis.spec.rate_to_device(asked))
 
 
-def _turned(told: object, ordered: float) -> float:
-    """The angle (rad of the device) that it says it has turned, else what it was told to."""
-    return float(getattr(told, "angle", ordered))
+def _gone(axis: AxisVerbs, work: Runnable[Any], ordered: float) -> Operation[float]:
+    """The way that an axis has gone (rad, m): what its device says it has turned, else what was ordered."""
+
+    def way(told: object) -> float:
+        return float(getattr(told, "angle", ordered * axis.spec.ratio)) / axis.spec.ratio
+
+    return way((yield from journey(axis, work, lambda movement, told: movement.after(way(told)))))

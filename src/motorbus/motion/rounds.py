@@ -16,6 +16,7 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
+from motorbus.bus.pump import Bus
 from motorbus.core.operation import Operation
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion import limits
@@ -74,7 +75,8 @@ class LoopState:
 class Rounds:
     """The work of one loop over a machine; `exactly` as `Part` says.
 
-    `places` and `statistics` are there once it has been entered; `without` are the axes that cannot be in a loop.
+    `places` and `statistics` are there once it has been entered; `only` is set by a blocking loop on the only bus there
+    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop.
     """
 
     def __init__(
@@ -119,11 +121,13 @@ class Rounds:
         self._stepped = 0
         self._fresh = False
         self._all: tuple[Place, ...] = ()
+        self._one: Part | None = None
+        self.only: Bus | None = None
 
     @property
     def now(self) -> float:
         """Robot time (s), by the latest clock of its buses."""
-        return max([part.now for part in self.parts.values()])
+        return self._one.now if self._one is not None else max([part.now for part in self.parts.values()])
 
     @property
     def parts_abreast(self) -> bool:
@@ -143,6 +147,7 @@ class Rounds:
             face = self._body.buses[bus]
             self.parts[bus] = Part(face, self._body.origins[bus], there, train)
             self.parts[bus].exactly = self._exactly and not face.link.virtual
+        self._one = next(iter(self.parts.values())) if len(self.parts) == 1 else None
         self.places = {name: place for name in self._led for place in self._placed() if place.name == name}
         self._all = tuple(self.places.values())
         yield from self._first_look()
@@ -220,17 +225,32 @@ class Rounds:
         moment = grid.take(now)
         orders = {bus: part.orders(periods) for bus, part in self.parts.items()}
         self._stepped = grid.number
-        told = yield Abreast({bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict)
+        if self.only is None:
+            told = yield Abreast(
+                {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
+            )
+        else:
+            told = self._at_once(self.only, orders, moment)
         return self._taken(told, moment, grid.number)
+
+    def _at_once(self, only: Bus, orders: Mapping[str, Any], moment: float) -> dict[str, Any]:
+        ((name, part),) = self.parts.items()
+        try:
+            return {name: part.at_once(only, orders[name], moment)}
+        except MotorbusError as failure:
+            return {name: failure}
 
     def _judge(self, periods: int) -> None:
         """Before anything is sent: has somebody been stopped, and may all goals be sent?"""
-        for place in self._all:
-            axis = place.axis
-            if place.begun and not (axis.under_way and axis.engaged):
-                self._release_interrupted()
-        for place in self._all:
-            place.judge(periods)
+        every = self._all
+        for place in every:
+            if place.begun:
+                axis = place.axis
+                if not (axis.under_way and axis.engaged):
+                    self._release_interrupted()
+        for place in every:
+            if place.asked is not None:
+                place.judge(periods)
 
     def _release_interrupted(self) -> None:
         halted = [place for place in self._all if place.interrupted]

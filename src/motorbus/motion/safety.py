@@ -7,7 +7,7 @@ device itself declares, or comes without limits.
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from motorbus.core.operation import Effect, Exchange, Goal, Rank
@@ -30,7 +30,9 @@ class Gate:
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for goal in exchange.goals:
-            _check(goal)
+            _, _, value, low, high = goal
+            if low is None or high is None or not -inf < low <= value <= high < inf:
+                _check(goal)
 
 
 def _check(goal: Goal) -> None:

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
-from typing import Any, TypeAlias, TypeVar
+from re import escape, search
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from motorbus.core.operation import Operation, Runnable, Together, afterwards, outcome
 from motorbus.errors import MotorbusError
-from motorbus.motion.axis import AxisVerbs
+
+if TYPE_CHECKING:
+    from motorbus.motion.axis import AxisVerbs
 
 T = TypeVar("T")
 
@@ -83,6 +86,11 @@ def gathered(errors: Mapping[str, MotorbusError]) -> MotorbusError:
     for other in named_[1:]:
         named_[0].add_note(f"also: {other}")
     return named_[0]
+
+
+def names(error: MotorbusError, name: str) -> bool:
+    """Whether an error tells of this one."""
+    return search(rf"(?<!\w){escape(name)}(?!\w)", error.summary) is not None
 
 
 def named(name: str, error: MotorbusError) -> MotorbusError:

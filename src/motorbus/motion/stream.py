@@ -80,7 +80,7 @@ class Fate:
 
 
 class Streamed(NamedTuple):
-    """What came of it: a track for each axis by its name, how the cycles went, and when (s) the first order left."""
+    """What came of it: a track for each axis by its name, how the cycles went, when (s) the first order was gone."""
 
     tracks: dict[str, Track]
     cycles: Cycles
@@ -152,6 +152,7 @@ def _told(train: Train, node: int, angle: float) -> float | None:
 class Stream:
     """Axes of one bus that are led along a course; `speeds` are the highest of it by name (rad/s, m/s).
 
+    `within` is by name how near to its goal each must come in the end (rad of the device).
     `command` is over these axes, `fate` that of the whole movement. With `reports` it reports its progress.
     """
 
@@ -163,6 +164,7 @@ class Stream:
         *,
         rate: float,
         speeds: Mapping[str, float],
+        within: Mapping[str, float],
         command: Command,
         fate: Fate,
         reports: bool = False,
@@ -172,6 +174,7 @@ class Stream:
         self._course: Final = course
         self._grid: Final = Grid.over(course.duration, rate)
         self._allowed: Final = {axis.name: _allowed(axis, speeds[axis.name]) for axis in axes}
+        self._within: Final = within
         self._command: Final = command
         self._fate: Final = fate
         self._reports: Final = reports
@@ -213,14 +216,15 @@ class Stream:
         """A goal at each slot of the grid, whatever becomes of the readings."""
         slot = 0
         while not self._over:
-            now = yield from self._until(slot)
-            if slot == 0:
-                self._first = now + self._lead - self._start
+            yield from self._until(slot)
+            if self._over:
+                return  # an axis does not follow, or nobody hears it
             self._fate.check()
-            self._command.check()
             last = slot == self._grid.last
             at = self._course.duration if last else (slot + 1) * self._grid.period
             yield from self._order(at)
+            if slot == 0:
+                self._first = (yield from Pause(0)) - self._start
             self._cycles += 1
             if last:
                 return
@@ -239,10 +243,10 @@ class Stream:
             yield from self._report(slot * self._grid.period)
             slot = yield from self._next(slot)
 
-    def _until(self, slot: int) -> Operation[float]:
-        """Wait for a slot; gives the moment (s). Nobody may wait between this and what is sent, or others go first."""
+    def _until(self, slot: int) -> Operation[None]:
+        """Wait for a slot. Nobody may wait between this and what is sent, or others go first."""
         due = self._start - self._lead + slot * self._grid.period
-        return (yield from Pause(max(0.0, due - (yield from Pause(0)))))
+        yield from Pause(max(0.0, due - (yield from Pause(0))))
 
     def _next(self, slot: int) -> Operation[int]:
         return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
@@ -314,7 +318,7 @@ class Stream:
         """Whether it was seen in position after the end, twice at the same place; when time is up, once."""
         *_, presents = self._tracks[axis.name]
         times = self._tracks[axis.name][0]
-        if not times or times[-1] < self._course.duration or self._off(axis) > TOLERANCE:
+        if not times or times[-1] < self._course.duration or self._off(axis) > self._within[axis.name]:
             return False
         before = presents[-2] if len(presents) > 1 else presents[-1]
         still = abs(presents[-1] - before) * abs(axis.spec.ratio) <= STILL
@@ -344,12 +348,12 @@ class Stream:
     def _check_arrived(self) -> None:
         """Raise Stalled for those that are not in position."""
         goals = self._course.positions(self._course.duration)
-        short = [axis for axis in self._axes.values() if self._off(axis) > TOLERANCE]
+        short = [axis for axis in self._axes.values() if self._off(axis) > self._within[axis.name]]
         for axis in short[:1]:
-            spec = axis.spec
+            spec, near = axis.spec, self._within[axis.name] / abs(axis.spec.ratio)
             raise Stalled(
                 "; ".join(_stands(one, goals[one.name], self._tracks[one.name][2]) for one in short),
-                expected=f"within {spec.show(TOLERANCE / abs(spec.ratio))} of it, {SETTLE:g} s after the end",
+                expected=f"within {spec.show(near)} of it, {SETTLE:g} s after the end",
                 cause="something blocks it, the load is too heavy, or its torque is bounded",
                 advice="clear the way, or allow it more torque; all of the movement were stopped",
                 node=spec.node,

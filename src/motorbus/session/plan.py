@@ -8,8 +8,10 @@ from typing import NamedTuple, Self
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
+from motorbus.core.entry import shown
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.axes import AsyncAxis, Axis
+from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import Machine
 from motorbus.motion.machine.agreement import check
 from motorbus.motion.several import named
@@ -31,6 +33,12 @@ class Plan(NamedTuple):
         Raises RequestError for a name that it does not have, a machine that does not fit together, an address that
         cannot be, and two buses on one port.
         """
+        if not isinstance(machine, Machine):
+            raise RequestError(
+                f"{shown(machine)} is not a machine",
+                expected="a motorbus.Machine",
+                advice="`load` opens the machine of a file; nothing was opened",
+            )
         check(machine)
         names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
         if not names:
@@ -88,8 +96,7 @@ def loaded(path: str | PathLike[str]) -> Machine:
 
 
 def _chosen(machine: Machine, names: str | Iterable[str]) -> tuple[str, ...]:
-    wanted = (names,) if isinstance(names, str) else tuple(names)
-    return tuple(dict.fromkeys(axis for name in wanted for axis in machine.axes_of(name)))
+    return tuple(dict.fromkeys(axis for name in named_in(names) for axis in machine.axes_of(name)))
 
 
 def _check_ports(machine: Machine, buses: Iterable[str]) -> None:

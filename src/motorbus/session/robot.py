@@ -17,12 +17,12 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import AsyncExitStack, ExitStack
 from os import PathLike
 from types import TracebackType
-from typing import Self
+from typing import Any, Final, Self
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import StopOutcome
-from motorbus.errors import MotorbusError
+from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import group, moving
 from motorbus.motion.abreast import Led, LedAsync, together
 from motorbus.motion.axes import AsyncAxis, Axis
@@ -41,6 +41,9 @@ from motorbus.session.stopping import estop, reset
 
 Notify = Callable[[object], None]
 Names = str | Iterable[str] | None
+
+NOT_OPEN: Final = "not open: use `async with`"
+CLOSED: Final = "closed: load it again"
 
 
 class RobotVerbs(Body):
@@ -62,6 +65,22 @@ class RobotVerbs(Body):
     budget = together(budget)
 
     _said: tuple[str, ...] = ()
+    _shut = ""
+
+    def chosen(self, names: Names = None) -> dict[str, Any]:
+        """See `Body.chosen`. Raises RequestError also while the machine is not open."""
+        self._refuse_shut()
+        return super().chosen(names)
+
+    def axis(self, name: str) -> Any:
+        """See `Body.axis`. Raises RequestError also while the machine is not open."""
+        self._refuse_shut()
+        return super().axis(name)
+
+    def _refuse_shut(self) -> None:
+        if self._shut:
+            what, advice = self._shut.split(": ")
+            raise RequestError(f"the machine is {what}", advice=f"{advice}; nothing was sent")
 
     @property
     def simulated(self) -> bool:
@@ -78,12 +97,15 @@ class RobotVerbs(Body):
         """Emergency stop on every bus at the same time; see `motorbus.bus.face.BusFace.estop`. From any thread.
 
         Never waits for a movement, and tells for each bus, by its name, what it achieved: a bus that is gone
-        acknowledges nothing. Motion and torque are refused afterwards until `reset`. A plain call on both kinds.
+        acknowledges nothing. Motion and torque are refused afterwards until `reset`. A plain call on both kinds. Raises
+        RequestError while the machine is not open, for then it stops nothing.
         """
+        self._refuse_shut()
         return estop(self)
 
     def reset(self) -> None:
         """Take the latch of an emergency stop off every bus. Nothing is sent and nothing moves. A plain call too."""
+        self._refuse_shut()
         reset(self)
 
     def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
@@ -104,13 +126,15 @@ class RobotVerbs(Body):
 class Robot(RobotVerbs, Led):
     """An open machine, blocking; use it in a `with`. Made by `load` or `of`."""
 
+    axes: Mapping[str, Axis]
     loop = blocking_loop
 
     def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
         super().__init__(machine, buses, axes)
         self.conductor = Conductor(buses, self.origins)
+        self._ports = tuple(buses.values())
         self._exits = ExitStack()
-        self._closed = False
+        self._leaving: Leaving | None = None
 
     @classmethod
     def load(
@@ -141,7 +165,7 @@ class Robot(RobotVerbs, Led):
 
     def __getitem__(self, name: str) -> Axis:
         """The axis of this name. Raises RequestError for none, or one that was not opened."""
-        axis: Axis = self.axis(name)
+        axis: Axis = super().axis(name)
         return axis
 
     def close(self) -> None:
@@ -152,6 +176,7 @@ class Robot(RobotVerbs, Led):
         self._end(None)
 
     def __enter__(self) -> Self:
+        self._refuse_shut()
         return self
 
     def __exit__(
@@ -160,22 +185,31 @@ class Robot(RobotVerbs, Led):
         self._end(error)
 
     def _end(self, others: BaseException | None) -> None:
-        if self._closed:
+        if self._shut:
             return
-        self._closed = True
-        with self._exits:
-            leaving = Leaving(self)
-            interruption = self._leave(leaving)
-            self._ended(leaving, others or interruption)
-            if interruption is not None:
-                raise interruption
+        first: BaseException | None = None
+        try:
+            first = self._leave()
+            if self._leaving is not None:
+                self._ended(self._leaving, others or first)
+        finally:
+            try:
+                self._leave()  # nothing is left to do, unless a Ctrl-C fell between two of these lines
+                self._exits.close()
+            finally:
+                for bus in self._ports:
+                    bus.close()
+                self._shut = CLOSED
+        if first is not None:
+            raise first
 
-    def _leave(self, leaving: Leaving) -> BaseException | None:
+    def _leave(self) -> BaseException | None:
         """Carry out all of it; the first interruption that came meanwhile."""
         first: BaseException | None = None
         caught: BaseException | None = None
         while True:
             try:
+                leaving = self._leaving = self._leaving or Leaving(self)
                 if caught is not None:
                     first = first or caught
                     leaving.hurry()
@@ -193,14 +227,17 @@ class Robot(RobotVerbs, Led):
 class AsyncRobot(RobotVerbs, LedAsync):
     """An open machine on the running event loop; use it in an `async with`. Made by `load` or `of`."""
 
+    axes: Mapping[str, AsyncAxis]
     loop = awaiting_loop
+    _shut = NOT_OPEN
 
     def __init__(self, plan: Plan, report: Notify | None = None) -> None:
         super().__init__(plan.machine, {}, {})
+        self.conductor = LoopConductor({}, {})
         self._plan = plan
         self._report = report
+        self._ending = False
         self._exits = AsyncExitStack()
-        self._closed = True
 
     @classmethod
     def load(
@@ -215,20 +252,24 @@ class AsyncRobot(RobotVerbs, LedAsync):
         return cls(Plan.of(machine, axes), report)
 
     async def __aenter__(self) -> Self:
+        if not self._shut:
+            raise RequestError("the machine is open already", advice="use it in one `async with` at a time")
         async with AsyncExitStack() as stack:
             buses: dict[str, AsyncBus] = {}
             for name in self._plan.buses:
                 buses[name] = await stack.enter_async_context(self._plan.open_async(name, self._report))
-            Body.__init__(self, self._plan.machine, buses, self._plan.awaiting(buses))
-            self.conductor = LoopConductor(buses, self.origins)
-            await self.conductor.run(recognise(self))
+            body = Body(self._plan.machine, buses, self._plan.awaiting(buses))
+            conductor = LoopConductor(buses, body.origins)
+            await conductor.run(recognise(body))
+            Body.__init__(self, body.machine, buses, body.axes, body.origins)
+            self.conductor = conductor
             self._exits = stack.pop_all()
-        self._closed = False
+        self._shut = ""
         return self
 
     def __getitem__(self, name: str) -> AsyncAxis:
         """The axis of this name. Raises RequestError for none, or one that was not opened."""
-        axis: AsyncAxis = self.axis(name)
+        axis: AsyncAxis = super().axis(name)
         return axis
 
     async def close(self) -> None:
@@ -241,15 +282,18 @@ class AsyncRobot(RobotVerbs, LedAsync):
         await self._end(error)
 
     async def _end(self, others: BaseException | None) -> None:
-        if self._closed:
+        if self._shut or self._ending:
             return
-        self._closed = True
-        async with self._exits:
-            leaving = Leaving(self)
-            interruption = await self._leave(leaving)
-            self._ended(leaving, others or interruption)
-            if interruption is not None:
-                raise interruption
+        self._ending = True
+        try:
+            async with self._exits:
+                leaving = Leaving(self)
+                interruption = await self._leave(leaving)
+                self._ended(leaving, others or interruption)
+                if interruption is not None:
+                    raise interruption
+        finally:
+            self._ending, self._shut = False, NOT_OPEN
 
     async def _leave(self, leaving: Leaving) -> BaseException | None:
         """Carry out all of it; the first cancellation that came meanwhile."""

@@ -30,9 +30,10 @@ def estop(body: Body) -> dict[str, StopOutcome]:
 def _stopped(body: Body, name: str) -> StopOutcome:
     try:
         return body.buses[name].estop()
-    except MotorbusError as error:  # closed, or its port is gone: the others are stopped all the same
+    except Exception as error:  # closed, or its port is gone: the others are stopped all the same
         nodes = tuple(axis.spec.node for axis in body.axes.values() if axis.spec.bus == name)
-        return StopOutcome((), nodes, 0, f"nothing: {error.summary}")
+        why = error.summary if isinstance(error, MotorbusError) else f"{type(error).__name__}: {error}"
+        return StopOutcome((), nodes, 0, f"nothing: {why}")
 
 
 def reset(body: Body) -> None:

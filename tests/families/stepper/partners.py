@@ -18,13 +18,14 @@ class Partner:
     """A `core.family.Timing` whose others need so long (s), after having made one wait for `thinks` s each time.
 
     `fails` is where they call off: "agreed" or "start". What was said here is `shortest`, `fit`, `agreed_on`, `lead`
-    and `moment` (s).
+    and `moment` (s); `failures` are the errors that the others were told.
     """
 
     def __init__(self, needs: float = 0.0, *, thinks: float = 0.2, fails: str = "") -> None:
-        self.needs, self.thinks, self.fails = needs, thinks, fails
+        self.needs, self.thinks, self._fails = needs, thinks, fails
         self.shortest = self.fit = self.agreed_on = self.lead = self.moment = 0.0
         self.asked: list[str] = []
+        self.failures: list[BaseException] = []
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
         yield from self._thought("agreed")
@@ -38,10 +39,13 @@ class Partner:
         self.moment = (yield from Pause(0.05)) + lead
         return self.moment
 
+    def fails(self, error: BaseException) -> None:
+        self.failures.append(error)
+
     def _thought(self, where: str) -> Operation[None]:
         self.asked.append(where)
         yield from Pause(self.thinks)
-        if self.fails == where:
+        if self._fails == where:
             raise Interrupted("the others do not move", cause="made up")
 
 

@@ -18,6 +18,7 @@ import motorbus
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import borrowing, editing, homing, jogging, recovery, stopping, turning
 from motorbus.families.stepper.driver.borrowing import NOTE
+from motorbus.families.stepper.driver.turning import Slowing
 from tests.families.stepper.loans import Cut, Line1
 from tests.families.stepper.test_borrow_cuts import WORKS, homed, jogged, wrecked
 
@@ -153,3 +154,13 @@ def test_on_a_line_that_takes_its_time(moment: float) -> None:
         line.run(lambda device: device.jog(tau, 5.0))
     assert NOTE not in getattr(caught.value, "__notes__", ())
     assert (line.as_before, line.journal.unfinished(), line.at_rest) == (True, None, True)
+
+
+def test_who_waits_for_the_motor_to_come_to_rest_is_told() -> None:
+    line = Line1()
+    line.interrupts = [3.0]
+    with pytest.raises(KeyboardInterrupt):
+        line.run(lambda device: device.jog(2 * tau, 5.0, acceleration=3))
+    (slowing,) = [one for one in line.events if isinstance(one, Slowing)]
+    assert slowing.seconds == pytest.approx(10.47, abs=0.01)
+    assert (line.as_before, line.journal.unfinished()) == (True, None)

@@ -7,6 +7,7 @@ orders may be mixed: present and goal position have the same place and size in a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final, Literal
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Positions
@@ -15,7 +16,7 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, read_block
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.orders import position_goal
 
 
@@ -103,25 +104,37 @@ def _no_sync_read(node: Node) -> RequestError:
 
 
 class _Gauge:
-    """Tells the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker."""
+    """Tells the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker.
 
-    __slots__ = ("end", "node", "row", "scale")
+    What has been made of those is kept as long as they are the same. A code below `_plain` is its own raw value.
+    """
+
+    __slots__ = ("_factor", "_order", "_plain", "_scale", "_settings", "end", "node", "row")
 
     def __init__(self, node: Node, row: Entry) -> None:
         self.node = node
         self.row = row
-        self.scale = row.scale
         self.end = 5 + row.size
+        self._order: Final[Literal["little", "big"]] = "little" if row.order == "little" else "big"
+        self._plain: Final = 1 << (8 * row.size - 1 if row.sign_bit is None else row.sign_bit)
+        self._scale: Final = row.scale
+        self._settings: Settings | None = None
+        self._factor = 0.0
 
     def value(self, data: bytes) -> float:
         """In rad. Raises RequestError when its settings have been written and not read since."""
         settings = self.node.settings
         if settings is None:
             raise _unsettled(self.node)
-        raw = self.row.decode(data)
+        if settings is not self._settings:
+            self._factor = settings.factors["present_position"]
+            self._settings = settings
+        raw = int.from_bytes(data, self._order)
+        if raw >= self._plain:
+            raw = self.row.decode(data)
         if settings.shift:
             raw = settings.compensated(raw)
-        return raw * self.scale * settings.factors["present_position"]
+        return raw * self._scale * self._factor
 
 
 def _unsettled(node: Node) -> RequestError:

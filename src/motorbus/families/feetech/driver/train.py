@@ -145,10 +145,14 @@ def _check_speed(node: Node, speed: float) -> None:
 # -- goals ---------------------------------------------------------------------------------------------------
 
 
+_HEAD: Final = 7
+"""Bytes of a SYNC WRITE in front of its first item."""
+
+
 class _Seat(NamedTuple):
     """What a goal of one servo is reckoned by; `lowest` and `highest` are what its register can say, in rad.
 
-    `codes` are the bytes of raw goals that were encoded before.
+    `known` are the raw goals that were reckoned before: what each orders, and its bytes in the packet.
     """
 
     id: int
@@ -160,38 +164,43 @@ class _Seat(NamedTuple):
     highest: float
     low: float
     high: float
-    codes: dict[int, bytes]
+    known: dict[int, tuple[Goal, bytes]]
 
 
 class _Packet:
     """One SYNC WRITE of goal positions, of which all is known but the goals."""
 
     def __init__(self, address: int, seats: Sequence[_Seat]) -> None:
-        self._address = address
+        still = [(seat.id, bytes(seat.row.size)) for seat in seats]
+        self._head = wire.sync_write(address, still)[:_HEAD]
         self._seats = seats
         self._under = [(seat.node, seat.node.settings) for seat in seats]
         self._refusal = changed_since(self._under)
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
-        return all(node.settings is settings for node, settings in self._under)
+        for node, settings in self._under:
+            if node.settings is not settings:
+                return False
+        return True
 
     def exchange(self, to: Mapping[int, float]) -> Exchange[None]:
         """The packet with these goals (rad)."""
-        goals, items = [], []
-        for id, node, row, factor, scale, lowest, highest, low, high, codes in self._seats:
+        goals, parts = [], [self._head]
+        for id, node, row, factor, scale, lowest, highest, low, high, known in self._seats:
             value = to[id]
             if type(value) is float and lowest <= value <= highest:
                 raw = round(value / factor / scale)
-                goal = Goal(id, "position", raw * scale * factor, low, high)
             else:  # a whole number, or what is none: as `position_goal` says
-                raw, goal = position_goal(node, row, value)
-            goals.append(goal)
-            code = codes.get(raw)
-            if code is None:
-                code = codes[raw] = row.encode(raw)
-            items.append((id, code))
-        request = wire.sync_write(self._address, items)
+                raw, _ = position_goal(node, row, value)
+            found = known.get(raw)
+            if found is None:
+                goal = Goal(id, "position", raw * scale * factor, low, high)
+                found = known[raw] = goal, bytes((id,)) + row.encode(raw)
+            goals.append(found[0])
+            parts.append(found[1])
+        packet = b"".join(parts)
+        request = packet + bytes((wire.checksum(packet[2:]),))
         return unanswered(request, Effect.MOTION, tuple(goals), refusal=self._refusal)
 
 

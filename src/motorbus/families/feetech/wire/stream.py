@@ -22,7 +22,6 @@ from motorbus.families.feetech.wire.packets import (
     OVERHEAD,
     InstructionPacket,
     StatusPacket,
-    fault_of,
     is_sound,
 )
 
@@ -48,19 +47,31 @@ class Stream(Generic[P]):
         return len(self._rest)
 
     def feed(self, data: bytes) -> list[P | Noise]:
-        """Take bytes; give what is complete. Exactly one good packet, the usual case, is not searched for."""
+        """Take bytes; give what is complete. Good packets in a row, the usual case, are not searched for."""
         if self._rest:
-            return self._split(self._rest + data, more=True)
-        if len(data) > 3 and len(data) == data[3] + 4 and fault_of(data, self._top) is None:
-            return [self._make(data)]
-        return self._split(data, more=True)
+            data = self._rest + data
+        events: list[P | Noise] = []
+        if self._suspect:
+            return self._split(data, events, more=True)
+        start, end, make, top = 0, len(data), self._make, self._top
+        while end - start >= OVERHEAD:
+            stop = start + data[start + 3] + 4
+            packet = data[start:stop]
+            if stop > end or packet[2] > top or packet[3] < 2 or packet[:2] != HEADER or not is_sound(packet):
+                break
+            events.append(make(packet))
+            start = stop
+        if start == end:
+            self._rest = b""
+            return events
+        return self._split(data[start:], events, more=True)
 
     def flush(self) -> list[P | Noise]:
         """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
-        return self._split(self._rest, more=False)
+        return self._split(self._rest, [], more=False) if self._rest else []
 
-    def _split(self, data: bytes, more: bool) -> list[P | Noise]:
-        events: list[P | Noise] = []
+    def _split(self, data: bytes, events: list[P | Noise], more: bool) -> list[P | Noise]:
+        """Search for packets, and tell what is found behind the `events` before."""
         noise = position = 0  # what lies between the two is noise, not yet told
         end = len(data)
         while (start := data.find(HEADER, position)) >= 0:

@@ -43,6 +43,7 @@ from motorbus.families.stepper.driver.running import run, start_project
 from motorbus.families.stepper.driver.scanning import Sends, scan
 from motorbus.families.stepper.driver.selecting import EditsLost, clear, save, select
 from motorbus.families.stepper.driver.stopping import Promise, stop
+from motorbus.families.stepper.driver.turning import Slowing
 from motorbus.families.stepper.driver.waiting import Outcome, Ran
 from motorbus.families.stepper.driver.writing import (
     Difference,
@@ -74,6 +75,7 @@ __all__ = [
     "Proof",
     "Ran",
     "Sends",
+    "Slowing",
     "Unrecorded",
     "Watched",
     "Written",

@@ -37,7 +37,7 @@ from motorbus.families.stepper.driver.editing import brought
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.selecting import cleared
 from motorbus.families.stepper.driver.stopping import BY_HAND, MAY_TURN, ended
-from motorbus.families.stepper.driver.turning import refuse_unless_idle, slowing
+from motorbus.families.stepper.driver.turning import Slowing, refuse_unless_idle, slowing
 from motorbus.families.stepper.table import (
     STEPS,
     Order,
@@ -61,6 +61,8 @@ BORROWED: Final = "borrowed"
 """It was read back as wanted, so reading shows what is being edited."""
 GIVEN_BACK: Final = "old"
 """How every borrow ends, in the journal and for `recover`."""
+LONG: Final = 0.5
+"""s; whoever waits longer than that for the motor to come to rest is told."""
 TRIES: Final = 3
 """How often giving back is tried: after an emergency stop the bus itself repeats nothing."""
 LOST: Final = "the controller has lost its supply meanwhile: where the motor stands is not known"
@@ -301,7 +303,10 @@ def given_back(node: Node, loan: Loan) -> Operation[None]:
     raised.
     """
     if loan.cut:
-        yield from Pause(slowing(replace(loan.wanted, total_steps=1)))
+        rest = slowing(replace(loan.wanted, total_steps=1))
+        if rest >= LONG:
+            yield from outcome(iter(Report(Slowing(rest))))  # whatever the listener says to that
+        yield from Pause(rest)
         loan.cut = False
     if not loan.restored:
         unsaved = node.memory.unsaved

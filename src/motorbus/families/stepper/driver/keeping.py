@@ -11,7 +11,7 @@ No position comes back. When it began is known from when the order left, and whe
 from __future__ import annotations
 
 from math import tau
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.family import Timing, Turned
 from motorbus.core.operation import Operation, Pause, Tune, outcome
@@ -35,6 +35,8 @@ from motorbus.families.stepper.driver.pacing import (
 from motorbus.families.stepper.driver.reading import image, read_input
 from motorbus.families.stepper.driver.turning import Watch, honest, longest, waited
 from motorbus.families.stepper.table import Project, decode_image
+
+T = TypeVar("T")
 
 VERB: Final = "keep_time"
 READS: Final = 2
@@ -68,7 +70,8 @@ def keep_time(
     than a pulse or too far, a velocity below 1 RPM, an acceleration not above 0, and as `borrowed` for what it refuses;
     Interrupted when the others do not begin or somebody has said stop before, and project 1 is given back; all of
     these have moved nothing, and are `unmoved`. Interrupted when somebody stops it, OutcomeUnknown when the order was
-    not acknowledged, and whatever else: where the motor stands is not known then.
+    not acknowledged, and whatever else: where the motor stands is not known then. Once the others are asked they are
+    told of each of these at once, before project 1 is given back.
     """
     check(angle, velocity, acceleration)
     watch = Watch(node)
@@ -94,7 +97,21 @@ def keep_time(
     def motion(project: Project) -> Operation[Turned]:
         return (yield from _turned(node, project, true, watch, tempo))
 
-    return (yield from honest(watch, borrowed(node, VERB, wanted, motion, accord=Accord(settled, ready))))
+    def told(work: Operation[T]) -> Operation[T]:
+        return _told(timing, honest(watch, work))
+
+    accord = Accord(lambda quick: told(settled(quick)), lambda project: told(ready(project)))
+    kept = borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord)
+    return (yield from honest(watch, kept))
+
+
+def _told(timing: Timing, work: Operation[T]) -> Operation[T]:
+    """Let the others know at once when it fails: giving project 1 back takes seconds, and they would move on."""
+    try:
+        return (yield from work)
+    except BaseException as error:
+        timing.fails(error)
+        raise
 
 
 def shortest(

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import inf
 from sys import float_info
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.operation import Operation, Pause, Progress, Report, Runnable, Stops
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, OutcomeUnknown, RequestError
@@ -26,6 +26,13 @@ from motorbus.families.stepper.program.plan import READINGS
 from motorbus.families.stepper.table import Project, StopMode
 
 T = TypeVar("T")
+
+
+class Slowing(NamedTuple):
+    """An event: the motor was told to stop, and has these `seconds` to come to rest before project 1 is given back."""
+
+    seconds: float
+
 
 LOOK: Final = 0.1
 """s between two looks at whether somebody has stopped it."""
