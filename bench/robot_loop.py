@@ -6,7 +6,7 @@ The other end is the responder in C, on which bytes take as long as at that baud
 that the budget names there is to be no overrun in a minute, and asked for that highest rate itself the loop is to
 achieve 88 % of what the wire carries. Both are measured with goals that are followed and with goals that are sent as
 they are. Each axis counts how often it was read, so a reading that is lost, doubled or stale is found. All of it runs
-with real-time priority where that is permitted, as a control loop would.
+with real-time priority where that is permitted, as a control loop would; whether it was is said with the result.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ COLUMNS = (
 
 class Sample(NamedTuple):
     """One loop: how goals were sent, Hz that were asked for, that the wire carries and that were achieved, overruns and
-    skipped slots; and in s how late a cycle began and how long one took on average, and the processor's part of it."""
+    skipped slots; in s how late a cycle began and how long one took on average, and the processor's part of it; and
+    whether its process had real-time priority."""
 
     kind: str
     asked: float
@@ -62,6 +63,7 @@ class Sample(NamedTuple):
     lateness: float
     cycle: float
     processor: float
+    urgent: bool = False
 
 
 class Wrong(Exception):
@@ -135,6 +137,7 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
         "lateness": told.lateness.mean,
         "cycle": told.cycle.mean,
         "processor": used / cycles,
+        "urgent": is_urgent(),
     }
 
 
@@ -182,8 +185,7 @@ def sample(program: Path, kind: str, rate: float, seconds: float) -> Sample:
         raise Wrong(f"{kind}, {rate:g} Hz: {done.stderr.strip() or done.returncode}")
     said = json.loads(done.stdout)
     _compare(said, wire.books)
-    names = ("asked", "wire", "achieved", "cycles", "overruns", "skipped", "lateness", "cycle", "processor")
-    return Sample(kind, *(said[name] for name in names))
+    return Sample(kind, **{name: said[name] for name in Sample._fields if name != "kind"})
 
 
 def _compare(said: dict[str, Any], books: dict[str, Any]) -> None:
@@ -191,6 +193,11 @@ def _compare(said: dict[str, Any], books: dict[str, Any]) -> None:
     written = [books["servos"][str(node)][1] for node in IDS]
     if min(written) < said["cycles"] or len(set(written)) != 1 or books["strays"]:
         raise Wrong(f"{said['cycles']} cycles, but goals that arrived: {written}, strays {books['strays']}")
+
+
+def is_urgent() -> bool:
+    """Whether this process has real-time priority."""
+    return hasattr(os, "sched_getscheduler") and os.sched_getscheduler(0) == os.SCHED_FIFO
 
 
 @contextmanager
@@ -233,8 +240,15 @@ def verdict(found: Iterable[Sample]) -> str:
     return (
         f"Overruns and skipped slots at {SHARE:.0%} of the budget's highest rate: {overruns} in "
         f"{sum(one.cycles for one in steady)} cycles. None: {_word(not overruns)}.\n"
-        f"Achieved of what the wire carries: {least:.1%}. At least {ACHIEVED:.0%}: {_word(least >= ACHIEVED)}."
+        f"Achieved of what the wire carries: {least:.1%}. At least {ACHIEVED:.0%}: {_word(least >= ACHIEVED)}.\n"
+        f"Real-time priority: {_priority(every)}."
     )
+
+
+def _priority(every: Sequence[Sample]) -> str:
+    if all(one.urgent for one in every):
+        return "granted"
+    return "not permitted here, so whatever else this machine did held the loop up too"
 
 
 def _word(reached: bool) -> str:

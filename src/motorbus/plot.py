@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+KINDS: Final = (".png", ".svg", ".pdf")
+"""How the name of a picture may end."""
 _INK: Final = "#24292f"
 _FAINT: Final = "#8c959f"
 _GRID: Final = "#e6e9ec"
@@ -63,11 +65,10 @@ def trajectory(
 
 def _saved(figure: Any, path: Path | str) -> None:
     """Write the picture. Raises RequestError for a name that does not say which kind of picture it shall be."""
-    kinds = (".png", ".svg", ".pdf")
-    if not str(path).lower().endswith(kinds):
+    if not str(path).lower().endswith(KINDS):
         raise RequestError(
             f"{path}: what kind of picture shall that be?",
-            expected=f"a name that ends in {', '.join(kinds)}",
+            expected=f"a name that ends in {', '.join(KINDS)}",
             advice="nothing was drawn",
         )
     figure.savefig(path)

@@ -16,6 +16,7 @@ from bench.robot_loop import (
     Wrong,
     course,
     described,
+    is_urgent,
     judged,
     rows,
     sample,
@@ -35,6 +36,7 @@ def test_it_is_a_loop_of_six_axes_on_a_wire_that_takes_its_time(kind: str) -> No
     assert found.cycles >= 1
     assert found.cycle >= 880e-6  # no reading can be there sooner
     assert (found.kind, found.asked) == (kind, 100.0)
+    assert found.urgent == is_urgent()  # as this process
 
 
 NOBODY: frozenset[str] = frozenset()
@@ -68,7 +70,9 @@ def test_the_goals_are_within_what_an_axis_may_do() -> None:
 def test_priority_is_given_back() -> None:
     before = os.sched_getscheduler(0)
     with urgent() as permitted:
+        assert is_urgent() == permitted
         assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == permitted
+    assert not is_urgent()
     assert os.sched_getscheduler(0) == before
 
 
@@ -77,6 +81,10 @@ def test_the_verdict_is_of_the_worst() -> None:
     assert "highest rate: 0 in 54546 cycles. None: reached." in told
     assert "Achieved of what the wire carries: 89.8%. At least 88%: reached." in told
     assert "1 in 109092 cycles. None: MISSED." in verdict([STEADY, STEADY._replace(skipped=1), FLAT])
+    assert "Real-time priority: not permitted here" in told
+    urgent_ones = [one._replace(urgent=True) for one in (STEADY, FLAT)]
+    assert verdict(urgent_ones).endswith("Real-time priority: granted.")
+    assert "not permitted" in verdict([*urgent_ones, FLAT])
     assert "79.2%. At least 88%: MISSED." in verdict([STEADY, FLAT, FLAT._replace(achieved=900.0)])
 
 

@@ -230,6 +230,17 @@ def test_a_reader_that_goes_away_ends_it_quietly() -> None:
         assert process.wait(timeout=30) == 10
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(("words", "code"), [("ping feetech:sim,ids=1#1", 0), ("nonsense", 2)])
+def test_a_stream_that_is_closed_is_no_trouble(closed: str, words: str, code: int) -> None:
+    line = f'exec "$0" -m motorbus.cli {words} {closed}'
+    ended = subprocess.run(
+        ["/bin/sh", "-c", line, sys.executable], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert ended.returncode == code, ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_can_be_made_for(shell: str) -> None:
     script = build().generate_completion(shell=shell)  # type: ignore[arg-type]

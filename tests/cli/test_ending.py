@@ -10,7 +10,7 @@ import threading
 
 import pytest
 
-from motorbus.cli.ending import asked_to_end
+from motorbus.cli.ending import END, asked_to_end
 
 
 def test_ctrl_c_asks_once_and_then_interrupts() -> None:
@@ -58,3 +58,15 @@ def test_in_another_thread_there_is_no_handler_to_set() -> None:
     thread.start()
     thread.join(10)
     assert said == [False]
+
+
+def test_being_told_to_end_can_ask_too_and_is_kept() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with asked_to_end(also=END) as ended:
+        signal.raise_signal(signal.SIGTERM)
+        assert ended()
+        assert ended.told
+        assert signal.getsignal(signal.SIGTERM) is before
+    with asked_to_end() as ended:
+        signal.raise_signal(signal.SIGINT)
+        assert not ended.told

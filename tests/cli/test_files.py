@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.files import replaced, usable
+from motorbus.cli.files import check_writable, replaced, usable
 from motorbus.errors import LinkLost, RequestError
 
 
@@ -51,3 +51,18 @@ def test_another_text_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: 
         replaced(link, "third")
     assert file.read_bytes() == b"new\r\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "link"]
+
+
+def test_a_file_is_judged_before_anything_is_begun(tmp_path: Path) -> None:
+    check_writable(tmp_path / "a.PNG", (".png", ".svg"))
+    (tmp_path / "there.csv").write_text("x")
+    check_writable(tmp_path / "there.csv")
+    for file, why in (
+        (tmp_path, "it is a folder"),
+        (tmp_path / "none" / "a", "its folder is not there"),
+    ):
+        with pytest.raises(RequestError, match=f"cannot be written: {why}"):
+            check_writable(file)
+    with pytest.raises(RequestError, match=r"what kind of file") as refused:
+        check_writable(tmp_path / "a.txt", (".png", ".svg"))
+    assert refused.value.expected == "a name that ends in .png, .svg"

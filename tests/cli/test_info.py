@@ -7,7 +7,7 @@ import pytest
 import motorbus
 from motorbus.families.feetech.table import STS
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def test_identity_and_limits(run: Run, arm: Simulation) -> None:
@@ -84,3 +84,8 @@ def test_letters_and_packed_bytes_are_told_in_words(run: Run) -> None:
     assert lines["node_id"][2:4] == ["1", "1"]
     rows = run("read", "kst:sim,profile=xqpower#1", "status", "--json").document["registers"]
     assert rows[0]["meaning"] == "0.000 A, 25 °C"
+
+
+def test_of_an_axis_it_says_that_the_angles_are_the_device_s(run: Run, bench: Bench) -> None:
+    assert "the device of a1 tells, in its own angles" in run("info", "a1").err
+    assert run("info", "arm#1").err == ""

@@ -112,3 +112,10 @@ def test_what_is_no_loop_ends_with_2(words: tuple[str, ...], bench: Bench, run: 
     ran = run("loop-stats", *words)
     assert (ran.code, ran.out) == (2, ""), ran.err
     assert torques(bench) == [0, 0, 0]
+
+
+def test_without_hold_there_is_nothing_to_rehearse(bench: Bench, run: Run) -> None:
+    ran = run("loop-stats", "arm", "--dry-run")
+    assert (ran.code, ran.out) == (2, "")
+    assert "--hold with --dry-run" in ran.err
+    assert "would send" in run("loop-stats", "arm", "--dry-run", "--hold").out

@@ -7,7 +7,7 @@ import pytest
 import motorbus
 from motorbus.cli import monitor
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def test_json_lines_one_per_device_and_sample(run: Run, arm: Simulation) -> None:
@@ -61,3 +61,16 @@ def test_what_nobody_tells_has_no_column(run: Run) -> None:
         out = run("monitor", f"{simulation.url}#1+9", "--count", "1").out
     assert "current (A)" in out
     assert "load" not in out
+
+
+def test_an_axis_has_its_own_position_in_its_own_unit(run: Run, bench: Bench) -> None:
+    assert run("move", "a1=30deg").code == 0
+    head, row = run("monitor", "a1", "--count", "1").out.splitlines()[1:3]
+    assert head.split()[:6] == ["axis", "axis", "at", "id", "position", "(rad)"]
+    assert row.split()[:4] == ["a1", "30.0", "deg", "1"] or row.split()[:4] == ["a1", "29.9", "deg", "1"]
+    (told,) = run("monitor", "a1", "--count", "1", "--json").records
+    assert told["axis"] == "a1"
+    assert told["axis_position"] == pytest.approx(0.5236, abs=0.01)
+    assert told["position"] == pytest.approx(0.5236 + 3.1416, abs=0.01)
+    reckoned = run("monitor", "arm#1", "lift", "--count", "1", "--json").records
+    assert [(one.get("axis"), one.get("axis_position")) for one in reckoned] == [(None, None), ("lift", None)]

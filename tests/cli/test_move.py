@@ -111,3 +111,15 @@ def test_devices_and_axes_are_not_mixed(run: Run, bench: Bench) -> None:
     assert run("move", "arm#1+2=3.0", "--velocity", "1").code == 0
     (one,) = run("hold", "a1", "--json").document["axes"]
     assert one["present"] == pytest.approx(3.0 - math.pi, abs=0.05), "a device goes by its own angle"
+
+
+def test_a_bare_number_beyond_the_limits_may_have_been_degrees(bench: Bench, run: Run) -> None:
+    ran = run("move", "a1=10", "a2=0.1")
+    assert ran.code == 8
+    assert "10 without a unit is in rad: did you mean 10deg?" in ran.err
+    assert "without a unit" not in run("move", "a1=500deg").err
+
+
+def test_what_an_option_lacks_is_said_with_the_option(bench: Bench, run: Run) -> None:
+    assert "--speed nan: it is a share" in run("move", "a1=1deg", "--speed", "nan").err
+    assert "--assume lift: where does it stand?" in run("move", "a1=1deg", "--assume", "lift").err

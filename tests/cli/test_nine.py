@@ -44,6 +44,11 @@ def test_it_goes_there_and_back(hand: InHand) -> None:
     assert hand.robot["slide"].estimated == pytest.approx(0.0, abs=1e-4)
 
 
+def test_the_shortest_that_is_allowed_is_kept(hand: InHand) -> None:
+    for _, moved in nine.there_and_back(hand, nine.LEAST):
+        assert moved.duration == pytest.approx(nine.LEAST / 2, rel=0.02)
+
+
 def test_what_is_drawn_leaves_the_pause_out_and_says_so(hand: InHand) -> None:
     movements = nine.there_and_back(hand, 6.0)
     close, (pause,) = nine.drawn_together(movements)
@@ -75,7 +80,14 @@ def test_a_person_is_told_of_each_axis(
     assert out.startswith("Found (simulated)\n")
     for name in nine.AXES:
         assert out.count(f"\n{name} ") == 3
-    for words in ("STS3215", "70.0 deg", "90.00 mm", "estimated", "orders left within", "nine.png (simulated)"):
+    for words in (
+        "STS3215",
+        "70.0 deg",
+        "90.00 mm",
+        "estimated",
+        "orders left within",
+        "nine.png (simulated)",
+    ):
         assert words in out
 
 

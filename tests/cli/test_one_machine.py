@@ -123,7 +123,7 @@ def test_ctrl_c_stops_them_all_and_says_where_they_stand(served_machine: Served,
         error = told(process)
     assert process.returncode == 10
     assert error["exit"] == 10
-    assert any(note.startswith("stopped; now a1 at ") for note in error["notes"])
+    assert any(note.startswith("a1: holds at ") for note in error["notes"])
     there = stand(run, "a1", "a2", "c1")
     assert 0 < there["a1"] < 1.5
     assert -1.5 < there["a2"] < 0
@@ -167,7 +167,7 @@ BAD = {
         "lift=1deg/s --seconds 1", "a9=1 --seconds 1", "upper=1 --seconds 1", "=1 --seconds 1", "a1=fast --seconds 1",
         "a1=nan --seconds 1", "a1=1 --seconds 1 --colour red",
     ),
-    "stop": ("a9", "a1 a9", "ready", "arm#254", "arm#x", "arm#", "a1#1", "arm,baud=1", "nobody:x", "a1=1"),
+    "stop": ("a9", "a9 a8", "ready", "arm#254", "arm#x", "arm#", "a1#1", "arm,baud=1", "nobody:x", "a1=1"),
     "torque": (
         "", "on", "sideways a1", "on a9", "on ready", "on a1 arm#1", "off can", "off a9", "on a1=1",
         "on arm#254", "on c1", "on a1 lift",

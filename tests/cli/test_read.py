@@ -7,7 +7,7 @@ import math
 import pytest
 
 from motorbus.simulation.named import Simulation
-from tests.cli.conftest import Run
+from tests.cli.conftest import Bench, Run
 
 
 def test_telemetry_when_no_register_is_named(run: Run, arm: Simulation) -> None:
@@ -63,3 +63,16 @@ def test_an_option_that_does_not_exist_is_named(run: Run) -> None:
     ran = run("read", "feetech:sim#1", "--colour", "red")
     assert ran.code == 2
     assert "colour" in ran.err
+
+
+def test_of_an_axis_its_own_position_stands_beside_what_the_device_tells(run: Run, bench: Bench) -> None:
+    assert run("move", "a1=-20deg").code == 0
+    told = run("read", "a1", "--json").document
+    assert (told["axis"], told["id"]) == ("a1", 1)
+    assert told["axis_position"] == pytest.approx(-0.349, abs=0.01)
+    assert told["position"] == pytest.approx(-0.349 + math.pi, abs=0.01)
+    out = run("read", "a1").out
+    assert out.startswith("#1, the device of a1 (simulated)\n")
+    assert "a1 at" in out
+    assert run("read", "a1", "present_position").out.startswith("#1, the device of a1")
+    assert run("read", "lift", "--json").document["axis_position"] is None

@@ -41,16 +41,6 @@ def test_what_failed_ends_as_exit_says(bench: Bench, run: Run) -> None:
     assert (torque(run, "a1"), torque(run, "a2")) == (0, 1)
 
 
-def test_who_interrupts_is_told_where_the_axes_stand(bench: Bench) -> None:
-    interruption = KeyboardInterrupt()
-    with robot.robot(["a1", "lift"], {}, Output()) as hand:
-        hand.robot["lift"].declare(0.004)
-        working = hand.working("moving")
-        working.__enter__()
-        assert not working.__exit__(KeyboardInterrupt, interruption, None)
-    assert interruption.__notes__ == ["stopped; now a1 at 0.0 deg, lift at 4.00 mm (estimated)"]
-
-
 def test_options_go_before_the_file_and_only_where_they_are_needed(bench: Bench) -> None:
     with robot.robot(["a1"], {"baud": "1M"}, Output()) as hand:
         assert hand.robot.buses["arm"].link.rate == 1_000_000

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 
 import pytest
 
@@ -36,7 +38,18 @@ def test_on_a_bus_that_is_held_the_other_stop_is_named(run: Run, served: Simulat
     with motorbus.open(served.bus):
         ran = run("stop", served.bus)
     assert ran.code == 4
-    assert "`motorbus estop BUS` reaches it" in ran.err
+    assert f"Ctrl-C there, or SIGTERM to process {os.getpid()}, ends it" in ran.err
+    assert f"`motorbus estop {served.bus}` stops the bus at once" in ran.err
+
+
+def test_a_held_bus_beside_others_is_told_of_with_what_reaches_it(
+    run: Run, served: Simulated, arm: Simulation
+) -> None:
+    with motorbus.open(served.bus):
+        ran = run("stop", f"{arm.url}#1", served.bus)
+    assert ran.code == 6
+    assert "is held by this very program" in ran.err
+    assert f"`motorbus estop {served.bus}` stops the bus at once" in ran.err
 
 
 def test_by_name_and_the_whole_machine_without_one(run: Run, bench: Bench) -> None:
@@ -52,7 +65,27 @@ def test_by_name_and_the_whole_machine_without_one(run: Run, bench: Bench) -> No
         "lift",
     ]
     assert run("stop", "a1").out.splitlines()[-1].startswith("a1 (feetech:sim:")
-    assert run("stop", "arm", "--json").document["devices"][0].keys() == {"bus", "id", "done", "promise"}
+
+
+def test_a_bus_by_its_name_is_its_axes_and_whoever_else_answers(run: Run, bench: Bench) -> None:
+    text = bench.file.read_text(encoding="utf-8").replace('"arm#3"', '"arm#9"')
+    bench.file.write_text(text, encoding="utf-8")
+    for words in ("stop arm", "torque off arm", "stop arm arm#1"):
+        ran = run(*words.split(), "--json")
+        assert ran.code == 6, words
+        told = [(one.get("axis"), one["id"], one["done"]) for one in ran.document["devices"]]
+        assert told == [("a1", 1, True), ("a2", 2, True), ("a3", 9, False), (None, 3, True)]
+    ran = run("estop", "arm", "--json")
+    assert (ran.code, ran.document["buses"][0]["silent"]) == (6, [9])
+
+
+def test_who_is_known_is_stopped_beside_a_name_that_nobody_knows(run: Run, bench: Bench) -> None:
+    ran = run("stop", "a1", "bogus", "lift", "--json")
+    assert ran.code == 6
+    assert [(one["axis"], one["done"]) for one in ran.document["devices"]] == [("a1", True), ("lift", True)]
+    error = json.loads(ran.err)
+    assert "has no bus, axis or group 'bogus'" in error["summary"]
+    assert "the others were visited" in error["advice"]
 
 
 def test_without_a_name_or_a_machine_it_asks_which_bus(run: Run) -> None:

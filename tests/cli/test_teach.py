@@ -47,12 +47,15 @@ def test_no_limp_switches_nothing(bench: Bench, run: Run) -> None:
 
 
 def test_without_names_it_is_all_who_can_be_taught(bench: Bench, run: Run) -> None:
-    assert run("teach", "--output", "wave.csv", "--seconds", "1").code == 0
+    ran = run("teach", "--output", "wave.csv", "--seconds", "1")
+    assert ran.code == 0
+    assert "note: not taught, for nobody can lead them by hand: c1, lift" in ran.err
     assert list(Trajectory.load("wave.csv").axes) == ["a1", "a2", "a3"]
 
 
-def test_ctrl_c_ends_it_and_what_was_taught_is_kept(
-    bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 10)])
+def test_a_signal_ends_it_and_what_was_taught_is_kept(
+    number: signal.Signals, code: int, bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm = bench.simulations["arm"].simulator
     receive, heard = arm.receive, []
@@ -60,12 +63,12 @@ def test_ctrl_c_ends_it_and_what_was_taught_is_kept(
     def interrupted(data: object, at: float) -> None:
         heard.append(at)
         if len(heard) == 60:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
         receive(data, at)  # type: ignore[arg-type]
 
     monkeypatch.setattr(arm, "receive", interrupted)
     ran = run("teach", "arm", "--output", "wave.csv")
-    assert ran.code == 0, ran.err
+    assert ran.code == code, ran.err
     assert 2 < len(Trajectory.load("wave.csv").times) < 60
 
 
@@ -113,5 +116,7 @@ def test_what_cannot_be_taught_ends_with_2_and_lets_nobody_go(
     ran = run("teach", *words)
     assert (ran.code, ran.out) == (2, ""), ran.err
     assert "error: " in ran.err
+    assert "the torque goes off now" not in ran.err
+    assert "has train" not in ran.err
     assert torques(bench) == [HELD, HELD, HELD]
     assert not Path("w.csv").exists()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
 import pytest
 
-from motorbus.core.operation import Exchange
-from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
+from motorbus.core.operation import Alone, Answer, Effect, Exchange, Operation, Pause, Rank, Together
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply
 from motorbus.motion.command import Command
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
@@ -24,6 +28,36 @@ def test_the_command_is_lost_with_the_next_order_from_elsewhere() -> None:
         assert [axis.name for axis in mine.held()] == ["a2"]
         with pytest.raises(Interrupted):
             mine.depart()
+
+
+def test_two_commands_are_joined_and_each_counts_from_when_it_was_taken() -> None:
+    with machine(arm="1-3") as (made, _), Robot.of(made) as robot:
+        first, second, third = robot.axes.values()
+        nobody = Command(())
+        one = nobody.joined(Command([first, second]))
+        assert one.lost() is None
+        first.stop()
+        other = Command([first, third])
+        both = one.joined(other)
+        assert both.axes == (first, second, third)
+        assert both.lost() is None  # `first` was taken anew
+        second.hold()
+        assert [axis.name for axis in both.held()] == ["a1", "a3"]
+        assert other.joined(nobody).lost() is None
+        assert isinstance(one.lost(), Interrupted)
+
+
+def test_the_rest_of_a_command_is_over_those_that_nobody_told_anything() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        mine = Command(robot.axes.values())
+        robot["a1"].stop()
+        rest = mine.rest()
+        assert rest.axes == (robot["a2"],)
+        assert rest.lost() is None
+        assert isinstance(mine.lost(), Interrupted)
+        robot["a2"].bus.run(robot["a2"].able["disable_torque"](robot["a2"].device))  # past the axis
+        assert isinstance(rest.lost(), Interrupted)
+        assert rest.rest().axes == ()
 
 
 @pytest.mark.parametrize("verb", ["stop", "hold", "disable_torque", "enable_torque"])
@@ -103,3 +137,120 @@ def test_stopping_visits_those_that_are_still_commanded_and_tells_who_did_not_ac
         }
         assert sims["arm"][1].memory["torque_enable"] == 0  # somebody let it go, and that is respected
         sims["arm"][2].plug()
+
+
+# -- what is watched ---------------------------------------------------------------------------------------------------
+
+
+def test_in_what_is_watched_nothing_that_moves_or_gives_torque_leaves_once_the_command_is_lost() -> None:
+    def tried(effect: Effect, rank: Rank = Rank.CONTROL) -> Exchange[Answer]:
+        return Exchange(b"x", effect=effect, rank=rank)
+
+    exchanges = [
+        tried(Effect.TORQUE),
+        tried(Effect.MOTION),
+        tried(Effect.MOTION, Rank.STOP),
+        tried(Effect.NONE),
+        tried(Effect.PERSISTENT),
+    ]
+
+    def several() -> Operation[str]:
+        yield from Pause(0.0)
+        for one in exchanges:
+            yield from one
+        yield from Together(exchanges)
+        yield from Alone(exchanges[0])
+        return "done"
+
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        mine = Command([robot["a1"]])
+        seen: list[Exchange[Any]] = []
+        assert _carried(mine.watched(several()), seen) == "done"
+        robot["a1"].hold()
+        left = [one.refusal is None or one.refusal(lambda _: 0) is None for one in seen]
+        assert left == [False, False, True, True, True] * 2 + [False]
+
+
+def _carried(steps: Any, seen: list[Exchange[Any]]) -> Any:
+    """Go through an operation and note every exchange in it; gives what it returns."""
+    try:
+        step = next(steps)
+        while True:
+            if isinstance(step, Exchange):
+                seen.append(step)
+            elif isinstance(step, Together):
+                for one in step.operations:
+                    _carried(iter(one), seen)
+            elif isinstance(step, Alone):
+                _carried(iter(step.operation), seen)
+            step = steps.send(None)
+    except StopIteration as end:
+        return end.value
+
+
+def test_what_is_watched_gets_its_values_and_its_errors_and_can_clean_up() -> None:
+    said: list[object] = []
+
+    def reading(position: Callable[[], Any]) -> Operation[float]:
+        try:
+            first: float = yield from position()
+            said.append(first)
+            raise_here: float = yield from position()
+            return raise_here
+        except MotorbusError as error:
+            said.append(type(error))
+            raise
+        finally:
+            said.append("cleaned")
+
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        axis = robot["a1"]
+        mine = Command([axis])
+
+        def position() -> Any:
+            if said:
+                sims["arm"][1].unplug()
+            return axis.able["position"](axis.device)
+
+        with pytest.raises(NoReply):
+            axis.bus.run(mine.watched(reading(position)))
+        sims["arm"][1].plug()
+        assert said == [pytest.approx(pi, abs=0.001), NoReply, "cleaned"]
+
+
+def test_a_watched_operation_that_is_given_up_is_closed() -> None:
+    said: list[str] = []
+
+    def waiting() -> Operation[None]:
+        try:
+            yield from Pause(1.0)
+        finally:
+            said.append("closed")
+
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        steps = Command([robot["a1"]]).watched(waiting())
+        next(steps)
+        steps.close()
+        assert said == ["closed"]
+
+
+def test_a_stop_of_another_device_costs_one_look_and_then_it_is_quick_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        mine = Command([robot["a1"]])
+        looked: list[int] = []
+        known = robot["a1"].bus.turns.known
+        stops = known.stops
+
+        def counted(node: int) -> int:
+            looked.append(node)
+            return int(stops(node))
+
+        monkeypatch.setattr(known, "stops", counted)
+        robot["a2"].bus.run(robot["a2"].able["disable_torque"](robot["a2"].device))
+        assert [mine.lost(), mine.lost(), mine.lost()] == [None] * 3
+        assert looked == [1]
+        robot["a1"].bus.run(robot["a1"].able["disable_torque"](robot["a1"].device))  # past the axis
+        assert isinstance(mine.lost(), Interrupted)
+        assert isinstance(mine.lost(), Interrupted)

@@ -42,7 +42,7 @@ def test_the_way_of_a_follower_has_no_jump() -> None:
 def watched(sims: Any, places: list[float]) -> bool:
     """Where the follower's target is, cycle by cycle."""
     raw = sims["can"][0x21].memory["goal_position"]
-    places.append(radians(raw / 10) if abs(raw) > 1800 else radians(raw) / 10)
+    places.append(radians(raw / 10))
     return len(places) > 200
 
 
@@ -58,6 +58,14 @@ def test_leaders_are_let_go_and_followers_hold() -> None:
         robot.enable_torque()
         robot.follow({"a1": "a2"}, seconds=0.2)
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 1]
+
+
+def test_what_the_loop_refuses_lets_nobody_go() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        with pytest.raises(RequestError, match="20000 Hz cannot be"):
+            robot.follow({"a1": "a2"}, rate=20000.0, seconds=1.0)
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [1, 1]
 
 
 def test_a_leader_that_nobody_hears_moves_nobody() -> None:

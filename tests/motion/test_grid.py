@@ -63,6 +63,18 @@ def test_time_that_was_not_the_loops_is_forgiven() -> None:
     assert one.take(5.041) == pytest.approx(5.05)
 
 
+def test_what_was_late_before_is_booked_and_only_the_rest_forgiven() -> None:
+    one, told = grid()
+    one.take(5.0)
+    one.book(5.009)
+    assert (told.overruns, told.skipped) == (0, 0)
+    one.book(5.0349)
+    assert (told.overruns, told.skipped) == (1, 2)
+    one.forgive(5.0749)
+    assert one.take(5.0749) == pytest.approx(5.08)
+    assert (told.overruns, told.skipped) == (1, 2)
+
+
 def test_how_long_things_took() -> None:
     took = Took()
     assert took.mean == 0.0

@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
-import motorbus
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.abreast import Abreast, Led
 from motorbus.motion.body import Body
 from motorbus.motion.loop import AsyncLoop, Errand, Loop, LoopFace, looped
-from motorbus.motion.rounds import LoopState
+from motorbus.motion.readings import LoopState
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import machine
+from tests.motion.machines import Heard, machine
 
 
 def lead(loop: Any, state: LoopState) -> None:
@@ -175,5 +174,49 @@ def test_ctrl_c_ends_what_has_no_other_end_and_is_raised_otherwise() -> None:
 
 
 def test_a_loop_needs_an_open_machine() -> None:
-    assert motorbus.Robot.loop.__doc__
-    assert motorbus.AsyncRobot.loop.__doc__
+    with machine(arm="1") as (made, _):
+        with Robot.of(made) as robot:
+            pass
+        with pytest.raises(RequestError, match="the machine is closed"):
+            robot.loop(100)
+        with pytest.raises(RequestError, match="the machine is not open"):
+            AsyncRobot.of(made).loop(100)
+
+
+def test_a_loop_that_was_not_entered_says_so() -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        sims["arm"].line = line = Heard()
+        loop = robot.loop(100)
+        with pytest.raises(RequestError, match=r"(?s)was not entered.*enter the loop with `with`"):
+            next(loop)
+        with pytest.raises(RequestError, match="was not entered"):
+            loop.goal["a1"] = 0.1
+        assert not line.sent
+
+
+def test_a_loop_that_was_left_moves_nothing_any_more_and_is_not_entered_again() -> None:
+    with machine(arm="1", exit="leave") as (made, sims), Robot.of(made) as robot:
+        with robot.loop(100) as loop:
+            loop.goal["a1"] = 0.1
+            next(loop)
+        sims["arm"].line = line = Heard()
+        for tries in (lambda: next(loop), lambda: loop.goal.update({"a1": 0.2}), loop.__enter__):
+            with pytest.raises(RequestError, match=r"the loop was (left|entered before)"):
+                tries()
+        assert not line.sent
+        assert (loop.axes, loop.statistics.cycles) == (("a1",), 1)
+
+
+def test_the_same_of_one_on_an_event_loop() -> None:
+    async def main() -> None:
+        with machine(arm="1", exit="leave") as (made, _):
+            async with AsyncRobot.of(made) as robot:
+                loop = robot.loop(100)
+                with pytest.raises(RequestError, match="was not entered"):
+                    await anext(loop)
+                async with loop:
+                    await anext(loop)
+                with pytest.raises(RequestError, match="was left"):
+                    await anext(loop)
+
+    asyncio.run(main())

@@ -161,6 +161,23 @@ def test_a_failure_after_the_start_stops_nobody_else() -> None:
     assert told["b"] == pytest.approx(0.0, abs=0.002), "and the dead one held it up by nothing"
 
 
+@pytest.mark.parametrize(
+    "error", [NoReply("it is gone"), KeyboardInterrupt("it is gone"), KeyboardInterrupt()]
+)
+def test_who_fails_with_its_seat_lets_nobody_begin(error: BaseException) -> None:
+    several = Several(True, True)
+    beat = Beat(several.buses)
+
+    def gone() -> Operation[None]:
+        beat.of("a", several.origins["a"]).fails(error)
+        yield from Pause(0)
+
+    waiting = attending(beat, taking_part(beat, "b", several.origins["b"], 0.1))
+    told = several.concert.run({"a": gone(), "b": waiting})["b"]
+    assert isinstance(told, Interrupted)
+    assert (str(error) or "KeyboardInterrupt") in str(told)
+
+
 def test_when_all_have_come_a_failure_changes_nothing_for_anybody() -> None:
     several = Several(True, True)
     meeting = Meeting[int](several.buses)

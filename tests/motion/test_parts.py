@@ -32,6 +32,13 @@ def test_a_part_with_one_bus_moves_nobody_else() -> None:
         assert not robot["c1"].engaged
 
 
+def test_the_first_goals_leave_earlier_by_the_time_that_they_take_on_the_wire() -> None:
+    with machine(arm="1-6") as (made, _), Robot.of(made) as robot:
+        moved = robot.move(dict.fromkeys(robot.axes, 0.3))
+        # a packet for six servos has 26 bytes, and 10 bits for each at 1 Mbit/s
+        assert moved.axes["a1"].started == pytest.approx(-26 * 10 / 1e6, abs=1e-6)
+
+
 def test_an_axis_that_measures_tells_what_was_measured_and_not_what_was_asked() -> None:
     with machine(can="0x25") as (made, _), Robot.of(made) as robot:
         moved = robot.move({"c1": 0.3})
@@ -53,6 +60,18 @@ def test_a_stepper_alone_tells_its_progress_and_its_track() -> None:
         assert not moved.cycles
         told = [event.done for event in events if isinstance(event, Progress) and event.what == "moving"]
         assert len(told) >= 3
+
+
+def test_a_stepper_is_sent_again_to_where_it_stands_though_its_pulses_do_not_say_that_place_exactly() -> None:
+    with machine(arm="1", lift=True) as (made, _), Robot.of(made) as robot:
+        robot["lift"].declare(0.0)
+        robot.move({"a1": 0.3, "lift": 0.0123457})
+        stands = robot["lift"].estimated
+        assert stands != 0.0123457
+        moved = robot.move({"a1": 0.1, "lift": 0.0123457})
+        assert (moved.axes["lift"].present, robot["lift"].estimated) == (stands, stands)
+        assert (moved.axes["lift"].started, moved.axes["lift"].ended, moved.ended_apart) == (0.0, 0.0, 0.0)
+        assert robot["a1"].position() == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_stepper_that_has_no_way_to_go_is_not_even_asked() -> None:

@@ -108,8 +108,11 @@ def test_no_order_is_farther_from_the_measured_position_than_max_step(axis: Any,
             one.judge(1)
             one.step(1)
 
-    with pytest.raises(LimitExceeded, match=r"a1: the goal .* where it is, and one command may be 20.0 deg"):
+    with pytest.raises(
+        LimitExceeded, match=r"a1: the goal .* is, and one command may be 20.0 deg"
+    ) as refused:
         pushes()
+    assert ("it stays at its last goal" in refused.value.advice) == (not direct)
     assert one.sent is not None
     assert radians(19) < one.sent <= radians(20)
     assert one.asked == one.sent  # and there it stays
@@ -128,29 +131,47 @@ def test_a_short_hitch_is_made_good_and_a_long_one_begins_anew_at_rest(axis: Any
 
 def test_braking_ends_at_the_follower_s_stopping_point(axis: Any) -> None:
     one = place(axis)
-    assert not one.halt()
     for _ in range(40):
         here = led(one, 2.0)
-    assert one.halt()
+    one.halt()
     assert one.asked == pytest.approx(here + radians(90) ** 2 / (2 * radians(360)), rel=1e-6)
     while not one.arrived:
         here = led(one, one.asked or 0.0)
     assert here == pytest.approx(one.asked)
-    assert not one.halt()
 
 
-def test_who_is_stopped_from_elsewhere_shows_it(axis: Any) -> None:
+def test_who_is_at_rest_when_all_brake_stays_whatever_was_asked(axis: Any) -> None:
     one = place(axis)
-    assert not one.interrupted
-    axis.stop()
-    assert one.interrupted
+    one.asked = 2.0
+    one.halt()
+    assert one.arrived
+    assert one.asked == 0.0
+    assert one.step(1) == pytest.approx(pi)
+
+
+def test_at_rest_it_goes_on_slowly_from_its_last_goal(axis: Any) -> None:
+    one = place(axis)
+    for _ in range(40):
+        here = led(one, 2.0)
+    assert one.stay() - pi == pytest.approx(here)
+    one.rest()
+    assert 0 < led(one, 2.0) - here < STEP / 10
+
+
+def test_what_is_led_no_more_waits_for_a_goal(axis: Any) -> None:
+    one = place(axis)
+    led(one, 0.5)
+    assert one.follows
     one.release()
-    assert not one.interrupted
-    assert (one.asked, one.sent, one.begun) == (None, None, False)
+    one.halt()  # and these do nothing
+    one.rest()
+    assert (one.asked, one.sent, one.begun, one.follows) == (None, None, False, False)
 
 
 def test_a_direct_goal_is_never_braked(axis: Any) -> None:
     one = place(axis, direct=True)
     led(one, STEP)
-    assert not one.halt()
+    one.halt()
+    one.rest()
     assert one.arrived
+    assert one.sent == pytest.approx(STEP)

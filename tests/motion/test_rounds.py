@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from math import inf, nan, radians
 from typing import Any
 
@@ -287,53 +287,3 @@ def test_an_emergency_stop_in_the_middle_is_the_end_of_all_goals() -> None:
             next(loop)
         assert sims["arm"][1].memory["goal_position"] == written
         assert sims["arm"][1].memory["torque_enable"] == 0
-
-
-@pytest.mark.parametrize("jerk", [None, 100.0])
-def test_leaving_brakes_whoever_is_under_way(jerk: float | None) -> None:
-    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
-        with suppress(ZeroDivisionError), robot.loop(RATE, jerk=jerk) as loop:
-            loop.goal.update({"a1": 2.0, "a2": 0.0})
-            state = cycles(loop, 60)
-            raise ZeroDivisionError
-        place = loop._rounds.places["a1"]
-        way = place.sent - state.position["a1"]
-        assert 0.5 * radians(90) ** 2 / radians(360) < way < 0.5
-        assert not robot["a1"].under_way
-        sims["arm"].line = line = Heard()
-        robot.buses["arm"].link.advance(0.5)  # type: ignore[attr-defined]
-        assert robot["a1"].position() == pytest.approx(place.sent, abs=0.01)
-        assert all(
-            data[4] in (0x02, 0x82) for data in line.sent if isinstance(data, bytes)
-        )  # nothing but reading any more
-
-
-def test_leaving_what_was_stopped_or_has_not_begun_sends_nothing() -> None:
-    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
-        with robot.loop(RATE):
-            pass
-        with robot.loop(RATE) as loop:
-            loop.goal["a1"] = 1.0
-            cycles(loop, 40)
-            robot["a1"].stop()
-            sims["arm"].line = line = Heard()
-        assert not line.sent
-
-
-def test_leaving_visits_the_other_buses_when_one_is_gone() -> None:
-    with machine(arm="1", can="0x21", exit="leave") as (made, _), Robot.of(made) as robot:
-        loop = robot.loop(RATE)
-
-        def fails() -> None:
-            with loop:
-                loop.goal.update({"a1": 1.0, "c1": 0.6})
-                cycles(loop, 30)
-                robot.buses["arm"].link.unplug()  # type: ignore[attr-defined]
-                raise ZeroDivisionError
-
-        with pytest.raises(ZeroDivisionError) as left:
-            fails()
-        assert "on leaving the loop" in left.value.__notes__[0]
-        assert loop._rounds.places["c1"].arrived
-        assert not robot["c1"].under_way
-        robot.buses["arm"].link.plug()  # type: ignore[attr-defined]

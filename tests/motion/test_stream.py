@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 from math import pi
 from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.operation import Data, Progress
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
-from motorbus.motion.stream import Fate, Grid, grains, rate_for
-from motorbus.session.robot import Robot
+from motorbus.motion.stream import SETTLE, Fate, Grid, grains, rate_for
+from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import machine
 
 
@@ -152,3 +153,50 @@ def test_a_part_that_fails_is_told_to_the_others_once() -> None:
     with pytest.raises(Interrupted, match="another part of it failed") as told:
         fate.check()
     assert "the first" in str(told.value)
+
+
+# -- after the end -----------------------------------------------------------------------------------------------------
+
+
+class Last(PerfectLine):
+    """A line on which it is noted when (s) the host was last heard."""
+
+    at = 0.0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        self.at = at if sender is Side.HOST else self.at
+        return super().carry(sender, data, at)
+
+
+def test_an_axis_has_a_second_to_come_to_its_place_and_no_more() -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        sims["arm"][1].blocked = (2000, 2048 + 240)
+        sims["arm"].line = line = Last()
+        with pytest.raises(Stalled, match="a1 is not in position"):
+            robot.move({"a1": 0.4}, duration=2.0)
+        assert line.at == pytest.approx(2.0 + SETTLE, abs=0.05)
+
+
+@pytest.mark.parametrize(("whose", "later"), [("a1", 0.75), ("lift", 0.3)])
+def test_while_an_axis_comes_to_its_place_a_stop_of_it_or_of_another_ends_that(
+    whose: str, later: float
+) -> None:
+    async def both() -> None:
+        with machine(arm="1", lift=True, exit="leave") as (made, sims):
+            events: list[Any] = []
+            async with AsyncRobot.of(made, report=events.append) as robot:
+                robot["lift"].declare(0.0)
+                sims["arm"][1].blocked = (2000, 2048 + 240)
+                sims["arm"].line = line = Last()
+                movement = asyncio.create_task(robot.move({"a1": 0.4, "lift": 0.02}, duration=4.0))
+                while not any(one.done >= 3700 for one in events if isinstance(one, Progress)):
+                    await asyncio.sleep(0)
+                end = robot.buses["arm"].link.now() + later
+                while robot.buses["arm"].link.now() < end:
+                    await asyncio.sleep(0)
+                await robot[whose].stop()
+                with pytest.raises(Interrupted, match=f"{whose}: the movement was ended by another order"):
+                    await movement
+                assert line.at - end < 0.1
+
+    asyncio.run(asyncio.wait_for(both(), 60))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 
 import pytest
 
@@ -12,13 +13,16 @@ from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import machine
 from tests.motion.test_follow import move
 
+LATE = 0.0005
+"""s; a reading is there so long after the beginning of its cycle, at most."""
 
-def test_what_is_taught_is_on_the_grid_from_0_on() -> None:
+
+def test_what_is_taught_has_the_times_of_its_readings_from_0_on() -> None:
     with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
         robot.enable_torque()
         found = robot.teach(seconds=1.0)
         assert isinstance(found, Trajectory)
-        assert found.times == pytest.approx([number / 50 for number in range(51)])
+        assert found.times == pytest.approx([number / 50 for number in range(51)], abs=LATE)
         assert set(found.axes) == {"a1", "a2"}
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
         assert not robot["a1"].engaged
@@ -49,7 +53,41 @@ def test_a_cycle_in_which_somebody_was_silent_has_no_sample() -> None:
 
         found = robot.teach(until=over)
         assert len(found.times) < 41
-        assert all(round(at * 50, 6) == pytest.approx(round(at * 50)) for at in found.times)
+        assert max(after - before for before, after in pairwise(found.times)) > 0.03  # where it was silent
+
+
+def test_a_reading_that_is_late_stands_where_it_was_taken() -> None:
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        count = [0]
+
+        def over() -> bool:
+            count[0] += 1
+            if count[0] == 3:
+                robot.buses["arm"].link.advance(0.033)  # type: ignore[attr-defined]  # a busy host
+            return count[0] == 5
+
+        found = robot.teach(until=over)
+        assert found.times == pytest.approx([0.0, 0.02, 0.04, 0.073, 0.08], abs=LATE)
+
+
+def test_it_ends_with_as_many_samples_as_a_trajectory_can_have_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("motorbus.motion.teach.MOST", 20)
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        assert len(robot.teach().times) == 20
+        assert "teaching ended after 0.38 s: a trajectory has 20 samples at most" in caplog.text
+        caplog.clear()
+        assert len(robot.teach(seconds=0.38).times) == 20
+        assert not caplog.text
+
+
+def test_what_the_loop_refuses_lets_nobody_go() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        with pytest.raises(RequestError, match="20000 Hz cannot be"):
+            robot.teach(rate=20000.0, seconds=1.0)
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [1, 1]
 
 
 def test_too_few_samples_are_told() -> None:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from motorbus import __version__
-from motorbus.cli import faces, machine
+from motorbus.cli import faces, flags, machine
 from motorbus.cli.exits import Exit, exit_code
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
@@ -145,12 +145,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _fill_closed_streams() -> None:
     """What the shell has closed (`>&-`) is None here, and its number would be given to the next port."""
-    if sys.stdin is None:
-        sys.stdin = open(os.devnull, encoding="utf-8")
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
 
 
 @contextmanager
@@ -204,7 +201,11 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
         command, bound, ignored = parse(app, words)
         bound.arguments.update(dict.fromkeys(ignored, output))
         with _logging(verbose), machine.using(file):
-            result = command(*bound.args, **bound.kwargs)
+            try:
+                result = command(*bound.args, **bound.kwargs)
+            except RequestError as error:
+                flags.explain(error, command, bound.arguments.get("options", {}))
+                raise
         return result if isinstance(result, int) else Exit.OK
 
     app.meta.suppress_keyboard_interrupt = False

@@ -12,10 +12,11 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from motorbus import families
+from motorbus import families, plot
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit
-from motorbus.cli.nine import nine
+from motorbus.cli.files import check_writable
+from motorbus.cli.nine import LEAST, nine
 from motorbus.cli.output import Output
 from motorbus.cli.target import opened
 from motorbus.cli.wave import served, waved
@@ -58,20 +59,25 @@ def demo(
     Parameters
     ----------
     output_
-        Where the picture goes; .png or .svg.
+        Where the picture goes; .png, .svg or .pdf.
     ids
         With --family: the ids of the simulated devices.
     duration
-        Seconds of motion.
+        Seconds of motion: 4 to 60; with --family, 1 to 60.
     family
         Only the devices of this one: servos in a loop; of a stepper controller a project is written and run.
     """
-    if not 1.0 <= duration <= 60.0:
-        raise RequestError(f"--duration {duration}: too short or too long", expected="1 to 60 seconds")
+    least = 1.0 if family else LEAST
+    if not least <= duration <= 60.0:
+        why = "" if family else ": the slide needs half of that for each of its ways"
+        raise RequestError(
+            f"--duration {duration:g}: too short or too long", expected=f"{least:g} to 60 seconds{why}"
+        )
     if ids and not family:
         raise RequestError("--ids: the machine of the demo has its own", expected="--family with --ids")
     if family:
         families.load(family)
+    check_writable(output_, plot.KINDS)
     output.simulated = True
     if not family:
         nine(duration, output_, output)

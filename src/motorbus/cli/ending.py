@@ -8,17 +8,21 @@ import signal
 import sys
 import threading
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator, Sequence
+
+END: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""The signals by which a program is told to end."""
 
 
 class _Ending:
-    """Asked again and again: has somebody said that it shall end?"""
+    """Asked again and again: has somebody said that it shall end? `told` when it was a signal to the program."""
 
     def __init__(self) -> None:
         self.asked = False
+        self.told = False
         self._keyboard = os.name != "nt" and sys.stdin is not None and sys.stdin.isatty()
 
     def __call__(self) -> bool:
@@ -29,20 +33,29 @@ class _Ending:
 
 
 @contextmanager
-def asked_to_end() -> Iterator[Callable[[], bool]]:
-    """Within it Ctrl-C only asks, once; the second one interrupts as ever. Gives what says whether it was asked."""
+def asked_to_end(*, also: Sequence[signal.Signals] = ()) -> Iterator[_Ending]:
+    """Within it Ctrl-C only asks, once; the second one interrupts as ever. Gives what says whether it was asked.
+
+    So do the signals in `also`, as those in `END`; whoever says so has to raise KeyboardInterrupt for them in the end.
+    """
     ending = _Ending()
     if threading.current_thread() is not threading.main_thread():
         yield ending  # Python lets only the main thread have handlers
         return
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *also)}
 
     def ask(number: int, frame: object) -> None:
         ending.asked = True
-        signal.signal(signal.SIGINT, before)
+        ending.told = ending.told or number != signal.SIGINT
+        restore()
 
-    signal.signal(signal.SIGINT, ask)
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    for number in before:
+        signal.signal(number, ask)
     try:
         yield ending
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()

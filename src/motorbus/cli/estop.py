@@ -72,12 +72,12 @@ def estop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving((bus,) if bus else (), output):
+    with forgiving((bus,) if bus else ()):
         stops = _stop_each(_wanted(bus), options, output) if bus else _stop_all(options, output)
-    output.document("motorbus.estop/1", {"buses": stops})
-    for one in stops:
-        output.text("\n  ".join(_lines(one)))
-    return _verdict(stops)
+        output.document("motorbus.estop/1", {"buses": stops})
+        for one in stops:
+            output.text("\n  ".join(_lines(one)))
+        return _verdict(stops)
 
 
 class Wanted(NamedTuple):

@@ -26,6 +26,28 @@ def usable(file: Path, what: str) -> Iterator[None]:
         raise RequestError(f"{file} cannot be {what}: {why}", advice="see that the path is right") from error
 
 
+def check_writable(file: Path, kinds: tuple[str, ...] = ()) -> None:
+    """Raise RequestError for a file that cannot be written, or is none of these kinds, before anything is begun."""
+    if kinds and not file.name.lower().endswith(kinds):
+        raise RequestError(
+            f"{file}: what kind of file shall that be?",
+            expected=f"a name that ends in {', '.join(kinds)}",
+            advice="nothing was sent",
+        )
+    folder = file.parent
+    why = ""
+    if file.is_dir():
+        why = "it is a folder"
+    elif not folder.is_dir():
+        why = "its folder is not there"
+    elif not os.access(file if file.exists() else folder, os.W_OK):
+        why = "permission denied"
+    if why:
+        raise RequestError(
+            f"{file} cannot be written: {why}", advice="see that the path is right; nothing was sent"
+        )
+
+
 def replaced(file: Path, text: str) -> None:
     """Give a file that is there another text, all of it or nothing: a cut in the middle leaves the old one.
 

@@ -28,7 +28,9 @@ app = App(
     usage="Usage: motorbus follow LEADER FOLLOWER [OPTIONS]",
     help_epilogue="""Both are an axis, or a group or bus of axes: the first axis of the one is
 followed by the first of the other, and so on. Leaders are let go, so that they
-can be led by hand: AN ARM SAGS, hold it. They stay limp. A follower goes where
+can be led by hand: AN ARM SAGS, hold it. They stay limp. What has no torque
+switch cannot be let go, and leads only when something else moves it: that is
+told. A follower goes where
 its leader is, within its own velocity and acceleration; while its leader
 stands where it may not go, it stays.
 
@@ -74,6 +76,9 @@ def follow(
     options
         Any option of the buses, as a flag.
     """
+    from motorbus.motion.budget import refuse_above
+    from motorbus.motion.follow import check_able
+
     pairs = _pairs(leader, follower)
     span = units.parse(seconds, "time") if seconds else None
     if not rate > 0 or (span is not None and not span > 0):
@@ -83,9 +88,14 @@ def follow(
         if dry_run:
             return _plan(hand, pairs, present)
         goals = {one: present[other] for other, one in pairs.items() if other in present and one in present}
+        check_able(hand.robot, pairs, "train", "followed in a loop")
+        check_able(hand.robot, pairs.values(), "train", "led in a loop")
+        refuse_above(hand.robot.budget(rate, [*pairs, *pairs.values()]))
         _consent(hand, present, goals, yes=yes)
         if limp := [name for name in pairs if hasattr(hand.robot[name], "disable_torque")]:
             output.note(f"{', '.join(limp)}: the torque goes off now, and stays off: hold what could sag")
+        if stiff := [name for name in pairs if name not in limp]:
+            output.note(f"note: {', '.join(stiff)} cannot be let go: only what else moves it leads")
         with hand.working("following"), asked_to_end() as ended:
             until = counted(hand, "following", ended, rate, span)
             followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until)

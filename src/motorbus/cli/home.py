@@ -123,7 +123,12 @@ def _axes(
     if velocity:
         raise RequestError("axes home as fast as their devices are set to", expected="no --velocity")
     for name in names:
-        offers(target(name).family, "home")
+        if not hasattr((family := target(name).family).devices.blocking, "home"):
+            raise RequestError(
+                f"{name}: {family.name} devices do not home",
+                expected="axes that do",
+                advice="nothing was sent",
+            )
     with robot(names, options, output) as hand:
         for name in names:
             able(hand, name, "home")

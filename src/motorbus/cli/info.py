@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import alarms
 from motorbus.cli import registers as table_rows
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_called
 from motorbus.cli.output import Output
 from motorbus.cli.target import device, face, id_shown, opened, table_of
 from motorbus.core.entry import Storage
@@ -27,6 +28,8 @@ _OPEN: Final = (
 app = App(
     name="info",
     help_epilogue="""Reads only. A device with unknown firmware is named as such and never written.
+Limits and registers are the device's, in its own angles, also where it is
+called by the name of an axis; the limits of the axis are in the machine file.
 
 Examples:
 
@@ -50,7 +53,7 @@ def info(
     Parameters
     ----------
     device_
-        FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3
+        FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3, or an axis
     registers
         Read every register and show address, value, unit, storage and access.
     options
@@ -67,6 +70,8 @@ def info(
         told = alarms.in_words(one)
     locked = {entry.name: _word(entry, int(values[entry.name])) for entry in lock}
     _show(identity, family, table_rows.facts(one, entries, values), registers, output, told, locked)
+    if axis := axes_called((device_,)).get((bus, node)):
+        output.note(f"note: all of it is what the device of {axis} tells, in its own angles")
     return Exit.OK
 
 

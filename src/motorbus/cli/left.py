@@ -13,8 +13,11 @@ from motorbus.session.robot import Robot
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
+    from motorbus.motion.axes import Axis
     from motorbus.motion.leaving import Leaving
+    from motorbus.motion.machine import Machine
 
 NEAR: Final = 0.02
 """rad; as near as a device comes to where it is parked."""
@@ -25,14 +28,20 @@ NEAR_LINEAR: Final = 0.001
 class ToldRobot(Robot):
     """A robot whose error says how it was left; what takes its time is announced on `output`."""
 
-    output: Output | None = None
+    output: Output
+    late = 0.0
     _concerned: Mapping[str, str] = {}
+
+    def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
+        super().__init__(machine, buses, axes)
+        for bus in buses.values():
+            bus.turns.latency = max(self.late, bus.turns.latency)
 
     def _end(self, others: BaseException | None) -> None:
         if others is not None and not self._shut:
             self._concerned = {name: axis.spec.exit for name, axis in self.axes.items() if axis.engaged}
             parked = [name for name, how in self._concerned.items() if how == "park"]
-            if parked and self.output is not None:
+            if parked:
                 self.output.note(f"note: parking {', '.join(parked)}; Ctrl-C stops that too")
         try:
             super()._end(others)
@@ -73,3 +82,8 @@ class ToldRobot(Robot):
         near = NEAR_LINEAR if axis.spec.linear else NEAR
         parked = at is not None and abs(at - (axis.spec.park or 0.0)) < near
         return "parked" if parked else "not parked, holds"
+
+
+def left_as_told(output: Output, late: float) -> type[ToldRobot]:
+    """`ToldRobot` with what it tells on, and how late (s) its devices may be, from its first question on."""
+    return type("ToldRobot", (ToldRobot,), {"output": output, "late": late})

@@ -10,7 +10,7 @@ from motorbus.cli.ending import asked_to_end
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_named
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.robot import robot
+from motorbus.cli.robot import rehearse, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
 from motorbus.errors import RequestError
@@ -78,10 +78,19 @@ def loop_stats(
         raise RequestError(
             "--seconds must be above 0, --rate not below 0", expected="s, and Hz", advice="nothing was sent"
         )
+    if dry_run and not hold:
+        raise RequestError(
+            "without --hold it changes nothing, so there is nothing to rehearse",
+            expected="--hold with --dry-run",
+            advice="leave it out; nothing was sent",
+        )
     with robot(axes, options, output) as hand:
+        if dry_run:
+            rehearse(hand, axes, lambda axis: axis.hold())
+            return Exit.OK
         budget = hand.robot.budget(rate, axes)
         chosen = rate or (USUAL * budget.highest_rate if budget.buses else 1.0)
-        took, without, found = _run(hand, axes, chosen, span, hold=hold and not dry_run)
+        took, without, found = _run(hand, axes, chosen, span, hold=hold)
     _tell(took, without, found, budget, output)
     return Exit.OK
 

@@ -218,7 +218,9 @@ def _unknown(text: str, name: str, known: Machine, *, of_bus: bool = False) -> R
     assert file is not None
     names = [*known.buses] if of_bus else [*known.buses, *known.axes, *known.groups]
     what = "bus" if of_bus else "bus, axis or group"
-    if name in known.poses:
+    if is_address(name):
+        advice = "it is an address, and here go names only: the file has to know the axis"
+    elif name in known.poses:
         advice = f"it is a pose: `motorbus pose {name}` goes there"
     elif of_bus and name in known.axes:
         advice = f"it is an axis: {name} alone means its device, {known.axes[name].device}"

@@ -9,8 +9,9 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import alarms, faces, traffic
 from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.machine import axes_called, machine
 from motorbus.cli.output import Output
-from motorbus.cli.read import Told, sampled, state_facts
+from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
 from motorbus.core.operation import Pause
 from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
@@ -21,11 +22,15 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.core.family import State
     from motorbus.core.operation import Operation
+    from motorbus.motion.machine import AxisSpec
 
 app = App(
     name="monitor",
-    usage="Usage: motorbus monitor BUS[#ID]... [OPTIONS]",
-    help_epilogue="""Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
+    usage="Usage: motorbus monitor BUS[#ID]|AXIS... [OPTIONS]",
+    help_epilogue="""Of an axis of the machine file, `axis at` is its own position, in its own unit;
+everything else is what its device tells, in the angles of the device.
+
+Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again. What no device tells has
 no column; of a stepper controller there are its inputs to watch, each asked
 for by itself. Where the line allows less than --rate, the rate that was
@@ -35,6 +40,7 @@ such as position reports, and works where listen_only=yes lets nothing out;
 
 Examples:
 
+    motorbus monitor shoulder elbow
     motorbus monitor feetech:/dev/ttyACM0
     motorbus monitor feetech:/dev/ttyACM0#1-6 --rate 20
     motorbus monitor kst:can://slcan/dev/ttyACM0,listen_only=yes --listen
@@ -60,7 +66,7 @@ def monitor(
     Parameters
     ----------
     devices
-        FAMILY:PORT, or FAMILY:PORT#ID for some of its devices.
+        FAMILY:PORT, or FAMILY:PORT#ID for some of its devices; or axes.
     rate
         Samples of every device per second.
     count
@@ -76,8 +82,9 @@ def monitor(
         raise RequestError("--rate must be above 0, --count and --duration not below 0")
     if listen:
         return traffic.listen(devices, count, duration, options, output)
-    wanted = gathered(devices)
-    with ExitStack() as stack, _shown(output, _usual(wanted)) as show:
+    wanted, called = gathered(devices), axes_called(devices)
+    specs = {key: (name, machine().axes[name]) for key, name in called.items()}
+    with ExitStack() as stack, _shown(output, _Columns(_usual(wanted), specs)) as show:
         watched = _watched(wanted, stack, options, output)
         told = alarms.Told(output)
 
@@ -170,8 +177,7 @@ def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit
 
 
 @contextmanager
-def _shown(output: Output, usual: Sequence[str]) -> Iterator[Callable[[Sample], None]]:
-    columns = _Columns(usual)
+def _shown(output: Output, columns: _Columns) -> Iterator[Callable[[Sample], None]]:
     if not output.live:
         yield lambda sample: _lines(sample, output, columns)
         return
@@ -188,7 +194,7 @@ def _shown(output: Output, usual: Sequence[str]) -> Iterator[Callable[[Sample], 
 
 def _lines(sample: Sample, output: Output, columns: _Columns) -> None:
     for (bus, node), state in sample.items():
-        named: dict[str, object] = {"bus": bus, "id": node}
+        named: dict[str, object] = {"bus": bus, "id": node, **columns.axis_facts(bus, node, state)}
         if isinstance(state, MotorbusError):
             output.document("motorbus.monitor/1", {**named, "error": state.summary})
         else:
@@ -213,11 +219,32 @@ _DIGITS: Final = {"position": 4, "velocity": 3, "load": 1, "current": 3, "voltag
 
 
 class _Columns:
-    """A column for each thing that a device has told so far; `usual` while none has told anything."""
+    """A column for each thing that a device has told so far; `usual` while none has told anything.
 
-    def __init__(self, usual: Sequence[str]) -> None:
+    `axes` are those by whose names devices were called: they have their own position, in their own unit.
+    """
+
+    def __init__(self, usual: Sequence[str], axes: Mapping[tuple[str, int], tuple[str, AxisSpec]]) -> None:
         self._usual = usual
         self._told: dict[str, None] = {}
+        self.axes = axes
+
+    def axis_facts(self, bus: str, node: int, state: State | Told | MotorbusError) -> dict[str, object]:
+        """The name of the axis, and its own position in rad or m; nothing for what was not called by one."""
+        if (bus, node) not in self.axes:
+            return {}
+        name, spec = self.axes[bus, node]
+        return {"axis": name, "axis_position": own_position(spec, state)}
+
+    def axis_cells(self, bus: str, node: int, state: State | Told | MotorbusError) -> tuple[str, ...]:
+        """The same for eyes; no cells where no device was called by an axis."""
+        if not self.axes:
+            return ()
+        if (bus, node) not in self.axes:
+            return ("", "")
+        name, spec = self.axes[bus, node]
+        at = own_position(spec, state)
+        return (name, "" if at is None else spec.show(at))
 
     def of(self, sample: Sample) -> tuple[list[str], list[str]]:
         """The names of telemetry, and what else is told, this sample included."""
@@ -235,12 +262,17 @@ class _Columns:
 def _grid(sample: Sample, output: Output, columns: _Columns) -> Any:
     names, others = columns.of(sample)
     titles = [
+        *(("axis", ">axis at") if columns.axes else ()),
         ">id",
         *(COLUMNS[name] for name in names),
         *(name.replace("_", " ") for name in others),
         "alarm",
     ]
-    return output.grid(titles, [_row(node, state, names, others) for (_, node), state in sample.items()])
+    rows = (
+        (*columns.axis_cells(bus, node, state), *_row(node, state, names, others))
+        for (bus, node), state in sample.items()
+    )
+    return output.grid(titles, rows)
 
 
 def _row(

@@ -15,6 +15,7 @@ from motorbus.cli import dry, faces
 from motorbus.cli.acting import acted
 from motorbus.cli.consent import FAR, consent_to_ways
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.moving import How, Known, go, goals_of, how_of, names_axes, positions_of
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Assume, DryRun, Duration, First, Flag, Shape, Speed
@@ -22,7 +23,7 @@ from motorbus.cli.plain import plain
 from motorbus.cli.robot import robot
 from motorbus.cli.target import Target, able, device, face, offers, opened, takes, target
 from motorbus.core import units
-from motorbus.errors import RequestError
+from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -39,7 +40,7 @@ itself where devices do that, as FEETECH servos do, or is never off, as in KST
 servos; `motorbus torque on` first elsewhere. A way of more than 180 degrees
 needs --yes. The goal must lie inside the limits of the device. Several devices
 of one bus begin in the same instant where their family can do that. Ctrl-C
-ends the waiting, not the motion: `motorbus stop` does.
+ends the waiting, not the motion: `motorbus stop BUS#ID` does, from then on.
 
 += and -= go by an angle from where the device stands: all that devices can do
 which do not know their position, as a stepper controller. One device at a
@@ -48,7 +49,8 @@ time, and it is stopped at the end. What is shown then is reckoned, not read.
 Axes of a machine file start together and arrive together, on whatever buses
 they are, within the limits of the file; += and -= go by a way from where each
 stands. A way of more than 180 degrees, or 100 mm, needs --yes. Ctrl-C stops
-them all. --dry-run shows the plan: frames are made on the way, from what is
+them all, and so does SIGTERM from another shell; `motorbus stop` cannot while
+this command has their bus, `motorbus estop` can. --dry-run shows the plan: frames are made on the way, from what is
 read then, and cannot be shown before.
 
 An axis without feedback knows its place only while one command lasts: say
@@ -189,8 +191,24 @@ def _axes(
     goals, known = goals_of(texts), Known(positions_of(assume), home)
     axes = list(dict.fromkeys([*goals, *known.stands]))
     with robot(axes, options, output) as hand:
-        go(hand, "move", goals, how, known, yes=yes, dry_run=dry_run)
+        try:
+            go(hand, "move", goals, how, known, yes=yes, dry_run=dry_run)
+        except LimitExceeded as error:
+            _hint_at_units(error, texts)
+            raise
     return Exit.OK
+
+
+def _hint_at_units(error: LimitExceeded, texts: tuple[str, ...]) -> None:
+    """Who types 10 for an axis that is shown in degrees may mean degrees."""
+    for text in texts:
+        head, _, said = text.rpartition("=")
+        for axis in axes_named((head.removesuffix("+").removesuffix("-"),)):
+            spec = machine().axes[axis]
+            own = "m" if spec.linear else "rad"
+            bare = said.lstrip("+-").replace(".", "", 1).isdigit()
+            if bare and spec.unit != own and error.summary.startswith(f"{axis}: "):
+                error.advice += f"; {said} without a unit is in {own}: did you mean {said}{spec.unit}?"
 
 
 def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
@@ -206,7 +224,8 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
         goals.update(dict.fromkeys(nodes, units.parse(position, "position")))
     if not found:
         raise RequestError(
-            "which device, and where to?", expected="BUS#ID=POSITION, as feetech:/dev/ttyACM0#3=90deg"
+            "which axis or device, and where to?",
+            expected="AXIS=POSITION, as shoulder=30deg, or BUS#ID=POSITION, as feetech:/dev/ttyACM0#3=90deg",
         )
     return found
 

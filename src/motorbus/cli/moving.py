@@ -72,7 +72,15 @@ def goals_of(texts: Iterable[str]) -> dict[str, Goal]:
 
 def positions_of(texts: Iterable[str]) -> dict[str, float]:
     """Positions (rad, m) by axis, as `lift=0mm`. Raises RequestError as `goals_of`, and for a way."""
-    found = goals_of(one for text in texts for one in text.split(","))
+    words = [one for text in texts for one in text.split(",")]
+    for word in words:
+        if "=" not in word:
+            raise RequestError(
+                f"--assume {word}: where does it stand?",
+                expected="AXIS=POSITION, as lift=0mm",
+                advice="nothing was sent",
+            )
+    found = goals_of(words)
     for axis, goal in found.items():
         if goal.way:
             raise RequestError(f"{axis}: a place is wanted, not a way", expected=f"{axis}=POSITION")
@@ -88,7 +96,10 @@ def once(axis: str, found: Mapping[str, object], text: str) -> None:
 def how_of(duration: str, kind: Kind, speed: str) -> How:
     """How they shall go, from what was typed. Raises RequestError for what is no duration and no share."""
     seconds = units.parse(duration, "time") if duration else None
-    share = units.parse(speed, "load") if speed else 1.0
+    try:
+        share = units.parse(speed, "load") if speed else 1.0
+    except RequestError:
+        share = 0.0
     if seconds is not None and not seconds > 0:
         raise RequestError(f"--duration {duration}: not above 0", advice="nothing was sent")
     if not 0 < share <= 1:

@@ -75,6 +75,10 @@ def machine(addresses: Mapping[str, str]) -> Machine:
 
 
 AXES: Final = (*ARM, *GIMBAL, "slide")
+LEAST: Final = 4.0
+"""s for both ways; the slide needs 3.6, as quick as its controller moves it."""
+PATIENCE: Final = 0.2
+"""s that a simulator may be late: it is a process, and a busy host lets processes wait as no device does."""
 GAP: Final = 0.5
 """s that are drawn for the time between two movements."""
 
@@ -88,7 +92,7 @@ class Movement(NamedTuple):
 
 def nine(duration: float, picture: Path, output: Output) -> None:
     """Serve the machine, find its devices, move all axes there and back in so many s, and draw it."""
-    with served(output) as (file, children), using(str(file)), robot(AXES, {}, output) as hand:
+    with served(output) as (file, children), using(str(file)), robot(AXES, {}, output, late=PATIENCE) as hand:
         found = found_on(hand.robot, output)
         movements = there_and_back(hand, duration)
     known = hand.robot.machine

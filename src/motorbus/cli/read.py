@@ -9,17 +9,21 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import faces, quantity, registers
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import axes_called, machine
 from motorbus.cli.output import Output
 from motorbus.cli.target import able, check_names, device, face, opened, table_of
 
 if TYPE_CHECKING:
     from motorbus.core.family import State
+    from motorbus.motion.machine import AxisSpec
 
 app = App(
     name="read",
     usage="Usage: motorbus read BUS#ID [NAME...] [OPTIONS]",
     help_epilogue="""Values are in rad, rad/s, A, V, °C, s and fractions; `raw` is what stands on
-the wire. `motorbus info BUS#ID --registers` lists the names.
+the wire. All of it is the device's, also where that is called by the name of
+an axis: its angles are not those of the axis, whose own position stands beside
+the telemetry. `motorbus info BUS#ID --registers` lists the names.
 
 Examples:
 
@@ -42,29 +46,42 @@ def read(
     Parameters
     ----------
     device_
-        FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3
+        FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3, or an axis
     names
         Registers by name; the telemetry when none is named.
     options
         Any option of the bus string, as a flag.
     """
     bus, family, (node,) = device(device_)
+    axis = axes_called((device_,)).get((bus, node), "")
     check_names(family, names)
     with opened(bus, options, output) as opening:
         one = face(opening, node)
         if names:
-            _registers(one, names, output)
+            _registers(one, names, axis, output)
         else:
-            _telemetry(one, output)
+            _telemetry(one, axis, output)
     return Exit.OK
 
 
-def _registers(one: Any, names: tuple[str, ...], output: Output) -> None:
+def _registers(one: Any, names: tuple[str, ...], axis: str, output: Output) -> None:
     table = table_of(one)
     entries = [table[name] for name in names]
     rows = registers.facts(one, entries, one.read(*names))
-    output.document("motorbus.read/1", {"id": one.node, "registers": rows})
-    registers.show(f"#{one.node}", rows, output)
+    named = {"axis": axis} if axis else {}
+    output.document("motorbus.read/1", {"id": one.node, **named, "registers": rows})
+    registers.show(titled(one.node, axis), rows, output)
+
+
+def titled(node: int, axis: str) -> str:
+    """A device in a title; one that was called by its axis, as the device of that."""
+    return f"#{node}, the device of {axis}" if axis else f"#{node}"
+
+
+def own_position(spec: AxisSpec, state: object) -> float | None:
+    """Where the axis is (rad, m) whose device told this; None where that tells no position."""
+    at = getattr(state, "position", None)
+    return None if at is None else spec.from_device(at)
 
 
 Told = dict[str, object]
@@ -91,21 +108,25 @@ def sampled(one: Any) -> State | Told:
     return state
 
 
-def _telemetry(one: Any, output: Output) -> None:
+def _telemetry(one: Any, axis: str, output: Output) -> None:
     state, node = sampled(one), one.node
+    spec = machine().axes[axis] if axis else None
+    at = own_position(spec, state) if spec is not None else None
+    named = {"axis": axis, "axis_position": at} if axis else {}
     if isinstance(state, dict):
-        output.document("motorbus.telemetry/1", {"id": node, **state})
+        output.document("motorbus.telemetry/1", {"id": node, **named, **state})
         words = {True: "yes", False: "no"}
         rows = [
             (name.replace("_", " "), words[value] if isinstance(value, bool) else value)
             for name, value in state.items()
         ]
-        output.table(f"#{node}", ["", "value"], rows)
+        output.table(titled(node, axis), ["", "value"], rows)
         return
-    output.document("motorbus.telemetry/1", {"id": node, **state_facts(state)})
+    output.document("motorbus.telemetry/1", {"id": node, **named, **state_facts(state)})
     told = {name: getattr(state, name) for name in UNITS if getattr(state, name) is not None}
-    rows = [(name, quantity.shown(value, UNITS[name])) for name, value in told.items()]
+    rows = [(f"{axis} at", spec.show(at))] if spec is not None and at is not None else []
+    rows += [(name, quantity.shown(value, UNITS[name])) for name, value in told.items()]
     if state.moving is not None:
         rows.append(("moving", "yes" if state.moving else "no"))
     rows.append(("alarm", ", ".join(state.alarm) or "none"))
-    output.table(f"#{node}", ["", "value"], rows)
+    output.table(titled(node, axis), ["", "value"], rows)

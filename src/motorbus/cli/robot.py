@@ -69,18 +69,21 @@ def place(robot: Robot, name: str, at: float | None) -> str:
 
 
 @contextmanager
-def robot(axes: Sequence[str], options: Mapping[str, str], output: Output) -> Iterator[InHand]:
+def robot(
+    axes: Sequence[str], options: Mapping[str, str], output: Output, *, late: float = 0.0
+) -> Iterator[InHand]:
     """These axes of the machine file, open; their buses with `options` beside those in the file.
+
+    An answer may be `late` (s), where whoever answers is a process on a busy host.
 
     Raises RequestError for what is wrong with file or options, and what opening raises.
     """
-    from motorbus.cli.left import ToldRobot
+    from motorbus.cli.left import left_as_told
 
     wanted = with_options(machine(), axes, options)
     hand = InHand(output)
     try:
-        with ToldRobot.of(wanted, axes, report=hand.heard) as robot:
-            robot.output, hand.robot = output, robot
+        with left_as_told(output, late).of(wanted, axes, report=hand.heard) as hand.robot:
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
                 output.note(f"note: {warning}")

@@ -10,15 +10,14 @@ import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
+from motorbus.cli.exits import Partial
 from motorbus.cli.machine import is_address, machine_file
-from motorbus.errors import RequestError
-from motorbus.motion.machine import NAME, AxisSpec, BusSpec, GroupSpec, Machine
-from motorbus.motion.machine.model import ADDRESS, DEVICE
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine
+from motorbus.motion.machine.model import ADDRESS, DEVICE, NAME
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
-
-    from motorbus.cli.output import Output
 
 WITHOUT: Final = "`motorbus stop FAMILY:PORT` and `motorbus estop FAMILY:PORT` need no file"
 _HEAD: Final = re.compile(rf"\s*\[\s*(bus|axis|group)\.[\"']?({NAME})[\"']?\s*\]")
@@ -27,12 +26,12 @@ _QUOTED: Final = re.compile(r"[\"']([^\"']+)[\"']")
 
 
 @contextmanager
-def forgiving(words: Collection[str], output: Output) -> Iterator[None]:
+def forgiving(words: Collection[str]) -> Iterator[None]:
     """Within it a machine file with faults, where these words need one, is as good as what can be seen in it.
 
-    Adds to an error what needs no file.
+    Adds to an error what needs no file. Raises Partial where all went well: somebody may be missing in the file.
     """
-    fault = None
+    fault = seen = None
     file = machine_file()
     needed = [word for word in words if not is_address(word)]
     try:
@@ -42,16 +41,19 @@ def forgiving(words: Collection[str], output: Output) -> Iterator[None]:
         seen = _seen()
         if seen is not None:
             file.machine = seen
-            output.note(
-                f"note: {error.summary}; only buses and devices were looked for in the file, and found: "
-                f"{', '.join(seen.axes)}"
-            )
     try:
         yield
-    except RequestError as error:
+    except MotorbusError as error:
         if fault is not None:
             error.advice = f"{error.advice}; {WITHOUT}" if error.advice else WITHOUT
+            error.add_note(f"only buses and devices were looked for in the file: {fault.summary}")
         raise
+    if fault is not None and seen is not None:
+        raise Partial(
+            f"only those were stopped who can be seen in a file with an error: {fault.summary}",
+            expected=f"all; seen were {', '.join(seen.axes)}",
+            advice=WITHOUT,
+        )
 
 
 def _seen() -> Machine | None:
@@ -80,7 +82,11 @@ def rough(text: str) -> Machine:
             tables[kind].setdefault(name, key[2])
     buses = {name: BusSpec(address=one) for name, one in _first(tables["bus"], ADDRESS).items()}
     devices = _first(tables["axis"], DEVICE)
-    axes = {name: AxisSpec(device=one) for name, one in devices.items() if one.partition("#")[0] in buses}
+    axes = {
+        name: AxisSpec(device=one, unit="rad", max_velocity=1.0, max_acceleration=1.0)
+        for name, one in devices.items()
+        if one.partition("#")[0] in buses
+    }
     groups = {
         name: tuple(one for one in _QUOTED.findall(said) if one in axes)
         for name, said in tables["group"].items()

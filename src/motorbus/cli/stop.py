@@ -58,7 +58,7 @@ def stop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving(devices, output):
+    with forgiving(devices):
         wanted = devices or (tuple(axes_named(())) if machine_file().path else ())
         known, unknown = _understood(wanted)
         return each("stop", "stop", known, options, output, dry_run=dry_run, unknown=unknown)
@@ -80,6 +80,6 @@ def _understood(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[RequestEr
             known.append(word)
     if errors and not known:
         raise errors[0]
-    for error in errors:
-        error.advice = error.advice.replace("nothing was sent", "the others were visited")
+    for one in errors:
+        one.advice = one.advice.replace("nothing was sent", "the others were visited")
     return tuple(known), errors

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.consent import consent_to
-from motorbus.cli.ending import asked_to_end
+from motorbus.cli.ending import END, asked_to_end
 from motorbus.cli.exits import Exit
-from motorbus.cli.files import usable
+from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.robot import place, robot
@@ -33,7 +33,8 @@ switched off, so that they can be led by hand: AN ARM SAGS, hold it. It stays
 off afterwards. An axis without a torque switch cannot be led by hand; with
 --no-limp nothing is switched, and whatever moves the axes is written down.
 
-Ends with Enter, with Ctrl-C or after --seconds, and writes the file then. A
+Ends with Enter, with Ctrl-C or after --seconds, and writes the file then; it
+is written when the program is told to end (SIGTERM), too. A
 servo tells its position in steps, and steps are hard: let --smooth take them
 out, here or in `motorbus replay`.
 
@@ -86,15 +87,35 @@ def teach(
     with robot(axes, options, output) as hand:
         if dry_run:
             return _plan(hand, axes, limp=limp)
+        _judge(hand, axes, rate, named=bool(names), limp=limp)
         if limp:
             output.note("the torque goes off now, and stays off: hold what could sag")
-        with hand.working("recording"), asked_to_end() as ended:
+        with hand.working("recording"), asked_to_end(also=END) as ended:
             until = counted(hand, "recording", ended, rate, span)
             taught = hand.robot.teach(
                 axes if names else None, seconds=span, rate=rate, until=until, limp=limp
             )
     _keep(taught.smoothed(smooth) if smooth else taught, output_, output)
+    if left := [name for name in axes if name not in taught.axes]:
+        output.note(f"note: not taught, for nobody can lead them by hand: {', '.join(left)}")
+    if ended.told:
+        raise KeyboardInterrupt
     return Exit.OK
+
+
+def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: bool) -> None:
+    """Raise RequestError for who cannot be taught, and for too high a rate, before it is said that torque goes off."""
+    from motorbus.motion.budget import refuse_above
+    from motorbus.motion.follow import check_able
+
+    if named:
+        check_able(hand.robot, axes, "train", "taught: nothing tells where it is in a loop")
+        if limp:
+            check_able(hand.robot, axes, "disable_torque", "taught by hand")
+    needed = {"train", "disable_torque"} if limp else {"train"}
+    taught = [name for name in axes if needed <= set(hand.robot[name].able)]
+    if taught:
+        refuse_above(hand.robot.budget(rate, taught))
 
 
 def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
@@ -105,11 +126,7 @@ def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
         raise RequestError(
             "--rate must be above 0, and --smooth not below", expected="Hz", advice="nothing was sent"
         )
-    if file.is_dir() or not file.parent.is_dir():
-        raise RequestError(
-            f"{file} cannot be written: {'it is a folder' if file.is_dir() else 'its folder is not there'}",
-            advice="see that the path is right; nothing was sent",
-        )
+    check_writable(file)
 
 
 def counted(

@@ -31,6 +31,10 @@ COMMANDS: Final[Mapping[str, str]] = {
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
 PHRASES: Final[Mapping[str, str]] = {
     "call reset() on the bus, in the process that owns it": "give the command again, for the stop has ended this one",
+    "estop() was called, here or by": "it was stopped, here or by",
+    "whose device has train": "whose device can be led in a loop",
+    "whose device has disable torque": "whose device can be let go",
+    "limp=False writes": "`--no-limp` writes",
 }
 """What only a program that goes on can do -> what comes to the same where the program has ended."""
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")

@@ -320,9 +320,10 @@ def cap(axis: AxisVerbs) -> Operation[None]:
 
 def disable_torque(axis: AxisVerbs) -> Operation[None]:
     """Limp, whatever alarms there are. Raises as the device's own verb when nobody knows whether it is."""
-    axis.orders += 1
+    axis.orders = order = axis.orders + 1
     yield from axis.able["disable_torque"](axis.device)
-    axis.engaged = axis.under_way = False
+    if axis.orders == order:  # else somebody has told it something since, and may have given it torque
+        axis.engaged = axis.under_way = False
 
 
 def stop(axis: AxisVerbs) -> Operation[Enum]:

@@ -8,6 +8,7 @@ which it leaves, whether the command is still with those who made it.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
+from copy import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -34,6 +35,8 @@ T = TypeVar("T")
 
 GUARDED: Final = frozenset({Effect.TORQUE, Effect.MOTION})
 """What an exchange does to the world that nobody may do any more once the command is lost."""
+NEVER: Final = -1
+"""No count of stops: every axis is looked at anew."""
 
 
 class Command:
@@ -74,6 +77,33 @@ class Command:
         return [
             axis for axis in self.axes if axis.orders == self._orders[axis.name] and not self._stopped(axis)
         ]
+
+    def untold(self) -> list[AxisVerbs]:
+        """Those that nobody else has told anything from here since, whatever stops have left on their bus."""
+        return [axis for axis, orders in self._counts if axis.orders == orders]
+
+    def joined(self, other: Command) -> Command:
+        """The command over the axes of both, on the same bus, each from when it was taken, the later one counts.
+
+        Whatever was told to one of them since is as good as told to all.
+        """
+        found = copy(other)
+        axes = {axis.name: axis for axis in (*self.axes, *other.axes)}
+        found.axes = tuple(axes.values())
+        found._known = self._known if other._known is None else other._known
+        found._stopping = NEVER
+        found._stops = self._stops | other._stops
+        found._orders = self._orders | other._orders
+        found._counts = tuple((axis, found._orders[axis.name]) for axis in found.axes)
+        return found
+
+    def rest(self) -> Command:
+        """The command over those that nobody else has told anything since, without the others."""
+        found, held = copy(self), self.held()
+        found.axes = tuple(held)
+        found._counts = tuple((axis, self._orders[axis.name]) for axis in held)
+        found._stopping = NEVER
+        return found
 
     def check(self) -> None:
         """Raise Interrupted when the command over one of them is lost."""
@@ -157,7 +187,7 @@ class Command:
 
         With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
         """
-        axes = [axis for axis, orders in self._counts if axis.orders == orders] if anew else self.held()
+        axes = self.untold() if anew else self.held()
         ended = yield from Together([outcome(axis.able["stop"](axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)

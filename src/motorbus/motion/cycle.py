@@ -7,18 +7,24 @@ other, on several they are all in flight at once. A device that does not answer 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.core.family import Positions, Train
-from motorbus.core.operation import Exchange, Operation, Pause, Refusal, Stops, Together, outcome
-from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown, WireError
+from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
+from motorbus.errors import (
+    Interrupted,
+    LimitExceeded,
+    MotionError,
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    WireError,
+)
 from motorbus.motion.axis import AxisVerbs, cap
+from motorbus.motion.command import Command
 from motorbus.motion.place import Place
-
-T = TypeVar("T")
 
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
 """Ways in which a reading, or the acknowledgement of a goal, is lost and a loop goes on."""
@@ -30,7 +36,8 @@ class Part:
     """What a loop does on one bus. `began` and `ended` are those of the last cycle, in s of robot time.
 
     `origin` is what the clock of its link showed when that of the robot was at 0. Those who wait `exactly` burn the
-    processor for the last bit.
+    processor for the last bit. `command` is over those who are led; `refused` are those of the last orders that could
+    not be given, and stay where they are.
     """
 
     def __init__(self, bus: BusFace, origin: float, places: Sequence[Place], train: Train) -> None:
@@ -43,8 +50,8 @@ class Part:
         self.exactly = False
         self.began = self.ended = 0.0
         self.abreast: Final = len({exchange.lane for exchange in self.reads}) > 1
-        self._stops: dict[int, int] = {}
-        self._stopping = 0
+        self.command = Command(())
+        self.refused: list[LimitExceeded] = []
 
     @property
     def now(self) -> float:
@@ -54,21 +61,30 @@ class Part:
     # -- a cycle -------------------------------------------------------------------------------------------------------
 
     def orders(self, periods: int) -> Sequence[Exchange[Any]]:
-        """The exchanges that order the next small goal of all who are led. Raises LimitExceeded; see `Place.step`."""
-        to = {node: place.step(periods) for node, place in self.places.items() if place.begun}
+        """The exchanges that order the next small goal of all who are led; see `refused`.
+
+        Raises RequestError when one of them was set up anew, and takes goals of another kind now.
+        """
+        to: dict[int, float] = {}
+        for node, place in self.places.items():
+            if place.begun:
+                try:
+                    to[node] = place.step(periods)
+                except LimitExceeded as error:
+                    to[node] = place.stay()
+                    self.refused.append(error)
         if not to:
             return ()
-        return [_guarded(exchange, self._stopped_since) for exchange in self.train.goals(to)]
+        guarded = self.command.guarded
+        return [guarded(exchange) for exchange in self.train.goals(to)]
 
-    def cycle(
-        self, orders: Sequence[Exchange[Any]], moment: float, *, reads: bool = True
-    ) -> Operation[list[Any]]:
+    def cycle(self, orders: Sequence[Exchange[Any]], moment: float) -> Operation[list[Any]]:
         """Send these from a moment of robot time on, then ask for all positions; what came of each exchange."""
         for pause in self._wait(moment + self.origin):
             yield from pause
         self.began = self.link.now() - self.origin
         told: list[Any] = []
-        wanted = (*orders, *self.reads) if reads else orders
+        wanted = (*orders, *self.reads)
         if self.abreast:
             told = yield from Together([_kept(exchange) for exchange in wanted])
         else:
@@ -122,6 +138,15 @@ class Part:
                     heard += 1
         return [] if heard == len(places) else self._unheard(told)
 
+    def heard(self, told: Sequence[Any]) -> dict[str, float]:
+        """When each was heard (s of robot time) of whom there is a reading among what came of a cycle, by name."""
+        return {
+            self.places[node].name: found.at - self.origin
+            for found in told
+            if isinstance(found, Positions)
+            for node in found.values
+        }
+
     def _unheard(self, told: Sequence[Any]) -> list[str]:
         heard = {node for found in told if isinstance(found, Positions) for node in found.values}
         missing = [place for node, place in self.places.items() if node not in heard]
@@ -132,45 +157,54 @@ class Part:
     # -- the beginning -------------------------------------------------------------------------------------------------
 
     def begin(self, fresh: Sequence[Place]) -> Operation[None]:
-        """Give these torque without a jump, with the caps of the machine file, and see where they stand."""
+        """Give these torque without a jump, with the caps of the machine file, and see where they stand.
+
+        Raises Interrupted when somebody else tells one of them something meanwhile: nothing of this leaves any more
+        then, so whoever has let an axis go finds it limp.
+        """
         axes = [place.axis for place in fresh]
+        command = Command(axes)
         train = yield from train_of(self.bus, axes)
-        for axis in axes:
-            yield from cap(axis)
-        for axis in axes:
-            axis.departs()
-        yield from train.begin(
-            {axis.spec.node: abs(axis.spec.rate_to_device(axis.spec.max_velocity)) for axis in axes}
-        )
-        known = self.bus.turns.known
-        if self._stopping != known.stopping and not self.stopped():
-            self._stopping = known.stopping
-        self._stops.update((place.node, known.stops(place.node)) for place in fresh)
-        for place in fresh:
-            angle: float = yield from place.axis.able["position"](place.axis.device)
+        try:
+            command.depart()
+            angles = yield from _begun(train, command)
+        except MotionError as error:
+            if lost := set(axes).difference(command.held()):
+                raise stopped([axis.name for axis in axes if axis in lost]) from error
+            raise
+        self.command = self.command.joined(command)
+        for place, angle in zip(fresh, angles, strict=True):
             place.begin(place.axis.spec.from_device(angle))
 
-    def has(self, places: Sequence[Place]) -> bool:
-        """Whether one of these is here."""
-        return any(place in self.places.values() for place in places)
+    def brakes(self) -> bool:
+        """Whether one of those who follow a goal is not there yet."""
+        return any(place.begun and not place.arrived for place in self.places.values())
 
-    def stopped(self) -> list[Place]:
-        """Those who were led, and were stopped since or let go; all of them after an emergency stop."""
-        turns = self.bus.turns
-        return [
-            place
-            for node, place in self.places.items()
-            if place.begun
-            and (turns.latched or place.interrupted or turns.known.stops(node) != self._stops[node])
-        ]
+    def release_lost(self) -> list[str]:
+        """Who was told something from elsewhere is led no more; their names. After an emergency stop all of them."""
+        self.command = command = Command(()) if self.bus.turns.latched else self.command.rest()
+        lost = [place for place in self.places.values() if place.begun and place.axis not in command.axes]
+        for place in lost:
+            place.release()
+        return [place.name for place in lost]
 
-    def _stopped_since(self, stops: Stops) -> MotorbusError | None:
-        if self.bus.turns.known.stopping == self._stopping:
-            return None
-        for node, before in self._stops.items():
-            if stops(node) != before and self.places[node].begun:
-                return stopped([self.places[node].name])
-        return None
+
+def _begun(train: Train, command: Command) -> Operation[list[float]]:
+    """Torque on, and as quick in following as the axis may be; where the device of each stands then (rad)."""
+
+    def ready() -> Operation[None]:
+        for axis in command.axes:
+            yield from cap(axis)
+        speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in command.axes}
+        yield from train.begin({node: abs(speed) for node, speed in speeds.items()})
+
+    try:
+        yield from command.watched(ready())
+        return (yield from Together([axis.able["position"](axis.device) for axis in command.axes]))
+    except BaseException:
+        for axis in command.held():  # they may have torque, and go nowhere
+            axis.arrives()
+        raise
 
 
 def train_of(bus: BusFace, axes: Sequence[AxisVerbs]) -> Operation[Train]:
@@ -180,31 +214,12 @@ def train_of(bus: BusFace, axes: Sequence[AxisVerbs]) -> Operation[Train]:
 
 
 def stopped(names: Sequence[str]) -> Interrupted:
-    """The error for axes that somebody has stopped, or let go, while they were led."""
+    """The error for axes that somebody else has stopped, let go or told to move while they were led."""
     return Interrupted(
         f"{', '.join(names)}: stopped from elsewhere, so the loop gives no more goals",
-        cause="stop(), hold() or disable_torque() was called while the loop led it, or another program stopped it",
+        cause="while the loop led it, it was stopped, held, let go or told to move by somebody else",
         advice="set a new goal to lead it again; after an emergency stop, reset() first",
     )
-
-
-def straight(bus: Bus, operation: Operation[T]) -> T:
-    """Carry out an operation on the only bus there is, each of its exchanges on the short path.
-
-    Only for one that has nothing to clean up: an interruption is raised at once.
-    """
-    step = next(operation)
-    try:
-        while True:
-            try:
-                value = bus.run(step if isinstance(step, Exchange) else iter(step))
-            except MotorbusError as error:
-                step = operation.throw(error)
-            else:
-                step = operation.send(value)
-    except StopIteration as end:
-        found: T = end.value
-        return found
 
 
 def _kept(exchange: Exchange[Any]) -> Operation[Any]:
@@ -213,27 +228,6 @@ def _kept(exchange: Exchange[Any]) -> Operation[Any]:
     if isinstance(found, MotorbusError) and not isinstance(found, LOST):
         raise found
     return found
-
-
-def _guarded(exchange: Exchange[Any], stopped: Refusal) -> Exchange[Any]:
-    """The same, and it does not leave once one of those it orders was stopped; asked when it leaves, so nothing can
-    come in between."""
-    return Exchange(
-        exchange.request,
-        exchange.replies,
-        exchange.read,
-        lane=exchange.lane,
-        rank=exchange.rank,
-        effect=exchange.effect,
-        goals=exchange.goals,
-        timeout=exchange.timeout,
-        repeatable=exchange.repeatable,
-        refusal=stopped if exchange.refusal is None else partial(_either, stopped, exchange.refusal),
-    )
-
-
-def _either(first: Refusal, second: Refusal, stops: Stops) -> MotorbusError | None:
-    return first(stops) or second(stops)
 
 
 def silence(names: Sequence[str], cycles: int, places: Mapping[str, Place], now: float) -> NoReply:

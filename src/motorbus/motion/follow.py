@@ -16,7 +16,7 @@ from motorbus.motion import group
 from motorbus.motion.body import Body
 from motorbus.motion.grid import ROUNDING, Statistics
 from motorbus.motion.loop import Errand, LoopFace
-from motorbus.motion.rounds import LoopState
+from motorbus.motion.readings import LoopState
 
 NOTHING = "nothing was sent"
 

@@ -103,16 +103,20 @@ class Grid:
 
         Whatever has gone by is counted.
         """
+        self.book(now)
+        self.number += 1
+        return self._start + self.number * self.period
+
+    def book(self, now: float) -> None:
+        """Count what has gone by until now, and take no slot yet."""
         number = self.number + 1
         late = now - self._start - number * self.period
         if late > ROUNDING and number:
             self._statistics.overruns += 1
             gone = int((late + ROUNDING) / self.period)
             self._statistics.skipped += gone
-            number += gone
-        self.number = number
-        return self._start + number * self.period
+            self.number += gone
 
     def forgive(self, now: float) -> None:
-        """What went by until now was not the loop's to use: the next slot is the next to begin."""
+        """What went by until now, and was not booked, was not the loop's to use: the next slot is the next to begin."""
         self.number = max(self.number, ceil((now - self._start - ROUNDING) / self.period) - 1)

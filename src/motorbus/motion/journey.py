@@ -15,6 +15,7 @@ from motorbus.core.operation import Operation, Together
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion import parts
 from motorbus.motion.abreast import Abreast
+from motorbus.motion.command import Command
 from motorbus.motion.meeting import Beat, Meeting, Seat
 from motorbus.motion.moved import Moved
 from motorbus.motion.plan import Fact, Gone, Plan, Planned
@@ -42,6 +43,7 @@ class Journey:
         self.plan: Final = plan
         self.rate: Final = rate
         self.fate: Final = Fate()
+        self.commands: Final[list[Command]] = []
         self.unstopped: Final[dict[str, MotorbusError]] = {}
         self.needs: Final[dict[str, float]] = {}
         self.outline: Planned | None = None
@@ -119,6 +121,12 @@ class Journey:
         self._facts.fail(known)
         self._beat.fail(known)
         self.fate.fail(known)
+
+    def check(self) -> None:
+        """Raise Interrupted when a part has failed, or somebody else has told one of the axes something since."""
+        self.fate.check()
+        for command in self.commands:
+            command.check()
 
     def seat(self, party: str, bus: str) -> Seat:
         """How a part keeps time with the others."""

@@ -10,6 +10,10 @@ jump, in a cycle of its own. Goals are followed within velocity and acceleration
 and what was sent direct is the last that its device knows. What the axes do then is the affair of their exit policy.
 
 Who leaves the `for` and stays in the `with` leaves the axes at their last small goal, abruptly where they were quick.
+Ctrl-C while they brake ends that as abruptly. A loop that was left takes no goals and has no cycles any more.
+
+An axis belongs to who told it something last. When somebody else stops it, lets it go or moves it, another loop
+included, the loop sends it no goal any more and raises Interrupted; the next goal that is set takes it back.
 
 A collection of garbage may hold Python up for longer than a period. A program with a quick loop had better call
 `gc.collect()` and `gc.freeze()` before it.
@@ -25,9 +29,9 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
-from motorbus.motion.cycle import straight
 from motorbus.motion.grid import Statistics
-from motorbus.motion.rounds import LoopState, Rounds
+from motorbus.motion.readings import LoopState
+from motorbus.motion.rounds import Rounds
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -121,8 +125,8 @@ class Loop(LoopFace):
     """A loop of a `Robot`; use it in a `with`, and in a `for` inside it. Never ends by itself.
 
     Raises RequestError on entering for a rate that a bus cannot carry, NoReply when an axis is silent too long,
-    LimitExceeded for a goal that must not be sent (nothing was sent then, and the loop can go on), Interrupted when an
-    axis was stopped from elsewhere; see `Rounds`.
+    LimitExceeded for a goal that must not be sent (nothing was sent then, and the loop can go on) or for an axis that
+    is held back (it stays, the others go on), Interrupted when an axis was stopped from elsewhere; see `Rounds`.
     """
 
     def __init__(
@@ -132,7 +136,7 @@ class Loop(LoopFace):
         self._conductor = conductor
 
     def __enter__(self) -> Self:
-        _carried(self._rounds.entering(), self._run)
+        _carried(self._rounds.entering(), self._conductor.run)
         buses = [part.bus for part in self._rounds.parts.values()]
         if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
             self._rounds.only = buses[0]
@@ -142,25 +146,13 @@ class Loop(LoopFace):
         return self
 
     def __next__(self) -> LoopState:
-        return _carried(self._rounds.round(), self._run)
+        return _carried(self._rounds.round(), self._conductor.run)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         try:
-            _carried(self._rounds.leaving(), self._run)
+            _carried(self._rounds.leaving(), self._conductor.run)
         except MotorbusError as failure:
             _told(failure, error)
-
-    def _run(self, work: Abreast[Any]) -> Any:
-        """On the only bus there is by the short way, else by the conductor."""
-        only = self._rounds.only
-        if only is None:
-            return self._conductor.run(work)
-        ((bus, operation),) = work.operations.items()
-        try:
-            found = straight(only, operation)  # type: ignore[arg-type]  # the work of a loop are generators
-        except MotorbusError as failure:
-            found = failure
-        return work.combine({bus: found})
 
 
 class AsyncLoop(LoopFace):

@@ -57,8 +57,9 @@ class Arrived(NamedTuple):
     """One axis: its `goal` and where it is at `present` (rad, m), `estimated` or measured.
 
     `started` and `ended` are s after the common start: when the order was gone that set it moving, acknowledged where
-    that is done, and when it was first seen where it rests; both 0 where it had less than two of its counts to go. A
-    servo may think before it moves: nobody sees when it does. Of an axis that is estimated, when its own profile began
+    that is done, and when it was first seen where it rests; both 0 where it had less than two of its counts to go.
+    Orders leave as much before the start as they take on the wire. A servo may think before it moves, or not have heard
+    the first one: nobody sees when it does. Of an axis that is estimated, when its own profile began
     and ended. `stood` is where it was before (rad, m).
     """
 

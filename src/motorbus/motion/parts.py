@@ -10,16 +10,17 @@ from inspect import GEN_CLOSED, getgeneratorstate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions, Turned
-from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
+from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import axis as single
 from motorbus.motion import limits
 from motorbus.motion.command import Command
+from motorbus.motion.forgiving import forgiven
 from motorbus.motion.moved import STILL, Arrived, Track
 from motorbus.motion.plan import Fact, Gone, Planned
 from motorbus.motion.reckoning import Movement, cut_short
 from motorbus.motion.several import named, names
-from motorbus.motion.stream import LOST, SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
+from motorbus.motion.stream import SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 
 if TYPE_CHECKING:
     from motorbus.motion.axis import AxisVerbs
@@ -46,6 +47,7 @@ def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[G
     """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
+    journey.commands.append(work.command)
     yield from afterwards(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
     assert work.gone is not None
     return work.gone
@@ -158,10 +160,7 @@ class LedPart:
         """Where each stands (rad of the device), by id. Raises NoReply for one that is silent."""
         angles: dict[int, float] = {}
         for _ in range(TRIES):
-            told = yield from Together([outcome(one) for one in train.positions])
-            for one in told:
-                if isinstance(one, MotorbusError) and not isinstance(one, LOST):
-                    raise one
+            for one in (yield from forgiven(train.positions)):
                 angles.update(one.values if isinstance(one, Positions) else {})
             missing = [axis for axis in self._axes if axis.spec.node not in angles]
             if not missing:
@@ -175,7 +174,12 @@ class LedPart:
             _check_still(axis, facts[axis.name].position, axis.spec.from_device(angles[axis.spec.node]))
         self.command.depart()
         self.begun = True
-        yield from self.command.watched(self._begin(train))
+        try:
+            yield from self.command.watched(self._begin(train))
+        except MotorbusError as error:
+            if (lost := self.command.lost()) is not None:  # what was let go meanwhile tells that in many ways
+                raise lost from error
+            raise
 
     def _begin(self, train: Any) -> Operation[None]:
         for axis in self._axes:
@@ -249,6 +253,8 @@ class OwnPart:
             now = yield from Pause(LOOK)
             if timing.moment is None:
                 continue
+            if (lost := self._overtaken()) is not None:
+                journey.fail(lost)
             if journey.fate.failure is not None:
                 journey.unstopped.update((yield from self.command.stop()))
                 return
@@ -256,6 +262,11 @@ class OwnPart:
             if journey.reports(timing.party) and reported + SHOWN <= since <= timing.duration:
                 reported = since
                 yield from Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
+
+    def _overtaken(self) -> MotorbusError | None:
+        """The error when somebody else has stopped it. Its driver looks for that more seldom, and stops it itself."""
+        ordered = not self.command.untold() or self._axis.bus.turns.latched
+        return self.command.lost() if ordered else None
 
     def _stayed(self, stood: float) -> Gone:
         arrived = Arrived(self._timing.planned.goals[self._axis.name], stood, True, 0.0, 0.0, stood)
@@ -307,7 +318,7 @@ class Kept:
     def start(self, lead: float) -> Operation[float]:
         """See `core.family.Timing`."""
         moment = yield from self._seat.start(lead)
-        self._journey.fate.check()  # all were ready, and one of them may have been stopped since
+        self._journey.check()  # all were ready, and one of them may have been stopped since
         self.moment = moment
         return moment
 

@@ -84,11 +84,6 @@ class Place:
         self.sent: float | None = None
         self.begun = False
 
-    @property
-    def interrupted(self) -> bool:
-        """It was led from here, and somebody has stopped it since or let it go."""
-        return self.begun and not (self.axis.under_way and self.axis.engaged)
-
     def allows(self, goal: float) -> bool:
         """Whether its soft limits and those of its device allow this goal (rad, m)."""
         return self._low <= goal <= self._high
@@ -150,22 +145,42 @@ class Place:
         self.sent = asked
         return self.zero + asked * self.ratio
 
+    def stay(self) -> float:
+        """The angle of its device (rad) where it was told to be last."""
+        assert self.sent is not None
+        return self.zero + self.sent * self.ratio
+
     def _held_back(self, way: Follower, asked: float) -> None:
         try:
             limits.check_step(self.name, self.axis.spec, asked, self.position)
-        except LimitExceeded:
+        except LimitExceeded as error:
             assert self.sent is not None
             way.reset(self.sent)
             self.asked = self._passed = self.sent
+            error.cause = "something holds it back, or nobody has heard for a while where it is"
+            error.advice = f"look what that is; it stays at its last goal, {self.axis.spec.show(self.sent)}"
             raise
 
-    def halt(self) -> bool:
-        """Where it follows and is on its way: brake from here on. False when there is nothing to brake."""
-        if self._follower is None or not self._follower.velocity:
-            return False
-        self._follower.halt()
-        self.asked = self._passed = self._follower.goal
-        return True
+    def rest(self) -> None:
+        """It has stood still, or nothing was sent: where it follows, it goes on from where it was told to be last."""
+        if self._follower is not None and self.sent is not None:
+            self._follower.reset(self.sent)
+
+    def halt(self) -> None:
+        """Where it follows: brake from here on, or stay. It is `arrived` when that is done."""
+        way = self._follower
+        if way is None or self.sent is None:
+            return
+        if way.velocity:
+            way.halt()
+        else:
+            way.reset(self.sent)
+        self.asked = self._passed = way.goal
+
+    @property
+    def follows(self) -> bool:
+        """It is led, and its goals are followed."""
+        return self._follower is not None
 
     @property
     def arrived(self) -> bool:

@@ -5,71 +5,37 @@
     leaving    axes that are on their way brake
 
 Each is a generator that yields work on several buses and is sent what came of it. Nothing moves before a goal is set.
-A goal that must not be sent ends its round before anything leaves, and who was stopped from elsewhere gets no goal any
-more.
+A goal that must not be sent ends its round before anything leaves. Who was stopped from elsewhere, or told to move,
+gets no goal any more: who told it last has the command. So it is with two loops that lead the same axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from functools import partial
 from math import isfinite
 from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 from motorbus.bus.pump import Bus
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Exchange, Operation
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
+from motorbus.motion.braking import Works, braked, latest, refusals
 from motorbus.motion.budget import RobotBudget, bus_budget, divided, refuse_above
 from motorbus.motion.cycle import Part, silence, stopped, train_of
 from motorbus.motion.grid import Grid, Statistics
 from motorbus.motion.limits import Device
-from motorbus.motion.place import Place
+from motorbus.motion.place import CATCH_UP, Place
+from motorbus.motion.readings import LoopState
 from motorbus.motion.several import named
-
-Works: TypeAlias = "Generator[Abreast[Any], Any, Any]"
 
 PATIENCE: Final = 5
 """Cycles in a row in which an axis may be silent; in the next one the loop raises NoReply."""
 NOBODY: Final[frozenset[str]] = frozenset()
-
-
-class LoopState:
-    """What one cycle of a loop brought.
-
-    `at`        when the readings were in, s of robot time
-    `number`    of its slot on the grid of the loop; slots that were skipped are missing
-    `position`  where each axis is (rad, m) by name, as it was heard last
-    `missing`   the names of those that were not heard in this cycle
-    """
-
-    __slots__ = ("_heard", "at", "missing", "number", "position")
-
-    def __init__(
-        self,
-        at: float,
-        number: int,
-        position: Mapping[str, float],
-        missing: frozenset[str],
-        heard: Mapping[str, float],
-    ) -> None:
-        self.at = at
-        self.number = number
-        self.position = position
-        self.missing = missing
-        self._heard = heard
-
-    @property
-    def age(self) -> dict[str, float]:
-        """How old the position of each axis is (s), by name."""
-        return {name: max(0.0, self.at - self._heard.get(name, self.at)) for name in self.position}
-
-    def __repr__(self) -> str:
-        silent = f", missing {', '.join(sorted(self.missing))}" if self.missing else ""
-        return f"<LoopState {self.number} at {self.at:.6g} s{silent}>"
 
 
 class Rounds:
@@ -118,6 +84,8 @@ class Rounds:
         self._jerk = jerk
         self._exactly = exactly
         self._grid: Grid | None = None
+        self._entered = self._left = False
+        self._askable: Mapping[str, Place] = {}
         self._stepped = 0
         self._fresh = False
         self._all: tuple[Place, ...] = ()
@@ -127,7 +95,7 @@ class Rounds:
     @property
     def now(self) -> float:
         """Robot time (s), by the latest clock of its buses."""
-        return self._one.now if self._one is not None else max([part.now for part in self.parts.values()])
+        return self._one.now if self._one is not None else latest(self.parts.values())
 
     @property
     def parts_abreast(self) -> bool:
@@ -138,6 +106,10 @@ class Rounds:
 
     def entering(self) -> Works:
         """Ask what must be known, refuse a rate that cannot be, and see where everybody is."""
+        if self._entered:
+            raise RequestError(
+                "the loop was entered before", expected="a new one for each `with`", advice="nothing was sent"
+            )
         parts = self._body.by_bus(self._led)
         opened = yield Abreast({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
         self.budget = RobotBudget(self.rate, {bus: found[2] for bus, found in opened.items()}, self.without)
@@ -151,6 +123,8 @@ class Rounds:
         self.places = {name: place for name in self._led for place in self._placed() if place.name == name}
         self._all = tuple(self.places.values())
         yield from self._first_look()
+        self._askable = self.places
+        self._entered = True
 
     def _opening(self, bus: str, there: list[AxisVerbs]) -> Operation[Any]:
         try:
@@ -190,7 +164,7 @@ class Rounds:
 
     def ask(self, name: str, goal: float) -> None:
         """Set the goal (rad, m) of an axis for the rounds to come. Raises RequestError for what is none of it."""
-        place = self.places.get(name)
+        place = self._askable.get(name)
         if place is None or type(goal) is not float:
             goal = self.check(name, goal)
             place = self.places[name]
@@ -199,7 +173,8 @@ class Rounds:
             self._fresh = True
 
     def check(self, name: str, goal: float) -> float:
-        """Raise RequestError for an axis that is not in the loop, or what is no number."""
+        """Raise RequestError for an axis that is not in the loop, what is no number, and outside the `with`."""
+        self._refuse_outside()
         if name not in self.places:
             known = ", ".join(self._led)
             why = "cannot be led" if name in self.without else "is not in this loop"
@@ -209,22 +184,28 @@ class Rounds:
     def round(self) -> Generator[Abreast[Any], Any, LoopState]:
         """One cycle. Raises LimitExceeded for a goal that must not be sent: then nothing was, and it may go on.
 
-        Raises Interrupted for who was stopped from elsewhere, NoReply for who is silent too long, and what else a bus
-        raises.
+        It is raised at the end of the cycle for an axis that is held back: that one stays, and the others go on. Raises
+        Interrupted for who was told something from elsewhere, NoReply for who is silent too long, RequestError outside
+        the `with`, and what else a bus raises.
         """
         grid = self._grid
         if grid is None:
+            self._refuse_outside()
             grid = self._grid = Grid(self.statistics, self.now)
         now = self.now
         periods = max(1, grid.upcoming(now) - self._stepped)
         self._judge(periods)
         if self._fresh and (fresh := self._unbegun()):
-            yield from self._begin(fresh)
-            grid.forgive(self.now)
-            now, periods = self.now, 1
+            grid.book(now)
+            try:
+                yield from self._begin(fresh)
+            finally:
+                now, periods = self.now, 1
+                grid.forgive(now)
+                self._stand(grid.upcoming(now) - self._stepped)
         moment = grid.take(now)
-        orders = {bus: part.orders(periods) for bus, part in self.parts.items()}
         self._stepped = grid.number
+        orders = self._orders(periods)
         if self.only is None:
             told = yield Abreast(
                 {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
@@ -240,23 +221,33 @@ class Rounds:
         except MotorbusError as failure:
             return {name: failure}
 
+    def _orders(self, periods: int) -> dict[str, Sequence[Exchange[Any]]]:
+        try:
+            return {bus: part.orders(periods) for bus, part in self.parts.items()}
+        except MotorbusError:  # nothing leaves, on any bus
+            for place in self._all:
+                place.rest()
+            raise
+
     def _judge(self, periods: int) -> None:
-        """Before anything is sent: has somebody been stopped, and may all goals be sent?"""
-        every = self._all
-        for place in every:
-            if place.begun:
-                axis = place.axis
-                if not (axis.under_way and axis.engaged):
-                    self._release_interrupted()
-        for place in every:
+        """Before anything is sent: has somebody been told something, and may all goals be sent?"""
+        for part in self.parts.values():
+            if part.command.lost() is not None:
+                self._release_lost()
+        for place in self._all:
             if place.asked is not None:
                 place.judge(periods)
 
-    def _release_interrupted(self) -> None:
-        halted = [place for place in self._all if place.interrupted]
-        for place in halted:
-            place.release()
-        raise stopped([place.name for place in halted])
+    def _release_lost(self) -> None:
+        lost = [name for part in self.parts.values() for name in part.release_lost()]
+        if lost:
+            raise stopped(lost)
+
+    def _stand(self, periods: int) -> None:
+        """Nobody was told anything for so many periods: after many, all stand at their last goals."""
+        if periods > CATCH_UP:
+            for place in self._all:
+                place.rest()
 
     def _unbegun(self) -> dict[str, list[Place]]:
         """Who has a goal and no torque yet, by bus."""
@@ -296,29 +287,39 @@ class Rounds:
         statistics.lateness.add(max(0.0, first - moment))
         statistics.cycle.add(last - first)
         missing: list[str] = []
-        failed = False
+        failed = refused = False
         for bus, part in parts.items():
             found = told[bus]
             if isinstance(found, MotorbusError):
                 failed = True
             else:
                 missing += part.take(found)
+            if part.refused:
+                refused = True
         if failed:
             self._fail(told)
-        return self._state(last, number, missing)
+        state = self._state(last, number, missing, told)
+        if refused:
+            settled(refusals(parts))
+        return state
 
     def _fail(self, told: Mapping[str, Any]) -> None:
-        """A bus has raised: who was stopped there is led no more."""
-        for bus, found in told.items():
-            if isinstance(found, Interrupted):
-                for place in self.parts[bus].stopped():
-                    place.release()
-        settled(told)
+        """A bus has raised: who was told something from elsewhere is led no more, the others there stay for now."""
+        found = dict(told)
+        for bus, error in told.items():
+            if isinstance(error, MotorbusError):
+                part = self.parts[bus]
+                for place in part.places.values():
+                    place.rest()
+                if isinstance(error, Interrupted) and (lost := part.release_lost()):
+                    found[bus] = stopped(lost)
+                    found[bus].__cause__ = error
+        settled({**found, **refusals(self.parts)})
 
-    def _state(self, at: float, number: int, missing: list[str]) -> LoopState:
+    def _state(self, at: float, number: int, missing: list[str], told: Mapping[str, Any]) -> LoopState:
         position = {place.name: place.position for place in self._all}
         if not missing:
-            return LoopState(at, number, position, NOBODY, _NEVER)
+            return LoopState(at, number, position, NOBODY, partial(self._ages, told, _NEVER))
         for name in missing:
             self.statistics.lost[name] += 1
         silent = [name for name in missing if self.places[name].silent > PATIENCE]
@@ -328,38 +329,37 @@ class Rounds:
                 self.places[name].silent = 0
             raise error
         heard = {name: self.places[name].heard for name in missing}
-        return LoopState(at, number, position, frozenset(missing), heard)
+        return LoopState(at, number, position, frozenset(missing), partial(self._ages, told, heard))
+
+    def _ages(self, told: Mapping[str, Any], before: Mapping[str, float], at: float) -> dict[str, float]:
+        """How old (s) a position is that came with what was told in this cycle, or was heard before."""
+        heard = dict(before)
+        for bus, part in self.parts.items():
+            heard |= part.heard(told[bus])
+        return {name: max(0.0, at - moment) for name, moment in heard.items()}
 
     # -- leaving -------------------------------------------------------------------------------------------------------
 
     def leaving(self) -> Works:
         """Those that follow a goal and are on their way brake, as hard as they may, and stay where that ends.
 
-        Who was stopped from elsewhere is left alone, and so is whoever can be told nothing any more.
+        Who was told something from elsewhere is left alone, and so is whoever can be told nothing any more. Raises what
+        went wrong when all others rest.
         """
-        grid = self._grid
-        if grid is None:
-            return
-        for part in self.parts.values():
-            for place in part.stopped():
-                place.release()
-        led = {place.name for place in self._all if place.begun and not self._direct}
-        braking = [place for place in self._all if place.halt()]
-        parts = {bus: part for bus, part in self.parts.items() if part.has(braking)}
-        failures: dict[str, Any] = {}
-        while parts and not all(place.arrived for place in braking):
-            grid.forgive(self.now)
-            moment = grid.take(self.now)
-            told = yield Abreast(
-                {bus: part.cycle(part.orders(1), moment, reads=False) for bus, part in parts.items()}, dict
+        grid, self._grid = self._grid, None
+        self._askable, self._left = {}, True
+        if grid is not None:
+            yield from braked(self.parts, grid)
+
+    def _refuse_outside(self) -> None:
+        """Raise RequestError before it was entered, and when it was left."""
+        if self._left or not self._entered:
+            raise RequestError(
+                "the loop was left" if self._left else "the loop was not entered",
+                expected="goals and cycles inside its `with`",
+                advice=("make another one" if self._left else "enter the loop with `with`, or `async with`")
+                + "; nothing was sent",
             )
-            failures |= {bus: found for bus, found in told.items() if isinstance(found, MotorbusError)}
-            parts = {bus: part for bus, part in parts.items() if bus not in failures}
-            braking = [place for place in braking if place.axis.spec.bus in parts]
-        for place in self._all:
-            if place.name in led and place.axis.spec.bus not in failures:
-                place.axis.arrives()
-        settled(failures)
 
 
 _NEVER: Final[Mapping[str, float]] = MappingProxyType({})

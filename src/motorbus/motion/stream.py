@@ -13,22 +13,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import ceil, floor, inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.bus.face import BusFace
 from motorbus.core.family import Positions, Train
-from motorbus.core.operation import Exchange, Operation, Pause, Progress, Report, Together, outcome
+from motorbus.core.operation import Operation, Pause, Progress, Report, Together
 from motorbus.errors import (
     Interrupted,
     LimitExceeded,
     MotorbusError,
     NoReply,
-    OutcomeUnknown,
     RequestError,
     Stalled,
-    WireError,
 )
 from motorbus.motion.command import Command
+from motorbus.motion.forgiving import forgiven
 from motorbus.motion.moved import STILL, Cycles, Track
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.trajectory import Course
@@ -55,8 +54,6 @@ SILENCE: Final = 0.3
 it alone for a while, and asks it twice more in this time."""
 SHOWN: Final = 0.25
 """s between two reports of progress."""
-LOST: Final = (NoReply, WireError, OutcomeUnknown)
-"""An exchange that failed like this may be forgotten: the next cycle brings another."""
 
 
 class Fate:
@@ -252,7 +249,7 @@ class Stream:
         return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
 
     def _order(self, at: float) -> Operation[None]:
-        yield from _forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
+        yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -261,7 +258,7 @@ class Stream:
 
     def _read(self) -> Operation[None]:
         """Read the positions, and keep what was heard."""
-        told = yield from _forgiven(self._train.positions)
+        told = yield from forgiven(self._train.positions)
         heard = {node for one in told if isinstance(one, Positions) for node in self._keep(one)}
         now = yield from Pause(0)
         for node in self._axes.keys() - heard:
@@ -371,15 +368,6 @@ class Stream:
             advice="look at the cable and the supply; all of the movement were told to stop",
             node=node,
         )
-
-
-def _forgiven(exchanges: Sequence[Exchange[Any]]) -> Operation[list[Any]]:
-    """What came of each; one that was lost is an error among the values, every other error is raised."""
-    told = yield from Together([outcome(one) for one in exchanges])
-    for one in told:
-        if isinstance(one, MotorbusError) and not isinstance(one, LOST):
-            raise one
-    return told
 
 
 def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:

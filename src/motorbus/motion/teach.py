@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 
 from motorbus.errors import MotionError, RequestError
@@ -10,9 +11,11 @@ from motorbus.motion.body import Body
 from motorbus.motion.budget import divided
 from motorbus.motion.follow import NOTHING, Ending, check_able, check_seconds
 from motorbus.motion.loop import Errand, LoopFace
-from motorbus.motion.rounds import LoopState
+from motorbus.motion.readings import LoopState
 from motorbus.motion.trajectory import Trajectory
 from motorbus.motion.trajectory.samples import MOST
+
+LOG = logging.getLogger("motorbus.motion")
 
 
 def teach(
@@ -26,12 +29,14 @@ def teach(
 ) -> Errand[Trajectory]:
     """Let these axes go and write down where they are guided, `rate` times a second (Hz); None: all that can be taught.
 
-    The trajectory has the times of the grid, from 0 on. A cycle in which an axis was not heard has no sample; nothing
-    is smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
+    The trajectory has the times of the readings, from 0 on: those of a loop that was held up are late, and stand where
+    they were taken. A cycle in which an axis was not heard has no sample; nothing is smoothed, see
+    `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
     moves.
 
     It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it
-    and what was taught is given. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or
+    and what was taught is given. With as many samples as a trajectory can have (`MOST`) it ends too, and the log says
+    so. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or
     whose device cannot be asked in a loop; MotionError for less than two samples; and what a `Loop` raises.
     """
     check_seconds(seconds)
@@ -65,17 +70,23 @@ def _taught(body: Body, names: str | Iterable[str] | None, limp: bool) -> tuple[
 
 class _Teaching:
     def __init__(self, rate: float, seconds: float | None, until: Callable[[], bool] | None) -> None:
-        self._rate = rate
         self._over = Ending(rate, seconds, until)
-        self._numbers: list[int] = []
+        self._times: list[float] = []
         self._rows: list[tuple[float, ...]] = []
 
     def step(self, loop: LoopFace, state: LoopState) -> bool:
         """See `loop.Course`."""
         if not state.missing:
-            self._numbers.append(state.number)
+            self._times.append(state.at)
             self._rows.append(tuple(state.position.values()))
-        return not self._over(state.number) and len(self._rows) < MOST
+        if self._over(state.number):
+            return False
+        if len(self._rows) < MOST:
+            return True
+        LOG.warning(
+            "teaching ended after %.6g s: a trajectory has %d samples at most", self._over.seconds, MOST
+        )
+        return False
 
     def result(self, loop: LoopFace) -> Trajectory:
         """See `loop.Course`."""
@@ -85,7 +96,6 @@ class _Teaching:
                 expected="two cycles or more in which every axis was heard",
                 advice="teach longer, at a higher rate, or see why an axis is silent; the axes stay as they are",
             )
-        first = self._numbers[0]
-        times = [(number - first) / self._rate for number in self._numbers]
+        times = [at - self._times[0] for at in self._times]
         columns = zip(*self._rows, strict=True)
         return Trajectory(times, dict(zip(loop.axes, columns, strict=True)))

@@ -116,6 +116,16 @@ def test_what_cannot_be_so_slow_ends_before_the_others_and_says_so() -> None:
     assert found.turned.duration < 21.0
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.4 * PULSE, -0.4 * PULSE])
+def test_what_is_there_already_takes_part_and_stays(angle: float) -> None:
+    line, partner = paced(), Partner(2.0)
+    turned = Kept(line, partner, angle=angle).turned
+    assert (turned.angle, turned.duration, turned.start, turned.way(1.0)) == (0.0, 0.0, partner.moment, 0.0)
+    assert (partner.asked, partner.shortest) == (["agreed", "start"], 0.0)
+    assert set(starts(line.sent)) == {READ}
+    untouched(line)
+
+
 # -- in which order ----------------------------------------------------------------------------------------------------
 
 
@@ -145,13 +155,12 @@ def test_others_that_give_up_leave_nothing_moved(fails: str) -> None:
     failed(found.told, Interrupted, "the others do not move")
     assert isinstance(found.told, MotorbusError)
     assert found.told.unmoved
+    assert found.partner.failures == [found.told]
     unmoved(line)
     assert (SELECT in starts(line.sent)) == (fails == "start")
 
 
 REFUSED: dict[str, dict[str, Any]] = {
-    "no pulse": {"angle": 0.4 * PULSE},
-    "nothing": {"angle": 0.0},
     "too far": {"angle": 1e9},
     "no number": {"angle": float("nan")},
     "too slow": {"velocity": 0.1},
@@ -239,6 +248,23 @@ def test_a_stop_of_another_task_ends_it(stop: Any, place: str) -> None:
     assert starts(line.sent).count(MOVE) == (place == "moving")
     assert 0 < line.simulated.position < 8000 if place == "moving" else line.simulated.position == 0
     assert (line.at_rest, line.as_before, line.journal.unfinished()) == (True, True, None)
+
+
+def test_the_others_are_told_of_a_stop_before_project_1_is_given_back() -> None:
+    line = paced()
+    seen: list[bool] = []
+
+    class Noting(Partner):
+        def fails(self, error: BaseException) -> None:
+            super().fails(error)
+            seen.append(line.as_before)
+
+    partner = Noting(6.0)
+    told, _ = beside(line, partner, stopping(5.0))
+    assert isinstance(told, Interrupted), told
+    assert not told.unmoved
+    assert (partner.failures, seen) == ([told], [False])
+    assert line.as_before
 
 
 @pytest.mark.parametrize("moment", [0.2, 0.6, 1.0, 1.3, 2.2, 3.0])

@@ -10,12 +10,13 @@ No position comes back. When it began is known from when the order left, and whe
 
 from __future__ import annotations
 
+from fractions import Fraction
 from math import tau
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.family import Timing, Turned
 from motorbus.core.operation import Operation, Pause, Tune, outcome
-from motorbus.errors import MotorbusError
+from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.borrowing import PROJECT, Accord, borrowed
@@ -66,8 +67,11 @@ def keep_time(
     with another reading of the ramp it takes longer. So it is waited for as long as the slowest reading says, then
     stopped. When this returns the motor has turned by `Turned.angle`, in whole pulses, unless steps were lost.
 
-    Raises RequestError, with nothing sent that changes anything and before anything is agreed, for an angle of less
-    than a pulse or too far, a velocity below 1 RPM, an acceleration not above 0, and as `borrowed` for what it refuses;
+    An angle that is no pulse when it is rounded to whole ones is none to go: it begins and ends with the others, and
+    nothing is sent that changes anything. So who is sent again to where it stands already holds nobody up.
+
+    Raises RequestError, with nothing sent that changes anything and before anything is agreed, for an angle that is too
+    far, a velocity below 1 RPM, an acceleration not above 0, and as `borrowed` for what it refuses;
     Interrupted when the others do not begin or somebody has said stop before, and project 1 is given back; all of
     these have moved nothing, and are `unmoved`. Interrupted when somebody stops it, OutcomeUnknown when the order was
     not acknowledged, and whatever else: where the motor stands is not known then. Once the others are asked they are
@@ -75,10 +79,22 @@ def keep_time(
     """
     check(angle, velocity, acceleration)
     watch = Watch(node)
+    try:
+        return (yield from honest(watch, _kept(node, angle, timing, watch, velocity, acceleration)))
+    except _There:
+        return (yield from _told(timing, _stayed(node, timing)))
+
+
+def _kept(
+    node: Node, angle: float, timing: Timing, watch: Watch, velocity: float, acceleration: float | None
+) -> Operation[Turned]:
     tempo, true = Tempo(0.0, 0.0), Project()
 
     def wanted(project: Project) -> Operation[Project]:
-        return quickest((yield from grounded(node, project, VERB, 1)), angle, velocity, acceleration)
+        found = yield from grounded(node, project, VERB, 1)
+        if not round(Fraction(abs(angle) / tau) * (found.pulses_per_turn or 0)):
+            raise _There
+        return quickest(found, angle, velocity, acceleration)
 
     def settled(quick: Project) -> Operation[Project]:
         nonlocal true
@@ -101,8 +117,7 @@ def keep_time(
         return _told(timing, honest(watch, work))
 
     accord = Accord(lambda quick: told(settled(quick)), lambda project: told(ready(project)))
-    kept = borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord)
-    return (yield from honest(watch, kept))
+    return (yield from borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord))
 
 
 def _told(timing: Timing, work: Operation[T]) -> Operation[T]:
@@ -112,6 +127,19 @@ def _told(timing: Timing, work: Operation[T]) -> Operation[T]:
     except BaseException as error:
         timing.fails(error)
         raise
+
+
+class _There(RequestError):
+    """It is where it is to go."""
+
+    def __init__(self) -> None:
+        super().__init__("this is no way to go")
+
+
+def _stayed(node: Node, timing: Timing) -> Operation[Turned]:
+    """It takes part and does not move."""
+    yield from timing.agreed(0.0, lambda others: others)
+    return Turned(node.node, 0.0, (yield from timing.start(0.0)), 0.0, lambda _: 0.0)
 
 
 def shortest(

@@ -1,0 +1,25 @@
+"""What may be lost on the wire while axes are led: the next cycle brings another one soon.
+
+A reading that is missing, or an acknowledgement, does no harm by itself. Whoever leads counts them, and gives up when
+nothing is heard for too long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+from motorbus.core.operation import Exchange, Operation, Together, outcome
+from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError
+
+LOST: Final = (NoReply, WireError, OutcomeUnknown)
+"""The errors of an exchange that may be forgotten."""
+
+
+def forgiven(exchanges: Iterable[Exchange[Any]]) -> Operation[list[Any]]:
+    """What came of each; one that was lost is an error among the values, the first error of another kind is raised."""
+    told = yield from Together([outcome(one) for one in exchanges])
+    for one in told:
+        if isinstance(one, MotorbusError) and not isinstance(one, LOST):
+            raise one
+    return told

@@ -1,0 +1,25 @@
+"""What a cycle brought tells how old each position is, also where a bus answered long before another."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.motion.readings import LoopState
+from tests.motion.test_rounds import Slow, cycles, looping
+
+
+def test_it_says_what_it_is() -> None:
+    state = LoopState(2.5, 7, {"a1": 0.1}, frozenset({"a1"}), lambda at: {"a1": at - 2.0})
+    assert state.age == {"a1": 0.5}
+    assert repr(state) == "<LoopState 7 at 2.5 s, missing a1>"
+
+
+def test_a_position_of_a_bus_that_answered_early_is_older() -> None:
+    with looping(arm="1", can="0x21") as (_, loop, sims):
+        sims["can"].line = slow = Slow()
+        slow.by = 0.004
+        state = cycles(loop, 2)
+        assert state.age["c1"] == pytest.approx(0.0, abs=0.0005)
+        assert state.age["a1"] == pytest.approx(0.004, abs=0.0005)
+        cycles(loop, 3)
+        assert state.age["a1"] == pytest.approx(0.004, abs=0.0005)  # that is of its own cycle
