@@ -92,3 +92,17 @@ def test_what_cannot_follow_ends_with_2_and_nobody_is_let_go(
     assert (ran.code, ran.out) == (2, ""), ran.err
     assert "error: " in ran.err
     assert [bench.simulations["arm"][node].memory["torque_enable"] for node in (1, 2, 3)] == [1, 1, 1]
+
+
+def test_a_leader_that_cannot_be_let_go_is_told_of(bench: Bench, run: Run) -> None:
+    ran = run("follow", "c1", "a1", "--seconds", "1")
+    assert ran.code == 0, ran.err
+    assert "c1 cannot be let go: only what else moves it leads" in ran.err
+    assert "the torque goes off now" not in ran.err
+
+
+def test_it_is_judged_before_it_is_said_that_torque_goes_off(bench: Bench, run: Run) -> None:
+    for words in ("a1 lift", "a1 a2 --rate 5000"):
+        ran = run("follow", *words.split(), "--seconds", "1")
+        assert ran.code == 2
+        assert "the torque goes off now" not in ran.err

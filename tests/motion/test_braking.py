@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from math import radians
+from itertools import pairwise
+from math import radians, tau
 from typing import Any
 
 import pytest
@@ -144,15 +145,23 @@ class Stopping(Heard):
         return found
 
 
-def test_who_is_told_to_move_meanwhile_is_left_alone_and_the_others_brake() -> None:
+def braked_while(number: int) -> tuple[int, Loop, Robot]:
+    """Two axes brake, and somebody moves a2 at this frame of it; how many there were, the loop and the robot."""
     with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
         with robot.loop(RATE) as loop:
             loop.goal.update({"a1": 2.0, "a2": 2.0})
             cycles(loop, 60)
-            sims["arm"].line = Stopping(5, lambda: robot["a2"].departs())
+            sims["arm"].line = line = Stopping(number, lambda: robot["a2"].departs())
+        return len(line.sent), loop, robot
+
+
+def test_who_is_told_to_move_meanwhile_is_left_alone_and_the_others_brake_whenever_that_is() -> None:
+    frames, _, _ = braked_while(0)
+    assert frames > 40
+    for number in {*range(1, frames, 4), frames - 1, frames}:
+        _, loop, robot = braked_while(number)
         assert speed(loop, "a1") == 0.0
-        assert [robot[name].under_way for name in ("a1", "a2")] == [False, True]
-        assert place(loop, "a1").sent - place(loop, "a2").position > 0.1
+        assert [axis.under_way for axis in robot.axes.values()] == [False, True]
 
 
 def test_a_bus_that_fails_meanwhile_is_told_nothing_more_and_the_other_brakes() -> None:
@@ -226,12 +235,29 @@ def test_what_goes_wrong_is_told_with_what_made_it_leave() -> None:
         assert "on leaving the loop: a1: the goal" in left.value.__notes__[0]
 
 
-def test_a_stop_before_it_brakes_takes_that_axis_out_of_it() -> None:
-    with machine(arm="1-2", exit="leave") as (made, _), Robot.of(made) as robot:
+def test_a_stop_before_it_brakes_takes_that_axis_out_of_it_and_costs_the_others_no_cycle() -> None:
+    with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
         with robot.loop(RATE) as loop:
             loop.goal.update({"a1": 2.0, "a2": 2.0})
             cycles(loop, 60)
             robot["a1"].stop()
             stood = robot["a1"].position()
+            way = [place(loop, "a2").sent]
+            memory = sims["arm"][2].memory
+            sims["arm"].line = Each(lambda: way.append((memory["goal_position"] - 2048) * tau / 4096))
         assert robot["a1"].position() == pytest.approx(stood, abs=0.02)
         assert place(loop, "a2").arrived
+        assert len(set(way)) > 20
+        assert max(after - before for before, after in pairwise(way)) < 1.1 * QUICK / RATE
+
+
+class Each(Heard):
+    """A wire on which something is done with each frame."""
+
+    def __init__(self, act: Any) -> None:
+        super().__init__()
+        self.act = act
+
+    def carry(self, sender: Any, data: Any, at: float) -> Any:
+        self.act()
+        return super().carry(sender, data, at)

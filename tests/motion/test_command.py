@@ -43,8 +43,18 @@ def test_two_commands_are_joined_and_each_counts_from_when_it_was_taken() -> Non
         assert both.lost() is None  # `first` was taken anew
         second.hold()
         assert [axis.name for axis in both.held()] == ["a1", "a3"]
-        assert other.joined(nobody).lost() is None
-        assert isinstance(one.lost(), Interrupted)
+        alone = other.joined(nobody)
+        assert alone.lost() is None
+        first.bus.run(first.able["disable_torque"](first.device))  # past the axis
+        assert isinstance(alone.lost(), Interrupted)
+
+
+def test_a_stop_between_two_commands_that_are_joined_is_not_forgotten() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        first, second = robot.axes.values()
+        one = Command([first])
+        first.bus.run(first.able["disable_torque"](first.device))  # past the axis
+        assert isinstance(one.joined(Command([second])).lost(), Interrupted)
 
 
 def test_the_rest_of_a_command_is_over_those_that_nobody_told_anything() -> None:

@@ -203,6 +203,8 @@ def test_a_loop_that_was_left_moves_nothing_any_more_and_is_not_entered_again() 
         for tries in (lambda: next(loop), lambda: loop.goal.update({"a1": 0.2}), loop.__enter__):
             with pytest.raises(RequestError, match=r"the loop was (left|entered before)"):
                 tries()
+        with pytest.raises(RequestError, match="the loop was left"):
+            loop.goal["a1"] = 0.2
         assert not line.sent
         assert (loop.axes, loop.statistics.cycles) == (("a1",), 1)
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import inf, nan, radians
 from typing import Any
 
 import pytest
 
 from motorbus.core.operation import CanFrame, Data
-from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError
+from motorbus.errors import Interrupted, LimitExceeded, LinkError, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop import Loop
 from motorbus.motion.rounds import PATIENCE
@@ -287,3 +287,39 @@ def test_an_emergency_stop_in_the_middle_is_the_end_of_all_goals() -> None:
             next(loop)
         assert sims["arm"][1].memory["goal_position"] == written
         assert sims["arm"][1].memory["torque_enable"] == 0
+
+
+# -- while nothing can be sent -----------------------------------------------------------------------------------------
+
+
+def gone(loop: Loop, name: str) -> float:
+    """How far (rad) the small goals of an axis go in 30 cycles that all raise."""
+    place: Any = loop._rounds.places[name]
+    before = place.sent
+    for _ in range(30):
+        with pytest.raises(MotorbusError):
+            next(loop)
+    way: float = place.sent - before
+    return way
+
+
+def test_no_small_goal_runs_away_while_a_bus_is_gone() -> None:
+    with machine(arm="1", can="0x21", exit="leave") as (made, _), Robot.of(made) as robot:
+        link: Any = robot.buses["arm"].link
+        with suppress(LinkError), robot.loop(RATE) as loop:
+            loop.goal.update({"a1": 2.0, "c1": 0.7})
+            cycles(loop, 40)
+            link.unplug()
+            assert 0 < gone(loop, "a1") < 2 * radians(90) / RATE
+        link.plug()
+
+
+def test_no_small_goal_runs_away_while_the_settings_of_another_servo_are_not_known() -> None:
+    with looping(arm="1", can="0x21") as (robot, loop, _):
+        loop.goal.update({"a1": 2.0, "c1": 0.7})
+        cycles(loop, 30)
+        servo: Any = robot["c1"].device
+        known, servo.limits = servo.limits, (-1.0, 1.0)  # as after a write to one of them
+        assert 0 <= gone(loop, "a1") < 2 * radians(90) / RATE
+        servo.limits = known
+        assert cycles(loop, 150).position == pytest.approx({"a1": 2.0, "c1": 0.7}, abs=0.02)

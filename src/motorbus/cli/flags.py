@@ -1,4 +1,4 @@
-"""A flag that no command and no bus has is most often a known one mistyped, so that is said and not a list of options."""
+"""A flag that nobody has is most often a known one mistyped, so that is said and not a list of options."""
 
 from __future__ import annotations
 

@@ -76,9 +76,6 @@ def follow(
     options
         Any option of the buses, as a flag.
     """
-    from motorbus.motion.budget import refuse_above
-    from motorbus.motion.follow import check_able
-
     pairs = _pairs(leader, follower)
     span = units.parse(seconds, "time") if seconds else None
     if not rate > 0 or (span is not None and not span > 0):
@@ -88,14 +85,9 @@ def follow(
         if dry_run:
             return _plan(hand, pairs, present)
         goals = {one: present[other] for other, one in pairs.items() if other in present and one in present}
-        check_able(hand.robot, pairs, "train", "followed in a loop")
-        check_able(hand.robot, pairs.values(), "train", "led in a loop")
-        refuse_above(hand.robot.budget(rate, [*pairs, *pairs.values()]))
+        _judge(hand, pairs, rate)
         _consent(hand, present, goals, yes=yes)
-        if limp := [name for name in pairs if hasattr(hand.robot[name], "disable_torque")]:
-            output.note(f"{', '.join(limp)}: the torque goes off now, and stays off: hold what could sag")
-        if stiff := [name for name in pairs if name not in limp]:
-            output.note(f"note: {', '.join(stiff)} cannot be let go: only what else moves it leads")
+        _warn(hand, pairs)
         with hand.working("following"), asked_to_end() as ended:
             until = counted(hand, "following", ended, rate, span)
             followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until)
@@ -113,6 +105,25 @@ def _pairs(leader: str, follower: str) -> dict[str, str]:
             advice="make groups of those that belong together, as [group.left]; nothing was sent",
         )
     return dict(zip(leaders, followers, strict=True))
+
+
+def _judge(hand: InHand, pairs: Mapping[str, str], rate: float) -> None:
+    """Raise RequestError for pairs and a rate that cannot be, before it is said that torque goes off."""
+    from motorbus.motion.budget import refuse_above
+    from motorbus.motion.follow import check_able
+
+    check_able(hand.robot, pairs, "train", "followed in a loop")
+    check_able(hand.robot, pairs.values(), "train", "led in a loop")
+    refuse_above(hand.robot.budget(rate, [*pairs, *pairs.values()]))
+
+
+def _warn(hand: InHand, pairs: Mapping[str, str]) -> None:
+    """Say which leaders lose their torque, and which have none to lose."""
+    limp = [name for name in pairs if hasattr(hand.robot[name], "disable_torque")]
+    if limp:
+        hand.output.note(f"{', '.join(limp)}: the torque goes off now, and stays off: hold what could sag")
+    if stiff := [name for name in pairs if name not in limp]:
+        hand.output.note(f"note: {', '.join(stiff)} cannot be let go: only what else moves it leads")
 
 
 def _consent(hand: InHand, present: Mapping[str, float], goals: Mapping[str, float], *, yes: bool) -> None:

@@ -50,7 +50,7 @@ Examples:
 
 @app.default
 def jog(
-    device_: Annotated[str, Parameter(name="BUS#ID=VELOCITY|AXIS=VELOCITY")],
+    device_: Annotated[str, Parameter(name="DEVICE=VELOCITY")],
     /,
     *,
     seconds: str,

@@ -79,7 +79,7 @@ Goals = dict[int, float]
 
 @app.default
 def move(
-    *goals: Annotated[str, Parameter(name="BUS#ID=POSITION|AXIS=POSITION")],
+    *goals: Annotated[str, Parameter(name="GOAL")],
     velocity: str = "",
     acceleration: str = "",
     duration: Duration = "",

@@ -88,23 +88,19 @@ def teach(
         if dry_run:
             return _plan(hand, axes, limp=limp)
         _judge(hand, axes, rate, named=bool(names), limp=limp)
-        if limp:
-            output.note("the torque goes off now, and stays off: hold what could sag")
         with hand.working("recording"), asked_to_end(also=END) as ended:
             until = counted(hand, "recording", ended, rate, span)
             taught = hand.robot.teach(
                 axes if names else None, seconds=span, rate=rate, until=until, limp=limp
             )
-    _keep(taught.smoothed(smooth) if smooth else taught, output_, output)
-    if left := [name for name in axes if name not in taught.axes]:
-        output.note(f"note: not taught, for nobody can lead them by hand: {', '.join(left)}")
+    _keep(taught.smoothed(smooth) if smooth else taught, axes, output_, output)
     if ended.told:
         raise KeyboardInterrupt
     return Exit.OK
 
 
 def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: bool) -> None:
-    """Raise RequestError for who cannot be taught, and for too high a rate, before it is said that torque goes off."""
+    """Say that torque goes off. Raises RequestError before, for who cannot be taught, and for too high a rate."""
     from motorbus.motion.budget import refuse_above
     from motorbus.motion.follow import check_able
 
@@ -116,6 +112,8 @@ def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: boo
     taught = [name for name in axes if needed <= set(hand.robot[name].able)]
     if taught:
         refuse_above(hand.robot.budget(rate, taught))
+    if limp:
+        hand.output.note("the torque goes off now, and stays off: hold what could sag")
 
 
 def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
@@ -166,9 +164,11 @@ def _plan(hand: InHand, axes: list[str], *, limp: bool) -> Exit:
     return Exit.OK
 
 
-def _keep(taught: Trajectory, file: Path, output: Output) -> None:
-    """Write it into its file, and say how far each axis went."""
+def _keep(taught: Trajectory, wanted: list[str], file: Path, output: Output) -> None:
+    """Write it into its file, and say how far each axis went, and who of those wanted is not in it."""
     axes = machine().axes
+    if left := [name for name in wanted if name not in taught.axes]:
+        output.note(f"note: not taught, for nobody can lead them by hand: {', '.join(left)}")
     with usable(file, "written"):
         file.write_text(taught.text(axes), encoding="utf-8")
     reach = {name: (min(places), max(places)) for name, places in taught.axes.items()}

@@ -102,7 +102,6 @@ class Command:
         found, held = copy(self), self.held()
         found.axes = tuple(held)
         found._counts = tuple((axis, self._orders[axis.name]) for axis in held)
-        found._stopping = NEVER
         return found
 
     def check(self) -> None:

@@ -169,13 +169,9 @@ class Place:
     def halt(self) -> None:
         """Where it follows: brake from here on, or stay. It is `arrived` when that is done."""
         way = self._follower
-        if way is None or self.sent is None:
-            return
-        if way.velocity:
+        if way is not None:
             way.halt()
-        else:
-            way.reset(self.sent)
-        self.asked = self._passed = way.goal
+            self.asked = self._passed = way.goal
 
     @property
     def follows(self) -> bool:
