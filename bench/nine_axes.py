@@ -28,7 +28,7 @@ from motorbus import families
 from motorbus.cli.nine import PARTS, machine
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
-from motorbus.motion.moved import Moved
+from motorbus.motion.moving.moved import Moved
 from motorbus.session import parse_ids
 from motorbus.session.robot import Robot
 from motorbus.simulation.clients import CanClient

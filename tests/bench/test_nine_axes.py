@@ -7,7 +7,7 @@ import pytest
 from bench.nine_axes import Spread, measured, spread, summary, table
 from bench.truth import Truth, Went
 from motorbus.core.plant import move, rest
-from motorbus.motion.moved import Arrived, Moved, Track
+from motorbus.motion.moving.moved import Arrived, Moved, Track
 
 WENT = {"a": Went(100.0, 10.0, 12.0, 10.1, 11.9), "b": Went(-50.0, 10.002, 12.01, 10.1, 11.8)}
 MOVED = Moved(

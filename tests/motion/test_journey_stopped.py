@@ -14,7 +14,7 @@ from motorbus.core.operation import Data, Progress
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.meeting import Seat
-from motorbus.motion.moved import Moved
+from motorbus.motion.moving.moved import Moved
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import Cut, Heard, machine

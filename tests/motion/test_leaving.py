@@ -9,10 +9,10 @@ import pytest
 
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
 from motorbus.core.operation import Operation, Pause, Together, outcome
-from motorbus.motion import moving
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving
 from motorbus.motion.machine import Machine
+from motorbus.motion.moving import verbs as moving
 from tests.motion.machines import Cut, listened, machine, said
 
 PARKED = {"exit": "park", "park": "10 deg"}
@@ -312,7 +312,7 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
 
 
 def _stopped_after(robot: Robot, seconds: float) -> Operation[object]:
-    from motorbus.motion.axis import stop
+    from motorbus.motion.capabilities import stop
 
     yield from Pause(seconds)
     return (yield from stop(robot["a1"]))

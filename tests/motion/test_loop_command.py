@@ -13,11 +13,11 @@ import pytest
 from motorbus.core.operation import CanFrame, Exchange
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.link.base import Side
-from motorbus.motion.axis import disable_torque
-from motorbus.motion.loop import AsyncLoop
+from motorbus.motion.capabilities import disable_torque
+from motorbus.motion.loop.faces import AsyncLoop
 from motorbus.session.robot import AsyncRobot, Robot
+from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.motion.machines import Heard, machine
-from tests.motion.test_rounds import RATE, cycles, looping
 
 ARM = "1-3"
 

@@ -14,7 +14,7 @@ import pytest
 
 from bench.truth import Truth, Went, watched
 from motorbus.link.memory import NoisyLine
-from motorbus.motion.moved import Moved
+from motorbus.motion.moving.moved import Moved
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
 

@@ -9,7 +9,7 @@ import pytest
 
 from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotHomed, RequestError, Robot
 from motorbus.core.operation import Operation, Pause, Together, outcome
-from motorbus.motion import axis as verbs
+from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned

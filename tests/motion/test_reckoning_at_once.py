@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Interrupted, NotHomed, RequestError, Robot
-from motorbus.motion.axes import AsyncAxis
+from motorbus.motion.axis import AsyncAxis
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
 from tests.motion.tracing import Line, interrupted
 
 PULSES = 1600
 """For one turn of 5 mm, as project 1 of the simulated controller says."""
-FILES = ("motion/axis.py", "motion/reckoning.py", "motion/parts.py", "motion/command.py")
+FILES = ("motion/capabilities.py", "motion/reckoning.py", "motion/moving/parts.py", "motion/command.py")
 
 
 def stands(sims: dict[str, Simulation]) -> float:

@@ -9,7 +9,7 @@ import pytest
 from motorbus import DeviceError, MotorbusError, NoReply, PortBusy, Robot
 from motorbus.core.operation import Operation, Pause
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.axis import AxisVerbs
+from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.several import errors_of, everyone, gathered, insisted, named, of_each, raised
 from tests.motion.machines import Cut, machine
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
-    from motorbus.motion.axes import Axis
+    from motorbus.motion.axis import Axis
     from motorbus.motion.leaving import Leaving
     from motorbus.motion.machine import Machine
 

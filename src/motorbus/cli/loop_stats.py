@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
     from motorbus.motion.budget import RobotBudget
-    from motorbus.motion.grid import Statistics, Took
+    from motorbus.motion.loop.grid import Statistics, Took
 
 app = App(
     name="loop-stats",

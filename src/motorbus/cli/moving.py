@@ -14,7 +14,7 @@ from motorbus.errors import NotHomed, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from motorbus.motion.moved import Moved
+    from motorbus.motion.moving.moved import Moved
 
 Kind = Literal["trapezoid", "minimum_jerk"]
 FAR: Final = pi

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
     from motorbus.core.family import Found
-    from motorbus.motion.moved import Moved
+    from motorbus.motion.moving.moved import Moved
     from motorbus.session.robot import Robot
 
 

@@ -19,7 +19,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from motorbus.cli.robot import InHand
     from motorbus.motion.machine import AxisSpec
-    from motorbus.motion.moved import Moved
+    from motorbus.motion.moving.moved import Moved
     from motorbus.motion.trajectory import Trajectory
 
 app = App(

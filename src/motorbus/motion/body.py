@@ -11,7 +11,7 @@ from typing import Any, Final
 from motorbus.bus.face import BusFace
 from motorbus.core.entry import shown
 from motorbus.errors import RequestError
-from motorbus.motion.axis import AxisVerbs
+from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.machine import Machine
 
 

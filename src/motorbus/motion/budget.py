@@ -18,9 +18,9 @@ from motorbus.core.operation import ANY, Exchange, Operation
 from motorbus.errors import RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
-from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
-from motorbus.motion.cycle import train_of
+from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.loop.cycle import train_of
 
 ROUNDING: Final = 1e-9
 

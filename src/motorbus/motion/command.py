@@ -28,7 +28,7 @@ from motorbus.core.operation import (
 from motorbus.errors import Interrupted, MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
     from motorbus.motion.reckoning import Movement
 
 T = TypeVar("T")

@@ -14,9 +14,9 @@ from typing import Any
 from motorbus.errors import RequestError
 from motorbus.motion import group
 from motorbus.motion.body import Body
-from motorbus.motion.grid import ROUNDING, Statistics
-from motorbus.motion.loop import Errand, LoopFace
-from motorbus.motion.readings import LoopState
+from motorbus.motion.loop.faces import Errand, LoopFace
+from motorbus.motion.loop.grid import ROUNDING, Statistics
+from motorbus.motion.loop.readings import LoopState
 
 NOTHING = "nothing was sent"
 

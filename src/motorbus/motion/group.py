@@ -14,11 +14,11 @@ from typing import Any, TypeAlias
 from motorbus.core.family import State
 from motorbus.core.operation import Operation
 from motorbus.errors import RequestError
-from motorbus.motion import axis as one
+from motorbus.motion import capabilities as one
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
+from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.several import Act, Told, everyone, insisted, of_each, raised
 
 Names: TypeAlias = "str | Iterable[str] | None"

@@ -14,11 +14,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
-from motorbus.motion import axis as one
+from motorbus.motion import capabilities as one
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
-from motorbus.motion.moving import park
+from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.moving.verbs import park
 from motorbus.motion.several import Act, errors_of, gathered, insisted, of_each
 
 TRIES: Final = 3

@@ -22,7 +22,7 @@ from motorbus.motion.trajectory import Trajectory
 from motorbus.motion.trajectory import check as check_samples
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 Device: TypeAlias = "tuple[float, float] | None"
 """The device's own lowest and highest position (rad of the device), None where it has or tells none."""

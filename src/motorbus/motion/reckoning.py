@@ -18,7 +18,7 @@ from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 T = TypeVar("T")
 

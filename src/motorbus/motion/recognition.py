@@ -13,8 +13,8 @@ from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Runnable
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
+from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.several import everyone, of_each, raised
 
 

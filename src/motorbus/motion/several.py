@@ -15,7 +15,7 @@ from motorbus.core.operation import Operation, Runnable, Together, afterwards, o
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 T = TypeVar("T")
 

@@ -10,8 +10,8 @@ from motorbus.motion import group
 from motorbus.motion.body import Body
 from motorbus.motion.budget import divided
 from motorbus.motion.follow import NOTHING, Ending, check_able, check_seconds
-from motorbus.motion.loop import Errand, LoopFace
-from motorbus.motion.readings import LoopState
+from motorbus.motion.loop.faces import Errand, LoopFace
+from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.trajectory import Trajectory
 from motorbus.motion.trajectory.samples import MOST
 

@@ -10,7 +10,7 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import shown
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.axes import AsyncAxis, Axis
+from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import Machine
 from motorbus.motion.machine.agreement import check

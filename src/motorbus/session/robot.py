@@ -23,16 +23,17 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion import group, moving
+from motorbus.motion import group
 from motorbus.motion.abreast import Led, LedAsync, together
-from motorbus.motion.axes import AsyncAxis, Axis
+from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.budget import budget
 from motorbus.motion.conductor import Conductor, LoopConductor
 from motorbus.motion.follow import follow
 from motorbus.motion.leaving import Leaving
-from motorbus.motion.loop import awaiting_loop, blocking_loop, looped
+from motorbus.motion.loop.faces import awaiting_loop, blocking_loop, looped
 from motorbus.motion.machine import NAME, Machine
+from motorbus.motion.moving import verbs as moving
 from motorbus.motion.recognition import recognise
 from motorbus.motion.teach import teach
 from motorbus.session.buses import LOG

@@ -22,15 +22,15 @@ from motorbus.core.operation import Exchange, Operation
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
-from motorbus.motion.axis import AxisVerbs
 from motorbus.motion.body import Body
-from motorbus.motion.braking import Works, braked, latest, refusals
 from motorbus.motion.budget import RobotBudget, bus_budget, divided, refuse_above
-from motorbus.motion.cycle import Part, silence, stopped, train_of
-from motorbus.motion.grid import Grid, Statistics
+from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.limits import Device
-from motorbus.motion.place import CATCH_UP, Place
-from motorbus.motion.readings import LoopState
+from motorbus.motion.loop.braking import Works, braked, latest, refusals
+from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
+from motorbus.motion.loop.grid import Grid, Statistics
+from motorbus.motion.loop.place import CATCH_UP, Place
+from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.several import named
 
 PATIENCE: Final = 5

@@ -16,18 +16,18 @@ from motorbus.core.operation import Operation, outcome
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.journey import Journey
-from motorbus.motion.moved import Arrived, Moved
-from motorbus.motion.plan import Fact, Planned
+from motorbus.motion.moving.journey import Journey
+from motorbus.motion.moving.moved import Arrived, Moved
+from motorbus.motion.moving.plan import Fact, Planned
+from motorbus.motion.moving.stream import USUAL
 from motorbus.motion.profile import Kind, Limiting, Limits, Move, Profile, Synchronised, synchronised
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.profile.together import KINDS
-from motorbus.motion.stream import USUAL
 from motorbus.motion.trajectory import Course, Trajectory, sampled
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
     from motorbus.motion.body import Body
+    from motorbus.motion.capabilities import AxisVerbs
 
 
 # -- what a movement shall be ------------------------------------------------------------------------------------------

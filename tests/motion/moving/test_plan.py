@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from motorbus.motion.moved import Arrived, Track
-from motorbus.motion.moving import Along, PointToPoint
-from motorbus.motion.plan import Fact, Gone, Plan
+from motorbus.motion.moving.moved import Arrived, Track
+from motorbus.motion.moving.plan import Fact, Gone, Plan
+from motorbus.motion.moving.verbs import Along, PointToPoint
 from motorbus.motion.trajectory import Trajectory
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.motion.moved import Arrived, Cycles, Moved, Track
+from motorbus.motion.moving.moved import Arrived, Cycles, Moved, Track
 from motorbus.motion.profile import Limiting
 
 TRACK = Track((0.0, 0.1, 0.2, 0.3, 0.4), (0.0, 0.1, 0.2, 0.2, 0.2), (0.0, 0.06, 0.16, 0.2, 0.2))

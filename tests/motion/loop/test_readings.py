@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.motion.readings import LoopState
-from tests.motion.test_rounds import Slow, cycles, looping
+from motorbus.motion.loop.readings import LoopState
+from tests.motion.loop.test_rounds import Slow, cycles, looping
 
 
 def test_it_says_what_it_is() -> None:

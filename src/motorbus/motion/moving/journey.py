@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.operation import Operation, Together
 from motorbus.errors import Interrupted, MotorbusError, RequestError
-from motorbus.motion import parts
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.command import Command
 from motorbus.motion.meeting import Beat, Meeting, Seat
-from motorbus.motion.moved import Moved
-from motorbus.motion.plan import Fact, Gone, Plan, Planned
+from motorbus.motion.moving import parts
+from motorbus.motion.moving.moved import Moved
+from motorbus.motion.moving.plan import Fact, Gone, Plan, Planned
+from motorbus.motion.moving.stream import Fate
 from motorbus.motion.profile import Limiting
 from motorbus.motion.profile.shapes import NOTHING
-from motorbus.motion.stream import Fate
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 ROUNDING: Final = 1e-6
 """Of a duration; less is no difference."""

@@ -11,8 +11,8 @@ import pytest
 from motorbus.bus.turns import Turns
 from motorbus.core.operation import CanFrame, Effect, Exchange, Rank
 from motorbus.errors import Interrupted, NoReply
-from motorbus.motion.cycle import Part, silence, stopped, train_of
-from motorbus.motion.place import Place
+from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
+from motorbus.motion.loop.place import Place
 from motorbus.session.robot import Robot
 from tests.motion.machines import Heard, machine
 

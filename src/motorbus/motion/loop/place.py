@@ -17,7 +17,7 @@ from motorbus.motion.machine.model import ROUNDING, VELOCITY
 from motorbus.motion.profile import Follower, Limits, follower
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 CATCH_UP: Final = 3
 """Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal

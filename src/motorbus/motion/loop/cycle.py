@@ -22,9 +22,9 @@ from motorbus.errors import (
     OutcomeUnknown,
     WireError,
 )
-from motorbus.motion.axis import AxisVerbs, cap
+from motorbus.motion.capabilities import AxisVerbs, cap
 from motorbus.motion.command import Command
-from motorbus.motion.place import Place
+from motorbus.motion.loop.place import Place
 
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
 """Ways in which a reading, or the acknowledgement of a goal, is lost and a loop goes on."""

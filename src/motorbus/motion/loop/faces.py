@@ -29,9 +29,9 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
-from motorbus.motion.grid import Statistics
-from motorbus.motion.readings import LoopState
-from motorbus.motion.rounds import Rounds
+from motorbus.motion.loop.grid import Statistics
+from motorbus.motion.loop.readings import LoopState
+from motorbus.motion.loop.rounds import Rounds
 
 P = ParamSpec("P")
 T = TypeVar("T")

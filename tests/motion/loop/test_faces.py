@@ -10,8 +10,8 @@ import pytest
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.abreast import Abreast, Led
 from motorbus.motion.body import Body
-from motorbus.motion.loop import AsyncLoop, Errand, Loop, LoopFace, looped
-from motorbus.motion.readings import LoopState
+from motorbus.motion.loop.faces import AsyncLoop, Errand, Loop, LoopFace, looped
+from motorbus.motion.loop.readings import LoopState
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import Heard, machine
 

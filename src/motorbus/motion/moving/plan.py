@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from motorbus.motion import limits
-from motorbus.motion.moved import Arrived, Cycles, Track
+from motorbus.motion.moving.moved import Arrived, Cycles, Track
 from motorbus.motion.profile import Limiting, Limits
 from motorbus.motion.trajectory import Course
 

@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any, Final
 from motorbus.core.family import Positions, Turned
 from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards
 from motorbus.errors import MotorbusError, NoReply, RequestError
-from motorbus.motion import axis as single
+from motorbus.motion import capabilities as single
 from motorbus.motion import limits
 from motorbus.motion.command import Command
-from motorbus.motion.forgiving import forgiven
-from motorbus.motion.moved import STILL, Arrived, Track
-from motorbus.motion.plan import Fact, Gone, Planned
+from motorbus.motion.moving.forgiving import forgiven
+from motorbus.motion.moving.moved import STILL, Arrived, Track
+from motorbus.motion.moving.plan import Fact, Gone, Planned
+from motorbus.motion.moving.stream import SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 from motorbus.motion.reckoning import Movement, cut_short
 from motorbus.motion.several import named, names
-from motorbus.motion.stream import SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
-    from motorbus.motion.journey import Journey
+    from motorbus.motion.capabilities import AxisVerbs
     from motorbus.motion.meeting import Seat
+    from motorbus.motion.moving.journey import Journey
 
 LOOK: Final = 0.02
 """s between two looks at whether the others have failed, while an axis moves by its own profile."""

@@ -7,7 +7,7 @@ import pytest
 from motorbus.core.family import Positions
 from motorbus.errors import Interrupted
 from motorbus.motion.command import Command
-from motorbus.motion.forgiving import LOST, forgiven
+from motorbus.motion.moving.forgiving import LOST, forgiven
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
 

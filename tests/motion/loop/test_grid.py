@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.motion.grid import Grid, Statistics, Took
+from motorbus.motion.loop.grid import Grid, Statistics, Took
 
 
 def grid(rate: float = 100.0, now: float = 5.0) -> tuple[Grid, Statistics]:

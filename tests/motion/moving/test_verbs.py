@@ -11,7 +11,7 @@ import pytest
 
 from motorbus.core.operation import Progress
 from motorbus.errors import LimitExceeded, NotHomed, RequestError
-from motorbus.motion.moving import Crisp
+from motorbus.motion.moving.verbs import Crisp
 from motorbus.motion.profile import Limiting, Limits, Move, synchronised
 from motorbus.motion.trajectory import Trajectory, Waypoint, interpolated
 from motorbus.session.robot import Robot

@@ -27,13 +27,13 @@ from motorbus.errors import (
     Stalled,
 )
 from motorbus.motion.command import Command
-from motorbus.motion.forgiving import forgiven
-from motorbus.motion.moved import STILL, Cycles, Track
+from motorbus.motion.moving.forgiving import forgiven
+from motorbus.motion.moving.moved import STILL, Cycles, Track
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.trajectory import Course
 
 if TYPE_CHECKING:
-    from motorbus.motion.axis import AxisVerbs
+    from motorbus.motion.capabilities import AxisVerbs
 
 USUAL: Final = 100.0
 """Hz at which axes are led where the wire carries twice as much."""

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.errors import LimitExceeded
-from motorbus.motion.place import CATCH_UP, Place
+from motorbus.motion.loop.place import CATCH_UP, Place
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
 

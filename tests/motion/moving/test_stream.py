@@ -12,7 +12,7 @@ from motorbus.core.operation import Data, Progress
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
-from motorbus.motion.stream import SETTLE, Fate, Grid, grains, rate_for
+from motorbus.motion.moving.stream import SETTLE, Fate, Grid, grains, rate_for
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import machine
 

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 from motorbus.core.operation import Exchange
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
 from motorbus.motion.abreast import Abreast, settled
-from motorbus.motion.cycle import Part
-from motorbus.motion.grid import Grid
+from motorbus.motion.loop.cycle import Part
+from motorbus.motion.loop.grid import Grid
 
 Works: TypeAlias = "Generator[Abreast[Any], Any, Any]"
 """Pieces of work on several buses, one after the other; each is sent what came of it."""

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from motorbus.errors import LimitExceeded, LinkError
-from motorbus.motion.loop import Loop
+from motorbus.motion.loop.faces import Loop
 from motorbus.session.robot import Robot
+from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.motion.machines import Cut, Heard, machine
-from tests.motion.test_rounds import RATE, cycles, looping
 
 QUICK = radians(90)
 
