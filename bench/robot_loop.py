@@ -24,6 +24,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
+from bench.bare_loop import bare, told
 from bench.places import BUILD, ROOT, surroundings
 from bench.responder import build, responder
 from bench.workloads import COUNTS, IDS
@@ -288,6 +289,12 @@ def main() -> int:
     found = samples(given.seconds, lambda text: print(text, file=sys.stderr), given.times)
     for row in (COLUMNS, *rows(found)):
         print("  ".join(row))
+    wire = found[0].wire
+    with urgent():
+        system = [bare(rate, min(given.seconds, FLAT_OUT)) for rate in (0.0, SHARE * wire)]
+    print("\n".join(told(one, wire) for one in system))
+    share = min(one.achieved for one in found if one.asked >= wire) / system[0].achieved
+    print(f"Of what bare system calls achieve flat out: {share:.1%}.")
     print(f"{verdict(found)}\nLoad of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores.")
     return 0
 
