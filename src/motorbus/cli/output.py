@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from motorbus.cli.exits import NeedsConsent, exit_code
@@ -74,8 +74,9 @@ class Output:
         print("\n".join(line if shown.is_terminal else line.rstrip() for line in lines), flush=True)
 
     def note(self, text: str) -> None:
-        """Something worth knowing that is not the result."""
-        print(text, file=sys.stderr, flush=True)
+        """Something worth knowing that is not the result. Nothing else ends because nobody reads that any more."""
+        with suppress(OSError):
+            print(text, file=sys.stderr, flush=True)
 
     def console(self) -> Console:
         return console(sys.stdout)

@@ -15,6 +15,7 @@ from motorbus.core.family import State
 from motorbus.core.operation import Operation, Runnable
 from motorbus.core.verbs import verb
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
 from motorbus.motion.several import named, names
@@ -301,11 +302,22 @@ def temperature(axis: AxisVerbs) -> Operation[float]:
 def enable_torque(axis: AxisVerbs) -> Operation[None]:
     """Torque on without a jump; the cap of the machine file, where there is one, is set before.
 
-    Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits.
+    Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits; Interrupted
+    when somebody lets it go, stops it or moves it meanwhile: then no torque comes behind that.
     """
     axis.orders += 1
-    yield from cap(axis)
+    command = Command([axis])
     axis.engaged = True
+    try:
+        yield from command.watched(_given_torque(axis))
+    except MotorbusError as error:
+        if (lost := command.lost()) is not None:
+            raise lost from error
+        raise
+
+
+def _given_torque(axis: AxisVerbs) -> Operation[None]:
+    yield from cap(axis)
     yield from axis.able["enable_torque"](axis.device)
 
 
@@ -328,9 +340,10 @@ def disable_torque(axis: AxisVerbs) -> Operation[None]:
 
 def stop(axis: AxisVerbs) -> Operation[Enum]:
     """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
-    axis.orders += 1
+    axis.orders = order = axis.orders + 1
     promise: Enum = yield from axis.able["stop"](axis.device)
-    axis.stopped()
+    if axis.orders == order:  # else it is the next movement already, which this was not said to
+        axis.stopped()
     return promise
 
 

@@ -1,8 +1,9 @@
 """What a run comes to: the judge of its acknowledgement, of its notices, of stops and of time.
 
 A notice is two bytes without a checksum or a name. It counts as the end of this run when it came after the
-acknowledgement, not sooner than a project of these numbers can be through in any reading, and while nobody was saying
-stop. Nothing else is ever `completed`. What this cannot tell apart is said in `running.run`.
+acknowledgement, not sooner than a project of these numbers can be through in any reading, and when nobody had said stop
+since: a stop that was not acknowledged may have been heard, and its own notice may come late. Nothing else is ever
+`completed`. What this cannot tell apart is said in `running.run`.
 """
 
 from __future__ import annotations
@@ -66,6 +67,7 @@ class Wait:
         self.ran: Ran | None = None
         self._memory = memory
         self._stops = memory.stops
+        self._wanted = memory.wanted
         self._timeout = timeout
         self._least = earliest(plan.project) * CLOCK
         self._lost: MotorbusError | None = None
@@ -89,7 +91,8 @@ class Wait:
     def heard(self, notice: Notice) -> bool:
         """A notice; True when whoever listens should look. One that two listeners hear counts as one."""
         if notice.kind == wire.COMPLETED:
-            self._notices.append((notice.at, self._memory.stopping > 0))
+            doubtful = self._memory.stopping > 0 or self._memory.wanted > self._wanted
+            self._notices.append((notice.at, doubtful))
             self.look(notice.at)
         return self.pending or self.ran is not None
 
@@ -130,7 +133,7 @@ class Wait:
         at, doubtful = counting[0]
         if doubtful:
             return self._said(
-                Outcome.UNKNOWN, "its notice came while a stop was said that was not acknowledged"
+                Outcome.UNKNOWN, "its notice came when a stop had been said that was not acknowledged"
             )
         since = "its acknowledgement" if self._lost is None else "it was sent; its acknowledgement was lost"
         return self._said(
