@@ -50,8 +50,8 @@ Axes of a machine file start together and arrive together, on whatever buses
 they are, within the limits of the file; += and -= go by a way from where each
 stands. A way of more than 180 degrees, or 100 mm, needs --yes. Ctrl-C stops
 them all, and so does SIGTERM from another shell; `motorbus stop` cannot while
-this command has their bus, `motorbus estop` can. --dry-run shows the plan: frames are made on the way, from what is
-read then, and cannot be shown before.
+this command has their bus, `motorbus estop` can. --dry-run shows the plan:
+frames are made on the way, from what is read then, and cannot be shown before.
 
 An axis without feedback knows its place only while one command lasts: say
 where it stands (--assume lift=0mm) or let it look (--home).

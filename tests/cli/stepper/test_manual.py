@@ -100,7 +100,7 @@ def test_a_stop_is_one_frame(name: str, run: Run, line: Line) -> None:
         ("set-project-loop BUS --project-loop 256", "0 to 255"),
         ("set-stop-mode BUS --stop-mode gently", "is not a whole number"),
         ("set-step-delay BUS --step 1 --delay 5 --project 5", "5"),
-        ("set-step-delay BUS --step 1 --delay 5 --colour red", "unknown option 'colour'"),
+        ("set-step-delay BUS --step 1 --delay 5 --colour red", "--colour: no such flag"),
         ("set-step-delay feetech:sim --step 1 --delay 5", "is no stepper bus"),
         ("set-step-delay BUS#2 --step 1 --delay 5", "is not the id of a stepper controller"),
     ],

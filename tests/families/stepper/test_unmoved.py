@@ -76,7 +76,7 @@ def test_on_faulty_lines_it_is_never_wrong(verb: str, fault: str, every: int) ->
         lambda device: device.move_by(0.0, velocity=tau),
         lambda device: device.jog(tau / 60 * 1.5, 1.0),
         lambda device: device.home(velocity=tau / 60 * 1.5),
-        lambda device: kept(device, Partner(), angle=0.0),
+        lambda device: kept(device, Partner(), velocity=tau / 60 / 2),
         lambda device: device.run(2),
     ],
 )
