@@ -326,9 +326,11 @@ def _followed(node: Node, course: _Course, wait: Wait, levels: Levels) -> Operat
 
 
 def _patience(wait: Wait, levels: Levels, now: float) -> float:
-    """How long to listen until the next look."""
-    busy = wait.pending or bool(levels.believed)
-    return max(0.0, min(SOON if busy else TICK, wait.deadline - now))
+    """How long to listen until the next look; behind its deadline too, where it waits for a stop that is being said."""
+    left = wait.deadline - now
+    busy = wait.pending or bool(levels.believed) or left <= 0
+    pause = SOON if busy else TICK
+    return min(pause, left) if left > 0 else pause
 
 
 def _reading(node: Node, wait: Wait, levels: Levels, twin: Twin | None) -> Operation[None]:
