@@ -300,14 +300,12 @@ def _unheard(node: Node, told: MotorbusError) -> OutcomeUnknown:
 def given_back(node: Node, loan: Loan) -> Operation[None]:
     """Bring project 1 back to what it was, see that it is, and close the journal. May be repeated at any point.
 
-    Where the motion was cut the motor has its time to slow down before. Raises what the last of several tries has
-    raised.
+    A motor that was cut off slows down before. Raises what the last of several tries has raised.
     """
     if loan.cut:
         rest = slowing(replace(loan.wanted, total_steps=1))
-        if rest >= LONG:
-            with suppress(Exception):  # whatever the listener says to that, the project is given back
-                yield from Report(Slowing(rest))
+        with suppress(Exception):  # whatever the listener says to that, the project is given back
+            yield from Report(Slowing(rest)) if rest >= LONG else ()
         yield from Pause(rest)
         loan.cut = False
     if not loan.restored:
