@@ -53,16 +53,34 @@ def dressed(
     return call
 
 
-class verb(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
-    """Makes a method of a driver function: blocking on a `Blocking` device, awaitable on an `Awaiting` one."""
+class Said(Generic[P, T]):
+    """A function in a list of verbs, and the method that it becomes; what carries it out, its kinds say."""
 
-    def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+
+    def method(self, owner: Any, carry_out: Callable[[Any], Any]) -> Any:
+        """The method of this object: what the function says of it is carried out when it is called."""
+        function = self.function
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            return carry_out(function(owner, *args, **kwargs))
+
+        return dressed(call, self.name, function, owner)
+
+
+class verb(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+    """Makes a method of a driver function: blocking on a `Blocking` device, awaitable on an `Awaiting` one."""
+
+    function: Callable[Concatenate[Any, P], Runnable[T]]
+
+    def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
+        super().__init__(function)
 
     @overload
     def __get__(self, device: None, owner: type) -> Self: ...
@@ -71,11 +89,4 @@ class verb(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     @overload
     def __get__(self, device: Awaiting, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
-        if device is None:
-            return self
-        function = self.function
-
-        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
-            return device.bus.run(function(device, *args, **kwargs))
-
-        return dressed(call, self.name, function, device)
+        return self if device is None else self.method(device, lambda said: device.bus.run(said))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.operation import Runnable
-from motorbus.core.verbs import dressed
+from motorbus.core.verbs import Said
 from motorbus.errors import MotorbusError
 
 P = ParamSpec("P")
@@ -52,16 +52,11 @@ class LedAsync:
     conductor: AsyncConductor
 
 
-class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class together(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Abreast`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], Abreast[T]]) -> None:
-        self.function = function
-        self.name = getattr(function, "__name__", "")
-        self.__doc__ = function.__doc__
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
+        super().__init__(function)
 
     @overload
     def __get__(self, machine: None, owner: type) -> Self: ...
@@ -70,14 +65,7 @@ class together(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verb
     @overload
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
-        if machine is None:
-            return self
-        function = self.function
-
-        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
-            return machine.conductor.run(function(machine, *args, **kwargs))
-
-        return dressed(call, self.name, function, machine)
+        return self if machine is None else self.method(machine, lambda work: machine.conductor.run(work))
 
 
 def settled(results: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from motorbus import families
 from motorbus.bus.aio import AsyncBus
@@ -33,6 +33,7 @@ logging.getLogger("motorbus").addHandler(
 )  # silent until somebody asks; here, for nothing below logs
 
 Notify = Callable[[object], None]
+AnyBus = TypeVar("AnyBus", bound=BusFace)
 
 
 def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
@@ -42,24 +43,13 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
     in the address. A guarded change that was cut off is told as a warning of the bus, see `unfinished`. Raises
     RequestError for a bad address, PortNotFound, PortBusy (naming the owner) or LinkError for the port.
     """
-    opening = prepare(address, options)
-    link = _link(opening)
+    bus = _opened(Bus, address, report, options)
     try:
-        journal = kept_for(parse_address(address), options, opening, link)
-        bus = Bus(
-            link,
-            opening.family,
-            admit=Gate(),
-            report=report,
-            journal=journal,
-            stop_socket=_stop_socket(opening, link),
-        )
-        _warn(bus, journal)
         test = _echo_test(bus)
         if test is not None:
             _settled(bus, lambda: bus.run(test))
     except BaseException:
-        link.close()
+        bus.link.close()
         raise
     return bus
 
@@ -83,11 +73,18 @@ class OpenAsyncBus(AsyncBus):
 
 def open_async(address: str, *, report: Notify | None = None, **options: object) -> AsyncBus:
     """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
+    return _opened(OpenAsyncBus, address, report, options)
+
+
+def _opened(
+    kind: Callable[..., AnyBus], address: str, report: Notify | None, options: dict[str, object]
+) -> AnyBus:
+    """A bus of this kind on its open link, with its gate and its journal; nothing is sent."""
     opening = prepare(address, options)
     link = _link(opening)
     try:
         journal = kept_for(parse_address(address), options, opening, link)
-        bus = OpenAsyncBus(
+        bus = kind(
             link,
             opening.family,
             admit=Gate(),

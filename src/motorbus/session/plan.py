@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from os import PathLike
 from typing import NamedTuple, Self
 
@@ -12,10 +12,10 @@ from motorbus.core.entry import shown
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in
-from motorbus.motion.machine import Machine
+from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
 from motorbus.motion.several import named
-from motorbus.session.buses import open, open_async
+from motorbus.session.buses import AnyBus, open, open_async
 from motorbus.session.opening import lock_name, prepare
 
 
@@ -63,31 +63,22 @@ class Plan(NamedTuple):
 
     def blocking(self, buses: Mapping[str, Bus]) -> dict[str, Axis]:
         """The axes on these buses, of whose devices nothing is known yet."""
-        specs = {name: self.machine.axes[name] for name in self.axes}
         return {
-            name: Axis(
-                buses[spec.bus],
-                name,
-                spec,
-                buses[spec.bus].family.devices.blocking(buses[spec.bus], spec.node),
-                {},
-            )
-            for name, spec in specs.items()
+            name: Axis(bus, name, spec, bus.family.devices.blocking(bus, spec.node), {})
+            for name, spec, bus in self._placed(buses)
         }
 
     def awaiting(self, buses: Mapping[str, AsyncBus]) -> dict[str, AsyncAxis]:
         """The same for asyncio."""
-        specs = {name: self.machine.axes[name] for name in self.axes}
         return {
-            name: AsyncAxis(
-                buses[spec.bus],
-                name,
-                spec,
-                buses[spec.bus].family.devices.awaiting(buses[spec.bus], spec.node),
-                {},
-            )
-            for name, spec in specs.items()
+            name: AsyncAxis(bus, name, spec, bus.family.devices.awaiting(bus, spec.node), {})
+            for name, spec, bus in self._placed(buses)
         }
+
+    def _placed(self, buses: Mapping[str, AnyBus]) -> Iterator[tuple[str, AxisSpec, AnyBus]]:
+        for name in self.axes:
+            spec = self.machine.axes[name]
+            yield name, spec, buses[spec.bus]
 
 
 def loaded(path: str | PathLike[str]) -> Machine:

@@ -25,6 +25,7 @@ from collections.abc import Callable, Coroutine, Generator, Iterable, Iterator, 
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.bus.pump import Bus
+from motorbus.core.verbs import Said
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
 from motorbus.motion.body import Body
@@ -276,12 +277,11 @@ class Errand(NamedTuple, Generic[T]):
     endless: bool = False
 
 
-class looped(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Errand`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], Errand[T]]) -> None:
-        self.function = function
-        self.__doc__ = function.__doc__
+        super().__init__(function)
 
     @overload
     def __get__(self, machine: None, owner: type) -> Self: ...
@@ -293,13 +293,7 @@ class looped(Generic[P, T]):  # noqa: N801 - reads as a word in a list of verbs
         if machine is None:
             return self
         carry_out = _blocking if isinstance(machine, Led) else _awaiting
-        function = self.function
-
-        def call(*args: P.args, **kwargs: P.kwargs) -> Any:
-            return carry_out(machine, function(machine, *args, **kwargs))
-
-        call.__doc__ = self.__doc__
-        return call
+        return self.method(machine, lambda errand: carry_out(machine, errand))
 
 
 def _blocking(machine: Any, errand: Errand[T]) -> T:
