@@ -80,6 +80,7 @@ class DryBus:
     def __init__(self, bus: Bus) -> None:
         self.family = copy(bus.family)
         self.link = bus.link
+        self.turns = bus.turns
         self.frames: list[bytes] = []
         self._bus = bus
         self._gate = Gate()
