@@ -13,7 +13,8 @@
     ├── DeviceError          it answered and said no: `node`, `code`, `register`
     ├── RequestError         the caller asked for something impossible            (also ValueError)
     ├── MotionError          motion refused or ended early
-    │   ├── LimitExceeded    the goal lies outside the limits, or the limits are unknown
+    │   ├── Refused          what it would be judged by is stale or doubtful, or nobody may move now: `reason`
+    │   │   └── LimitExceeded    the goal lies outside the limits, or the limits are unknown
     │   ├── NotHomed         the reference is not known
     │   ├── Stalled          it stopped moving before it was there
     │   └── Interrupted      a stop or a cancellation came in between
@@ -26,12 +27,17 @@ likely cause and what to do. The parts are attributes too, so a program need not
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class MotorbusError(Exception):
     """Base of every error of this package. `summary` is one line; the other parts may be empty."""
 
     unmoved = False
     """True where it is certain that nothing has moved for what was asked; False: it may have, or nobody said."""
+    so_far: Any = None
+    """What there was by then of the result that was asked for, where that is of use: the trajectory that `teach` has
+    seen. None where there is nothing."""
 
     def __init__(
         self,
@@ -127,10 +133,25 @@ class MotionError(MotorbusError):
     """Motion was refused or ended early."""
 
 
-class LimitExceeded(MotionError):
-    """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent."""
+class Refused(MotionError):
+    """Motion was refused before anything was sent: `reason` is one word for programs.
+
+    "limits", "step" (too far from where it is), "stale" or "suspect" (of the position by which it would be judged),
+    "fault", "lease" or "unattended".
+    """
 
     unmoved = True
+
+    def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:
+        super().__init__(summary, **parts)  # type: ignore[arg-type]
+        self.reason = reason
+
+
+class LimitExceeded(Refused):
+    """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent."""
+
+    def __init__(self, summary: str, *, reason: str = "limits", **parts: object) -> None:
+        super().__init__(summary, reason=reason, **parts)
 
 
 class NotHomed(MotionError):

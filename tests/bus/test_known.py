@@ -29,6 +29,16 @@ def test_whoever_answered_is_known_and_at_which_rate(known: Known) -> None:
     assert len(known.frames.exchanges) == 2
 
 
+def test_what_told_a_position_is_kept_with_its_answer_whatever_is_ordered_since(known: Known) -> None:
+    telling: Exchange[Answer] = Exchange(b"", tells_position=True)
+    known.heard([1], telling, seen(1, 5.0), RATE)
+    known.heard([1], Exchange(b""), seen(1, 6.0), RATE)
+    known.order(move(1, 100), RATE)
+    assert known.seen == {1: (telling, seen(1, 5.0))}
+    assert known[1] is None
+    assert known.fresh(5.0) == {1: None}
+
+
 def test_an_answer_without_a_position_leaves_the_last_one(known: Known) -> None:
     known.hear(1, seen(1, 5.0), RATE)
     known.hear(1, None, RATE)

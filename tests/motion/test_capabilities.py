@@ -8,6 +8,7 @@ import inspect
 import pytest
 
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
+from motorbus.core.family import Quality
 from motorbus.core.operation import Operation, Pause
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
@@ -66,14 +67,38 @@ def test_what_is_told_has_the_zero_the_direction_and_the_gear_of_the_axis() -> N
         device = axis.device.position()
         assert axis.position() == pytest.approx((device - 1.570796) / -2)
         axis.enable_torque()
-        axis.device.move(device + 1.0, velocity=1.0, wait=False)
+        axis.device.move(device - 1.0, velocity=1.0, wait=False)
         axis.bus.run(_pause(0.3))
         own, seen = axis.device.telemetry(), axis.state()
-        assert own.velocity > 0.1
+        assert own.velocity < -0.1
         assert seen.velocity == pytest.approx(own.velocity / -2, rel=0.2)
         assert seen.position == pytest.approx(axis.spec.from_device(own.position), abs=0.05)
         assert seen.temperature == own.temperature
-        assert axis.velocity() < -0.05
+        assert axis.velocity() > 0.05
+
+
+def test_a_sample_says_how_far_it_can_be_trusted() -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        assert robot["a1"].state().quality is Quality.FRESH
+        sims["arm"][1].raw_position = 3000
+        jumped = robot["a1"].state()
+        assert jumped.quality is Quality.CONFIRMED
+        assert jumped.position == pytest.approx(robot["a1"].position())
+        assert robot["a1"].state().quality is Quality.FRESH
+
+
+def test_a_sample_that_nothing_confirms_is_suspect() -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        robot["a1"].state()
+        inner = robot["a1"].able["state"]
+
+        def twitching(device: object) -> object:
+            sims["arm"][1].raw_position = 5000 - sims["arm"][1].raw_position
+            return inner(device)
+
+        robot["a1"].able = {**robot["a1"].able, "state": twitching}  # type: ignore[dict-item]
+        sims["arm"][1].raw_position = 3500
+        assert robot["a1"].state().quality is Quality.SUSPECT
 
 
 def test_effort_has_the_direction_of_the_axis() -> None:

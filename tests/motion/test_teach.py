@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
-from motorbus.errors import MotionError, RequestError
+from motorbus.cli.simulated import Simulated
+from motorbus.errors import LinkLost, MotionError, MotorbusError, NoReply, RequestError
+from motorbus.motion.machine import Machine
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import machine
+from tests.motion.machines import described, machine
 from tests.motion.test_follow import move
 
 LATE = 0.0005
@@ -33,7 +36,7 @@ def test_where_it_is_guided_is_what_is_written_down() -> None:
         axis = robot["a1"]
         axis.enable_torque()
         robot.buses["arm"].run(  # type: ignore[attr-defined]  # something else moves it meanwhile
-            axis.able["move"](axis.device, axis.spec.to_device(1.0), wait=False)
+            axis.able["move"](axis.device, axis.spec.to_device(1.0), velocity=1.5, wait=False)
         )
         found = robot.teach("a1", seconds=2.0, limp=False)
         places = found.axes["a1"]
@@ -54,6 +57,53 @@ def test_a_cycle_in_which_somebody_was_silent_has_no_sample() -> None:
         found = robot.teach(until=over)
         assert len(found.times) < 41
         assert max(after - before for before, after in pairwise(found.times)) > 0.03  # where it was silent
+
+
+def test_what_was_taught_until_an_axis_fell_silent_goes_along_with_the_error() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        count = [0]
+
+        def over() -> bool:
+            count[0] += 1
+            if count[0] == 40:
+                sims["arm"][2].unplug()
+            return False
+
+        with pytest.raises(NoReply, match="a2") as raised:
+            robot.teach(until=over)
+        found = raised.value.so_far
+        assert isinstance(found, Trajectory)
+        assert found.times == pytest.approx([number / 50 for number in range(40)], abs=LATE)
+        assert set(found.axes) == {"a1", "a2"}
+
+
+def test_a_port_that_dies_takes_nothing_along_of_what_was_taught(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with Simulated("feetech", ids="1-2", link=tmp_path / "bus") as served:
+        made = Machine.parse(described({"arm": served.bus}, "1-2", "", False, {}, {}))
+        count = [0]
+
+        def over() -> bool:
+            count[0] += 1
+            if count[0] == 30:
+                served.process.kill()
+                served.process.wait()
+            return False
+
+        lost = pytest.raises(LinkLost)
+        with lost as raised, Robot.of(made) as robot:
+            robot.teach(until=over)
+        assert len(raised.value.so_far.times) in range(20, 31)  # a busy host may lose some of its own
+
+
+def test_an_error_before_there_is_a_trajectory_has_none() -> None:
+    with machine(arm="1") as (made, sims), Robot.of(made) as robot:
+        sims["arm"][1].unplug()
+        with pytest.raises(MotorbusError) as raised:
+            robot.teach(seconds=1.0)
+        assert raised.value.so_far is None
 
 
 def test_a_reading_that_is_late_stands_where_it_was_taken() -> None:
@@ -118,6 +168,24 @@ def test_it_is_awaited_on_an_async_robot() -> None:
     found = asyncio.run(main())
     assert len(found.times) == 21
     assert set(found.axes) == {"a2"}
+
+
+def test_an_async_robot_keeps_what_was_taught_too() -> None:
+    async def main() -> None:
+        with machine(arm="1") as (made, sims):
+            async with AsyncRobot.of(made) as robot:
+                heard = iter(range(20))
+
+                def over() -> bool:
+                    if next(heard, None) is None:
+                        sims["arm"][1].unplug()
+                    return False
+
+                with pytest.raises(NoReply) as raised:
+                    await robot.teach(until=over)
+                assert len(raised.value.so_far.times) == 21
+
+    asyncio.run(main())
 
 
 def test_what_was_taught_by_hand_is_what_a_hand_did() -> None:

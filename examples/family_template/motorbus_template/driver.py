@@ -8,7 +8,7 @@ these functions do. `node` holds what is known of a device and is filled by them
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final, TypeVar
 
@@ -75,7 +75,7 @@ def exchange(
     effect: Effect = Effect.NONE,
     goals: tuple[Goal, ...] = (),
     timeout: Timeout = Timeout.REPLY,
-    tells_position: bool = False,
+    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
     refusal: Refusal | None = None,
 ) -> Exchange[T]:
     """One request to one node; `take` makes a value of the four bytes of the answer.
@@ -147,13 +147,18 @@ def proof(node: Node, attempt: int = 0, timeout: Timeout = Timeout.REPLY) -> Exc
 def position(node: Node) -> Exchange[float]:
     """Present position, rad."""
     row = TABLE["present_position"]
+
+    def where(answer: Answer) -> dict[int, float]:
+        data = answer.replies[0].data
+        return {} if data[3] & 0x0F else {node.node: float(row.to_value(row.decode(data[4:])))}
+
     return exchange(
         node,
         wire.Command.READ,
         row.address,
         row.subindex or 0,
         take=lambda data: float(row.to_value(row.decode(data))),
-        tells_position=True,
+        tells_position=where,
     )
 
 

@@ -365,8 +365,7 @@ class Air:
         if flight.exchange.rank is not Rank.STOP:  # what a stop cut short may still answer
             self.trust.believe(*heard, barrier=flight.parent is not None)
         self.statistics.answered(heard, now - flight.sent_at)
-        nodes = [due.node for due in heard]
-        self.known.hear_all(nodes, answer if flight.exchange.tells_position else None, self.rate)
+        self.known.heard([due.node for due in heard], flight.exchange, answer, self.rate)
 
     def _heard_of(self, flight: Flight, now: float) -> list[Due]:
         """Whose replies count; the others are noted as missing, or as not to be believed."""

@@ -39,6 +39,7 @@ class BusFace:
     ) -> None:
         self.link = link
         self.family = family
+        self.admit = admit
         self.report = report
         self.journal = journal
         self.warnings: tuple[str, ...] = tuple(link.warnings)

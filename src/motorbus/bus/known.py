@@ -1,4 +1,5 @@
-"""Whom an emergency stop must reach, where each of them was last seen, and how often each was stopped.
+"""Whom an emergency stop must reach, where each of them was last seen, how often each was stopped, and what a stop
+waits for.
 
 A node is known once it has answered or has been ordered to move. Where it was seen counts only while that is fresh
 and nothing has set it moving since: holding a device at a place it has left would be an order to go back.
@@ -7,9 +8,10 @@ and nothing has set it moving since: holding a device at a place it has left wou
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+from motorbus.bus.ticket import Flight
 from motorbus.core.family import Family
 from motorbus.core.operation import ANY, Answer, Effect, Exchange, Rank
 
@@ -20,6 +22,7 @@ MOVING = (Effect.TORQUE, Effect.MOTION)
 class Known(dict[int, Answer | None]):
     """Nodes with their last answer that told a position.
 
+    `seen` has the last exchange that told where a node is, with its answer, also when it was ordered to move since.
     `rate` is the bit rate at which one was last heard. `frames` stop everybody known, without a position: they are
     made when a node becomes known, for the case that a stop cannot make new ones. `stopping` counts the stops that
     have left, whomever they were for.
@@ -30,8 +33,17 @@ class Known(dict[int, Answer | None]):
         self.family = family
         self.rate = rate
         self.frames = family.stop({})
+        self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
         self._stops: Counter[int | None] = Counter()  # those for everybody under None
         self.stopping = 0
+
+    def heard(self, nodes: Sequence[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
+        """These nodes have answered this exchange, and can be believed."""
+        if not exchange.tells_position:
+            self.hear_all(nodes, None, rate)
+            return
+        self.seen.update(dict.fromkeys(nodes, (exchange, answer)))
+        self.hear_all(nodes, answer, rate)
 
     def hear(self, node: int, position: Answer | None, rate: int) -> None:
         """This node has answered, or has been ordered to move (None)."""
@@ -73,6 +85,14 @@ class Known(dict[int, Answer | None]):
     def stops(self, node: int) -> int:
         """How many stops have left for this node, those for everybody included."""
         return self._stops.get(node, 0) + self._stops.get(None, 0)
+
+
+def rest_of(flight: Flight, family: Family, rate: int, now: float) -> float:
+    """s that a stop waits for what is on the line: a reply, or the rest of a request where both ways are open."""
+    if not family.link.both_ways:
+        return family.air_time(flight.exchange, rate)
+    request: Exchange[Answer] = Exchange(flight.exchange.request)
+    return max(0.0, flight.sent_at + family.air_time(request, rate) - now)
 
 
 def named(exchange: Exchange[Any]) -> set[int]:

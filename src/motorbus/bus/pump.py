@@ -30,7 +30,9 @@ class Bus(BusFace):
 
         Raises whatever the operation raises; KeyboardInterrupt after the operation has cleaned up.
         """
-        if isinstance(operation, Exchange):
+        if isinstance(operation, Exchange) and not (
+            operation.effect and self.turns.look and self.turns.look(operation)
+        ):
             return self._exchange(operation)
         relay = self.relay
         run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=relay.wake)

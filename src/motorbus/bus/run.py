@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from motorbus.bus import verdict
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
-from motorbus.bus.turns import Turns
+from motorbus.bus.turns import GATED, Turns
 from motorbus.core.operation import (
     Alone,
     Exchange,
@@ -26,6 +26,7 @@ from motorbus.core.operation import (
     Step,
     Together,
     Tune,
+    outcome,
 )
 from motorbus.errors import RequestError
 
@@ -33,6 +34,7 @@ T = TypeVar("T")
 
 CLEAN_UP = 2.0  # s for the clean-up steps of an interrupted operation
 HURRY = 0.25  # s when it is interrupted once more
+LOOKS = 2  # the second one where the first was doubtful
 LONG = 0.5  # s; a pause of a clean-up from here on is no polling: something must come to rest, and it gets its time
 PATIENCE = 30.0  # s that such pauses may add at most
 
@@ -49,15 +51,19 @@ class Branch:
         "error",
         "finished",
         "generator",
+        "looked",
         "owner",
         "started",
         "ticket",
         "value",
     )
 
-    def __init__(self, operation: Runnable[Any], parent: Branch | None, alone: bool = False) -> None:
+    def __init__(
+        self, operation: Runnable[Any], parent: Branch | None, alone: bool = False, looked: bool = False
+    ) -> None:
         self.generator: Operation[Any] = iter(operation) if isinstance(operation, Exchange) else operation
         self.alone = alone
+        self.looked = looked
         self.claimed = False
         self.owner: object = parent.owner if parent is not None and parent.owner is not None else None
         if alone and self.owner is None:
@@ -158,8 +164,15 @@ class Run(Generic[T]):
             self._await(child, Claim(child.owner, self.wake))
         elif isinstance(wish, Report):
             self._notify(branch, wish.event)
+        elif isinstance(wish, Exchange) and self._must_look(branch, wish):
+            branch.children = [Branch(_looked(self.turns, wish), branch, looked=True)]
         else:
             self._await(branch, self._ticket(branch.owner, wish))
+
+    def _must_look(self, branch: Branch, wish: Exchange[Any]) -> bool:
+        """Whether something must be asked before this order can be judged."""
+        look = self.turns.look
+        return look is not None and not branch.looked and wish.effect in GATED and bool(look(wish))
 
     def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune) -> Ticket:
         if isinstance(wish, Exchange):
@@ -217,7 +230,7 @@ class Run(Generic[T]):
                     said.add(str(other))
                     errors[0].add_note(f"also: {str(other) or type(other).__name__}")
             self._step(branch, error=errors[0])
-        elif len(children) == 1 and children[0].alone:
+        elif len(children) == 1 and (children[0].alone or children[0].looked):
             self._step(branch, children[0].value)
         else:
             self._step(branch, [child.value for child in children])
@@ -278,6 +291,14 @@ class Run(Generic[T]):
             raise self.root.error
         value: T = self.root.value
         return value
+
+
+def _looked(turns: Turns, wish: Exchange[T]) -> Operation[T]:
+    """Ask what must be known before this order can be judged, once more where the answer is doubtful, then give it."""
+    for _ in range(LOOKS):
+        for question in turns.look(wish) if turns.look is not None else ():
+            yield from outcome(question)
+    return (yield from wish)
 
 
 def _note(interruption: BaseException, error: BaseException | None) -> None:

@@ -12,18 +12,18 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
 from threading import RLock
 from typing import Any
 
 from motorbus.bus import verdict
 from motorbus.bus.air import Air
-from motorbus.bus.known import withdraws
+from motorbus.bus.known import rest_of, withdraws
 from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
-from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Timeout
+from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Runnable, Timeout
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 RETRIES = 2  # of a repeatable exchange, after the first try
@@ -31,6 +31,7 @@ GATED = (Effect.MOTION, Effect.TORQUE)
 KEPT = (Effect.PERSISTENT, Effect.IDENTITY)  # a stop lets these follow it, so that locks get closed
 
 Admit = Callable[[Exchange[Any]], None]
+Look = Callable[[Exchange[Any]], "Sequence[Runnable[Any]]"]  # what must be asked before this may leave
 
 
 class Turns(Air):
@@ -56,14 +57,13 @@ class Turns(Air):
         self.admit = admit
         self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
         self.lock = RLock()
-        self.latched = False
-        self.stopping = False
+        self.look: Look | None = None
+        self.latched = self.stopping = False
         self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
         self._timers: list[Timer | Listener] = []
         self._claims: deque[Claim] = deque()
         self._holder: object = None
-        self._held = 0
-        self._courtesy = 0  # exchanges that waited while somebody was alone; they go before the next claim
+        self._held = self._courtesy = 0  # courtesy: who waited for one alone goes before the next claim
         self._look_at = inf
 
     # -- what is wanted -------------------------------------------------------------------------------------
@@ -367,8 +367,8 @@ class Turns(Air):
                     queue.remove(ticket)
                     self._settle(ticket, error=verdict.latched())
         for flight in self._flying.values():
-            rest = self.family.air_time(flight.exchange, self.rate) + self.latency
-            flight.deadline = min(flight.deadline, now + rest)
+            rest = rest_of(flight, self.family, self.rate, now)
+            flight.deadline = min(flight.deadline, now + rest + self.latency)
             flight.abandoned = True
             self._settle(flight, error=verdict.latched())
         for idle in (*self._timers, *(one for one in self._claims if one.owner is not self._holder)):

@@ -73,6 +73,7 @@ CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.DeviceError: Exit.DEVICE_REFUSED,
     errors.RequestError: Exit.USAGE,
     errors.MotionError: Exit.FAILURE,
+    errors.Refused: Exit.UNSAFE,
     errors.LimitExceeded: Exit.UNSAFE,
     errors.NotHomed: Exit.UNSAFE,
     errors.Stalled: Exit.FAILURE,

@@ -39,6 +39,7 @@ class LinkNeeds(NamedTuple):
     `settings`  of a bus, simulated or not: what `Family.configured` takes
     `window`    how many lanes may be in flight at once
     `only`      the id of the only device that a line of this family can have; None: there may be many
+    `both_ways` a device hears while it speaks: a stop waits for no reply
     """
 
     kind: str
@@ -48,6 +49,7 @@ class LinkNeeds(NamedTuple):
     settings: tuple[Option, ...] = ()
     window: int = 1
     only: int | None = None
+    both_ways: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ Each step is iterable so that `value = yield from step` has a type; the bare `yi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from enum import Enum, IntEnum
 from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -89,8 +89,6 @@ class Any_(Enum):  # noqa: N801 - typing.Any is taken
 
 
 ANY: Final = Any_.ANY
-
-
 EVERY_LANE: Final = -1
 """The lane of an exchange that addresses everyone on a bus where each node has a lane of its own; its replies are
 `ANY`: it takes each that nobody else awaits, on whatever lane it comes."""
@@ -99,8 +97,9 @@ EVERY_LANE: Final = -1
 class Goal(NamedTuple):
     """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
 
-    `quantity` is position (rad), velocity (rad/s), load (fraction), current (A) or relative (rad). A limit that is
-    not known is None, and the gate refuses what it cannot judge.
+    `quantity` is position (rad) or relative (rad); velocity (rad/s), load (fraction) or current (A), which are obeyed
+    until something else is ordered; or what only bounds a movement: speed (rad/s), cap (A), time (a share of the
+    longest). A limit that is not known is None, and the gate refuses what it cannot judge.
     """
 
     node: int
@@ -172,7 +171,8 @@ class Exchange(Generic[T_co]):
     `goals`       what it orders, per node, for the gate
     `timeout`     how long the device may think
     `repeatable`  sending it twice does no more than sending it once
-    `tells_position`  the replies begin with the present position, so stop can hold it
+    `tells_position`  the replies begin with the present position, so stop can hold it. As a function it says where that
+                  is (rad, by node; none for whom nobody can tell), so the gate can judge by it
     `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
                   must not, None when it may. It can ask how many stops have left for a node by now. So an order that
                   was made under other settings, or before a stop, does not leave the queue
@@ -207,7 +207,7 @@ class Exchange(Generic[T_co]):
         goals: tuple[Goal, ...] = (),
         timeout: Timeout = Timeout.REPLY,
         repeatable: bool = False,
-        tells_position: bool = False,
+        tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
         refusal: Refusal | None = None,
         other: Callable[[], Exchange[T_co]] | None = None,
     ) -> None:

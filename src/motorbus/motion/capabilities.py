@@ -11,13 +11,14 @@ from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
-from motorbus.core.family import State
+from motorbus.core.family import Quality, State
 from motorbus.core.operation import Operation, Runnable
 from motorbus.core.verbs import verb
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
+from motorbus.motion.safety.track import Track
 from motorbus.motion.several import named, names
 
 if TYPE_CHECKING:
@@ -94,7 +95,8 @@ class AxisVerbs:
     is true once it was given torque or moved from here, until it is let go: then its exit policy counts. `under_way` is
     true from the beginning of a movement until that has come to its end. `reckoning` is there where the device does not
     tell where it is. `orders` counts what it was told from here, to move, to hold, to stop or to let go: by that
-    whoever leads it sees whether somebody else has told it something since.
+    whoever leads it sees whether somebody else has told it something since. `track` judges its samples (rad of the
+    device).
     """
 
     def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: Able) -> None:
@@ -107,6 +109,7 @@ class AxisVerbs:
         self.under_way = False
         self.orders = 0
         self._movement: Movement | None = None
+        self.track = Track()
         self.recognised(able)
 
     def recognised(self, able: Able, model: str = "") -> None:
@@ -250,16 +253,29 @@ def _is_moving(name: str) -> RequestError:
 
 
 def state(axis: AxisVerbs) -> Operation[State]:
-    """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C."""
-    found: State = yield from axis.able["state"](axis.device)
+    """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C.
+
+    One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that.
+    """
+    found, quality = yield from _judged(axis)
+    if quality is Quality.SUSPECT:
+        found, quality = yield from _judged(axis)
     spec = axis.spec
     return replace(
         found,
+        quality=quality,
         position=None if found.position is None else spec.from_device(found.position),
         velocity=None if found.velocity is None else spec.rate_from_device(found.velocity),
         load=None if found.load is None else found.load * spec.sign,
         current=None if found.current is None else found.current * spec.sign,
     )
+
+
+def _judged(axis: AxisVerbs) -> Operation[tuple[State, Quality]]:
+    found: State = yield from axis.able["state"](axis.device)
+    if found.position is None:
+        return found, found.quality
+    return found, axis.track.take(found.position, found.at).quality
 
 
 def position(axis: AxisVerbs) -> Operation[float]:

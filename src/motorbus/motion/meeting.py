@@ -16,8 +16,8 @@ T = TypeVar("T")
 
 LOOK: Final = 0.002
 """s between two looks at whether all have come."""
-NOTICE: Final = 0.01
-"""s from the moment the last one is ready to the earliest start: time for the others to look."""
+NOTICE: Final = 0.02
+"""s from the moment the last one is ready to the earliest start: time for the others to look, also at their axes."""
 
 
 class Meeting(Generic[T]):
@@ -95,11 +95,13 @@ class Seat:
         offered = yield from self._beat.fitted.meet(self._party, fitted(longest))
         return max(longest, *offered.values())
 
-    def start(self, lead: float) -> Operation[float]:
-        """See `core.family.Timing`."""
+    def start(self, lead: float, meanwhile: Operation[object] | None = None) -> Operation[float]:
+        """See `core.family.Timing`. Once all are ready there is `NOTICE` left; `meanwhile` is done in that time."""
         now = (yield from Pause(0)) - self._origin
         ready = yield from self._beat.ready.meet(self._party, now + lead)
         moment = max(ready.values()) + NOTICE + self._origin
+        if meanwhile is not None:
+            yield from meanwhile
         yield from Pause(max(0.0, moment - lead - (yield from Pause(0))))
         return moment
 

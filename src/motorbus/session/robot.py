@@ -35,12 +35,14 @@ from motorbus.motion.loop.faces import awaiting_loop, blocking_loop, looped
 from motorbus.motion.machine import NAME, Machine
 from motorbus.motion.moving import verbs as moving
 from motorbus.motion.recognition import recognise
+from motorbus.motion.safety.fence import fence
 from motorbus.motion.teach import teach
 from motorbus.session.buses import LOG
 from motorbus.session.plan import Plan, loaded
 from motorbus.session.stopping import estop, reset
 
 Notify = Callable[[object], None]
+Left = Callable[[Leaving, BaseException | None], None]
 Names = str | Iterable[str] | None
 
 NOT_OPEN: Final = "not open: use `async with`"
@@ -65,6 +67,9 @@ class RobotVerbs(Body):
     teach = looped(teach)
     budget = together(budget)
 
+    when_left: Left | None = None
+    """Called once each axis was left as the file says and while the ports are still open: with what became of that, and
+    with what ended the machine, None where nothing did. To tell how things stand; it should raise nothing."""
     _said: tuple[str, ...] = ()
     _shut = ""
 
@@ -110,7 +115,15 @@ class RobotVerbs(Body):
         reset(self)
 
     def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
-        """Say what leaving did not achieve: as an error, or as a note of what is being raised already."""
+        """Say what leaving did not achieve, and let whoever wants to know look at what came of it."""
+        try:
+            self._told(leaving, others)
+        finally:
+            if self.when_left is not None:
+                self.when_left(leaving, others)
+
+    def _told(self, leaving: Leaving, others: BaseException | None) -> None:
+        """As an error, or as a note of what is being raised already."""
         self._said = tuple(leaving.said)
         for text in leaving.said:
             LOG.warning("%s", text)
@@ -161,6 +174,7 @@ class Robot(RobotVerbs, Led):
             buses = {name: stack.enter_context(plan.open(name, report)) for name in plan.buses}
             robot = cls(machine, buses, plan.blocking(buses))
             robot.conductor.run(recognise(robot))
+            fence(robot)
             robot._exits = stack.pop_all()
         return robot
 
@@ -262,6 +276,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
             body = Body(self._plan.machine, buses, self._plan.awaiting(buses))
             conductor = LoopConductor(buses, body.origins)
             await conductor.run(recognise(body))
+            fence(body)
             Body.__init__(self, body.machine, buses, body.axes, body.origins)
             self.conductor = conductor
             self._exits = stack.pop_all()

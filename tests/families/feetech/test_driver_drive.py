@@ -128,7 +128,8 @@ def sample(raw: int, moving: int = 1) -> Line:
 def test_a_step_is_one_packet_that_is_never_repeated() -> None:
     wish = step(Node(3), -1000 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False)
     _, exchange = watch(wish, prepares(**STEPS), writes(3, 41, 2, 0xE8, 0x83, 0, 0, 0xF4, 1)).exchanges
-    (goal,) = exchange.goals
+    goal, speed = exchange.goals
+    assert speed.quantity == "speed"
     assert goal.quantity == "relative"
     assert goal.value == pytest.approx(-1000 * COUNT)
     assert not exchange.repeatable

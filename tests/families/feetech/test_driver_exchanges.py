@@ -44,7 +44,7 @@ def test_a_read_is_owed_its_exact_length_and_may_be_repeated() -> None:
     ("address", "count", "tells"), [(56, 2, True), (56, 15, True), (56, 1, False), (58, 2, False)]
 )
 def test_reads_that_begin_with_the_position_say_so(address: int, count: int, tells: bool) -> None:
-    assert read_block(Node(3), address, count, bytes).tells_position is tells
+    assert bool(read_block(Node(3), address, count, bytes).tells_position) is tells
 
 
 def test_alarm_bits_travel_beside_the_value_and_never_raise() -> None:

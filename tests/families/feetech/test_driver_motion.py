@@ -123,13 +123,15 @@ def test_a_move_is_one_packet() -> None:
     wish = move(prepared(), 2048 * COUNT, velocity=1000 * COUNT, acceleration=5000 * COUNT, wait=False)
     _, exchange = watch(wish, prepares(), goes(2048, acceleration=50, velocity=1000)).exchanges
     assert (exchange.effect, exchange.repeatable, exchange.rank) == (Effect.MOTION, True, Rank.CONTROL)
-    assert exchange.goals == (Goal(3, "position", 2048 * COUNT, 0.0, 4095 * COUNT),)
+    where, speed = exchange.goals
+    assert where == Goal(3, "position", 2048 * COUNT, 0.0, 4095 * COUNT)
+    assert speed[:3] == (3, "speed", pytest.approx(1000 * COUNT))
 
 
 def test_a_new_servo_is_asked_for_its_limits_first() -> None:
     wish = move(Node(3), 1.0, wait=False)
     played = watch(wish, prepares(at_12=0x08), goes(652))
-    assert played.exchanges[1].goals == (Goal(3, "position", 652 * COUNT, 0.0, 2303 * COUNT),)
+    assert played.exchanges[1].goals[0] == Goal(3, "position", 652 * COUNT, 0.0, 2303 * COUNT)
 
 
 def test_goals_are_sign_magnitude() -> None:
@@ -226,7 +228,8 @@ def test_a_move_of_a_little_endian_servo_is_one_packet_with_the_switch_in_it(nam
     wish = move(node, 1024 * COUNT, velocity=500 * COUNT, acceleration=200 * COUNT, wait=False)
     _, exchange, _ = watch(wish, prepares_as(name), line, IS_ON).exchanges
     assert exchange.effect is Effect.MOTION
-    assert exchange.goals == (Goal(3, "position", 1024 * COUNT, 0.0, 4095 * COUNT),)
+    assert exchange.goals[0] == Goal(3, "position", 1024 * COUNT, 0.0, 4095 * COUNT)
+    assert exchange.goals[1].quantity == "speed"
 
 
 @pytest.mark.parametrize("name", ["scs", "scs2"])
@@ -298,7 +301,7 @@ def test_goals_over_many_turns_go_as_far_as_is_published(name: str) -> None:
     node = met(name, at_11=0, at_12=0)
     node.bound = 200
     assert node.table is not None
-    (goal,) = move_block(node, node.table, -30719 * COUNT).goals
+    goal, _ = move_block(node, node.table, -30719 * COUNT).goals
     assert (goal.low, goal.high) == (-30719 * COUNT, 30719 * COUNT)
 
 

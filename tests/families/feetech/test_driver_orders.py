@@ -12,7 +12,14 @@ from motorbus.core.entry import Entry, Storage, Value
 from motorbus.core.operation import Effect, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.orders import blocks, check_names, check_values, only_block, orders_of
+from motorbus.families.feetech.driver.orders import (
+    NO_LOAD,
+    blocks,
+    check_names,
+    check_values,
+    only_block,
+    orders_of,
+)
 from motorbus.families.feetech.table import STS, TABLES
 from tests.families.feetech.driver_script import prepared
 from tests.families.feetech.maps import met
@@ -55,6 +62,15 @@ def test_in_step_mode_a_goal_is_a_way_and_not_repeatable() -> None:
     assert block.goals == (Goal(3, "relative", -652 * COUNT, -30719 * COUNT, 30719 * COUNT),)
     assert block.repeatable is False
     assert [b.repeatable for b in made({"at_33": 3}, goal_velocity=1.0)] == [True]
+
+
+def test_in_position_mode_a_velocity_bounds_and_0_is_as_fast_as_it_can() -> None:
+    (bound,) = made({}, goal_velocity=100 * COUNT)[0].goals
+    assert bound[:3] == (3, "speed", pytest.approx(100 * COUNT))
+    (fastest,) = made({}, goal_velocity=0)[0].goals
+    assert fastest[:3] == (3, "speed", pytest.approx(NO_LOAD * COUNT))
+    (still,) = made({"at_18": 0}, goal_velocity=0)[0].goals
+    assert still[:3] == (3, "speed", 0.0)
 
 
 def test_velocity_and_duty_are_goals_too() -> None:

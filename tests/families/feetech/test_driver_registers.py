@@ -154,7 +154,7 @@ def test_reg_write_hands_over_and_is_never_repeated() -> None:
     wish = reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT)
     (exchange,) = watch(wish, ORDER).exchanges
     assert (exchange.effect, exchange.repeatable) == (Effect.MOTION, False)
-    assert [goal.quantity for goal in exchange.goals] == ["position", "load", "velocity"]
+    assert [goal.quantity for goal in exchange.goals] == ["position", "time", "speed"]
     assert node.pending is not None
     assert node.pending.goals == exchange.goals
 

@@ -149,7 +149,7 @@ class Stepper:
     def link(self) -> LinkNeeds:
         from motorbus.families.stepper.simulator import OPTIONS
 
-        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY)
+        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True)
 
     def configured(self, **settings: object) -> Stepper:
         for name in settings.keys() - {"motor", "dump_order"}:

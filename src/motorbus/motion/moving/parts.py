@@ -10,7 +10,7 @@ from inspect import GEN_CLOSED, getgeneratorstate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions, Turned
-from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards
+from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import capabilities as single
 from motorbus.motion import limits
@@ -126,11 +126,15 @@ class LedPart:
         )
         yield from self._ready(train, facts)
         lead = stream.lead(self._bus)
-        streamed = yield from stream.run((yield from seat.start(lead)), lead)
+        streamed = yield from stream.run((yield from seat.start(lead, self._again(train))), lead)
         for axis in axes:
             axis.arrives()
         arrived = {axis.name: _seen(axis, facts[axis.name], planned, streamed) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
+
+    def _again(self, train: Any) -> Operation[None]:
+        """Ask where they are: others may have needed long, and no goal leaves by what was so a while ago."""
+        yield from Together([outcome(one) for one in train.positions])
 
     def _train(self) -> Operation[Any]:
         """Those who are led, with all known of them that a cycle needs."""

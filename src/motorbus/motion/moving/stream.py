@@ -249,7 +249,12 @@ class Stream:
         return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
 
     def _order(self, at: float) -> Operation[None]:
-        yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
+        try:
+            yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
+        except LimitExceeded as error:
+            if error.reason == "step" and error.node in self._axes:
+                raise self._stalled(self._axes[error.node]) from error
+            raise
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -331,10 +336,12 @@ class Stream:
 
     def _check_following(self, axis: AxisVerbs) -> None:
         _, goals, presents = self._tracks[axis.name]
-        if not goals or abs(goals[-1] - presents[-1]) <= self._allowed[axis.name]:
-            return
-        spec, goal, present = axis.spec, goals[-1], presents[-1]
-        raise Stalled(
+        if goals and abs(goals[-1] - presents[-1]) > self._allowed[axis.name]:
+            raise self._stalled(axis)
+
+    def _stalled(self, axis: AxisVerbs) -> Stalled:
+        spec, (goal, present) = axis.spec, (row[-1] for row in self._tracks[axis.name][1:])
+        return Stalled(
             f"{axis.name} does not follow: it is at {spec.show(present)}, and should be at {spec.show(goal)} by now",
             expected=f"within {spec.show(self._allowed[axis.name])} of where it should be",
             cause="something blocks it, the load is too heavy, or it is slower than max_velocity says",

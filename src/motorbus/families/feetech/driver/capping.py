@@ -56,5 +56,5 @@ def cap_current(node: Node, current: float) -> Operation[None]:
     row = table[node.control.current]
     raw = raw_bound(node, row, current)
     value = float(node.value(row, raw))
-    goal = Goal(node.node, "current", value, 0.0, float(node.value(row, row.high)))
+    goal = Goal(node.node, "cap", value, 0.0, float(node.value(row, row.high)))
     yield from ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))

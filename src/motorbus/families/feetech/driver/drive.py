@@ -16,7 +16,7 @@ from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
 from motorbus.families.feetech.driver.motion import ON, finite, ordered, way
 from motorbus.families.feetech.driver.node import MANY_TURNS, Node
-from motorbus.families.feetech.driver.orders import DUTY, unheeded
+from motorbus.families.feetech.driver.orders import DUTY, speed_goal, unheeded
 from motorbus.families.feetech.driver.pace import burst, ramp_of
 from motorbus.families.feetech.driver.rest import asked_anew, unpublished_duty, with_bound
 from motorbus.families.feetech.table import Mode
@@ -150,9 +150,13 @@ def _step_block(
             node=node.node,
         )
     ramp = ramp_of(node, table, acceleration)
-    data = ramp + row.encode(raw) + burst(node, table, velocity, None)
+    more = burst(node, table, velocity, None)
     goal = Goal(node.node, "relative", float(node.value(row, raw)), -most, most)
-    return Block(row.address - len(ramp), data, Effect.MOTION, (goal,), repeatable=False)
+    speed = table["goal_velocity"]
+    goals = (goal, speed_goal(node, speed, speed.decode(more[-speed.size :])))
+    return Block(
+        row.address - len(ramp), ramp + row.encode(raw) + more, Effect.MOTION, goals, repeatable=False
+    )
 
 
 def _heed(node: Node, wanted: Mode, complaint: str) -> None:

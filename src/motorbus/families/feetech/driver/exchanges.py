@@ -7,7 +7,8 @@ serial bus servo protocol manual V1.01; STS3215 memory table V3.6.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.operation import (
@@ -88,11 +89,30 @@ def read_block(
             rank=rank,
             timeout=timeout,
             repeatable=True,
-            tells_position=address == PRESENT and count > 1,
+            tells_position=told_by({node.node: node}, address, count),
             other=lambda: exchange(other, count),
         )
 
     return exchange(count, another(address, count))
+
+
+def told_by(
+    nodes: Mapping[int, Node], address: int, count: int
+) -> bool | Callable[[Answer], Mapping[int, float]]:
+    """What a read of these registers of these servos says of where they are; see `Exchange.tells_position`."""
+    return address == PRESENT and count > 1 and partial(_places, nodes)
+
+
+def _places(nodes: Mapping[int, Node], answer: Answer) -> dict[int, float]:
+    """Where those are who are known well enough to tell (rad), by the settings that they have now."""
+    found = {}
+    for reply in answer.replies:
+        node = nodes.get(reply.data[2])
+        if node is not None and node.table is not None and node.settings is not None:
+            row = node.table["present_position"]
+            if row.unit:
+                found[node.node] = float(node.value(row, row.decode(reply.data[5 : 5 + row.size])))
+    return found
 
 
 def another(address: int, count: int) -> int:

@@ -15,11 +15,11 @@ from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outc
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
-    PRESENT,
     Block,
     another,
     changed_since,
     read_block,
+    told_by,
     unanswered,
 )
 from motorbus.families.feetech.driver.identity import learn, unknown_map
@@ -122,7 +122,8 @@ def sync_exchange(
 
     `read` must make do with either.
     """
-    ids = [node.node for node in nodes]
+    by_id = {node.node: node for node in nodes}
+    ids = list(by_id)
 
     def exchange(count: int, other: int) -> Exchange[T]:
         return Exchange(
@@ -130,7 +131,7 @@ def sync_exchange(
             tuple(Due(id, id, wire.OVERHEAD + count) for id in ids),
             read,
             repeatable=True,
-            tells_position=address == PRESENT and count > 1,
+            tells_position=told_by(by_id, address, count),
             other=lambda: exchange(other, count),
         )
 

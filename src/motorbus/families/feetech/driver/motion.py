@@ -18,7 +18,7 @@ from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
 from motorbus.families.feetech.driver.exchanges import Block, confirmed
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.orders import position_goal
+from motorbus.families.feetech.driver.orders import position_goal, speed_goal
 from motorbus.families.feetech.driver.pace import burst, ramp_of
 from motorbus.families.feetech.driver.rest import (
     asked_anew,
@@ -257,9 +257,11 @@ def move_block(
     that the velocity counts. Raises RequestError when a bound of the current is needed and not known (see `ask_bound`).
     """
     raw, order = position_goal(node, table["goal_position"], to)
-    data = table["goal_position"].encode(raw) + burst(node, table, velocity, current)
+    row, more = table["goal_velocity"], burst(node, table, velocity, current)
+    data = table["goal_position"].encode(raw) + more
     ramp = ramp_of(node, table, acceleration)
-    block = Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, (order,))
+    goals = (order, speed_goal(node, row, row.decode(more[-row.size :])))
+    block = Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, goals)
     return block if node.control.goal_switches_on else switched_on(block)
 
 

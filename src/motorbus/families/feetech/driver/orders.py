@@ -6,6 +6,7 @@ All of it is decided before the first byte is sent. The same rules hold for WRIT
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import tau
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value, is_number, shown
@@ -18,6 +19,10 @@ from motorbus.families.feetech.table import TABLES, Mode
 
 DUTY: Final = 0.001
 """What one count of a duty is, as a fraction. Source: STS3215 memory table V3.6; SCS memory table 1902."""
+NO_LOAD: Final = 3400
+"""Counts/s that no servo exceeds much: of an STS3215 without load. Source: STS3215 memory table V3.6."""
+COUNT: Final = tau / 4096
+"""rad; what a count of it is."""
 _CALIBRATE: Final = 128
 _INSTEAD: Final = {
     "id": "use set_id(), which sees to it that the servo is found again",
@@ -254,8 +259,23 @@ def _goals(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
     elif row.name == "goal_position":
         yield Goal(node.node, "position", value, *(node.limits or (None, None)))
     elif row.name == "goal_velocity":
-        yield Goal(node.node, "velocity", value, node.value(row, row.low), node.value(row, row.high))
+        yield speed_goal(node, row, raw)
     elif row.name == node.control.current:
-        yield Goal(node.node, "current", value, node.value(row, row.low), node.value(row, row.high))
+        quantity = "current" if node.known_mode is Mode.CURRENT else "cap"
+        yield Goal(node.node, quantity, value, node.value(row, row.low), node.value(row, row.high))
     elif row.name == "goal_time":  # a duty in PWM mode; a time otherwise, and judged all the same
-        yield Goal(node.node, "load", raw * DUTY, -1.0, 1.0)
+        yield Goal(node.node, "load" if node.known_mode is Mode.PWM else "time", raw * DUTY, -1.0, 1.0)
+
+
+def speed_goal(node: Node, row: Entry, raw: int) -> Goal:
+    """What a goal velocity orders: to turn at it in velocity mode, else how fast it goes to its goal at most.
+
+    Where 0 means the maximum, that is what it says: as fast as no servo goes much faster.
+    """
+    low, high = float(node.value(row, row.low)), float(node.value(row, row.high))
+    if node.known_mode is Mode.VELOCITY:
+        return Goal(node.node, "velocity", float(node.value(row, raw)), low, high)
+    most = raw == 0 and (node.settings is None or node.settings.zero_is_maximum)
+    return Goal(
+        node.node, "speed", min(NO_LOAD * COUNT, high) if most else float(node.value(row, raw)), low, high
+    )

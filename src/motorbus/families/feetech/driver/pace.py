@@ -14,9 +14,8 @@ from motorbus.core.entry import Entry, Table
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
 from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import NO_LOAD
 
-NO_LOAD: Final = 3400
-"""Counts/s that no servo exceeds much: of an STS3215 without load. Source: STS3215 memory table V3.6."""
 ROUNDING: Final = 1e-6
 """Units of a velocity that are noise of binary arithmetic."""
 

@@ -7,7 +7,7 @@ refuses exactly this is written to in CiA 301's sized form from then on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, TypeVar
 
 from motorbus.core.entry import Entry
@@ -63,7 +63,7 @@ def upload(
     *,
     rank: Rank = Rank.POLL,
     timeout: Timeout = Timeout.REPLY,
-    tells_position: bool = False,
+    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
 ) -> Exchange[T]:
     """Read an object; the value is what `take` makes of the reply. A refusal raises DeviceError."""
 
@@ -90,7 +90,14 @@ def upload_row(
     def decode(reply: SdoReply) -> T:
         return take(row.decode(sized(node, row, reply)))
 
-    return upload(node, row.address, row.subindex or 0, decode, tells_position=tells_position)
+    def places(answer: Answer) -> dict[int, float]:
+        reply = wire.decode_reply(answer.replies[0].data)
+        if reply is None or reply.kind != "upload":  # a refusal tells nothing
+            return {}
+        return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
+
+    where = tells_position and places
+    return upload(node, row.address, row.subindex or 0, decode, tells_position=where)
 
 
 def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:

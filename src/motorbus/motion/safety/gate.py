@@ -1,0 +1,211 @@
+"""The one gate that every motion command passes, whatever face or spelling it comes from.
+
+The bus asks it before anything leaves whose row says that writing it moves a motor or switches its torque
+(decision record 0014). What it cannot judge it refuses: a goal that is not finite, lies outside the limits the
+device itself declares, or comes without limits. Where somebody has set a guard over a node, its goals keep within that
+as well, and it must be known where the node is, by a reading that is fresh and can be believed.
+
+The gate judges and never changes: when it is asked, the bytes are made. It reads no clock and asks no device; what the
+bus has heard lately is what it knows. A stop passes whatever happens, and so does an order to stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf, isfinite
+from typing import Any, Final
+
+from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable
+from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.guard import Guard
+from motorbus.motion.safety.lease import Lease
+
+ROUNDING = 1e-9  # relative; a limit converted to its unit and back still admits itself
+
+Seen = Mapping[int, "tuple[Exchange[Any], Answer]"]
+"""By node, the last exchange that told where it is, and its answer."""
+
+
+class Gate:
+    """Called with an exchange before it is sent; raises Refused, as a rule LimitExceeded, else does nothing.
+
+    `guards` by node are what bounds it beyond the limits of its device. `faults` by node are reasons for which nothing
+    of it may move or get torque. With a `lease`, only its holder moves anything. `attended`: endless motion, which only
+    its stop ends, needs a lease whose holder attends.
+    """
+
+    def __init__(self) -> None:
+        self.guards: Final[dict[int, Guard]] = {}
+        self.faults: Final[dict[int, str]] = {}
+        self.lease: Lease | None = None
+        self.attended = False
+        self._seen: Seen = {}
+        self._now: Callable[[], float] = _never
+        self._answer: Answer | None = None
+        self._places: Mapping[int, float] = {}
+
+    def watch(self, seen: Seen, now: Callable[[], float]) -> None:
+        """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s)."""
+        self._seen, self._now = seen, now
+
+    def look(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
+        """What must be asked before this order can be judged: where those are whose position is not known well enough.
+
+        Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
+        """
+        if exchange.effect is not Effect.MOTION or not self.guards or exchange.rank is Rank.STOP:
+            return []
+        found: dict[int, Runnable[Any]] = {}
+        everyone, now = exchange.lane == EVERY_LANE, self._now()
+        for goal in self._of_everyone(exchange.goals) if everyone else exchange.goals:
+            guard = self.guards.get(goal.node)
+            if guard is None or guard.track is None or guard.ask is None or not _goes(goal):
+                continue
+            self._look(goal.node, guard)
+            if goal.node not in found and guard.track.why_not(now):
+                found[goal.node] = guard.ask()
+        return list(found.values())
+
+    def __call__(self, exchange: Exchange[Any]) -> None:
+        effect = exchange.effect
+        if exchange.rank is Rank.STOP or effect < Effect.TORQUE:
+            return
+        goals = exchange.goals
+        if effect is Effect.MOTION and not goals:
+            raise LimitExceeded(
+                "this write moves a motor and does not say where to",
+                sent=exchange.request,
+                cause="the driver made an exchange with effect motion and without goals",
+                advice="use a move, or a write by register name; nothing was sent",
+            )
+        for goal in goals:
+            _, _, value, low, high = goal
+            if low is None or high is None or not -inf < low <= value <= high < inf:
+                _check(goal)
+        if self.faults or self.lease is not None:
+            self._check_standing(exchange)
+        if self.guards or self.attended:
+            now = self._now()
+            for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
+                guard = self.guards.get(goal.node)
+                if guard is not None and guard.track is not None:
+                    self._look(goal.node, guard)
+                    if goal.quantity == "position" and guard.is_fine(goal.value, now):
+                        continue
+                if not _stays(goal):
+                    self._check_guarded(guard, goal, now)
+
+    # -- whether anything may move -----------------------------------------------------------------------------------
+
+    def _check_standing(self, exchange: Exchange[Any]) -> None:
+        goals = exchange.goals
+        if goals and all(map(_stays, goals)):
+            return
+        for node in _named(exchange) if self.faults else ():
+            if node in self.faults:
+                raise Refused(
+                    f"node {node} is at fault: {self.faults[node]}",
+                    reason="fault",
+                    advice="see to it, then reset the fault; nothing was sent",
+                    node=node,
+                )
+        if self.lease is not None:
+            self.lease.check(self._now())
+
+    # -- guards --------------------------------------------------------------------------------------------------------
+
+    def _check_guarded(self, guard: Guard | None, goal: Goal, now: float) -> None:
+        if goal.quantity in ENDLESS and goal.value:
+            self._check_attended(goal, now)
+        if guard is None:
+            return
+        if goal.quantity in ("velocity", "speed"):
+            guard.check_speed(goal)
+        elif goal.quantity in PLACES:
+            guard.check_known(goal.node, now)
+            guard.check_goal(goal)
+
+    def _of_everyone(self, goals: tuple[Goal, ...]) -> tuple[Goal, ...]:
+        """What an order for everyone says to those with a guard as well whom it does not name: it moves them too."""
+        named = {goal.node for goal in goals}
+        more = (goals[0]._replace(node=node) for node in self.guards if node not in named) if goals else ()
+        return (*goals, *more)
+
+    def _check_attended(self, goal: Goal, now: float) -> None:
+        if self.attended and (self.lease is None or not self.lease.is_attended(now)):
+            raise Refused(
+                f"node {goal.node}: goal {goal.quantity} has no end of its own, and nobody attends",
+                reason="unattended",
+                cause="a host that dies, or a cable that breaks, leaves the motor turning",
+                advice="take an attended lease, or order a move, which ends by itself; nothing was sent",
+                node=goal.node,
+            )
+
+    def _look(self, node: int, guard: Guard) -> None:
+        """Take in what the node has told since it was looked at last."""
+        found = self._seen.get(node)
+        if found is None or guard.track is None or found[1] is guard.answer:
+            return
+        exchange, answer = found
+        guard.answer = answer
+        if answer is not self._answer:
+            where = exchange.tells_position
+            self._places = {} if isinstance(where, bool) else where(answer)
+            self._answer = answer
+        place = self._places.get(node)
+        if place is not None:
+            guard.track.take(place, answer.at)
+
+
+PLACES: Final = ("position", "relative")
+"""Quantities that lead to a place."""
+ENDLESS: Final = ("velocity", "load", "current")
+"""Quantities that go on being obeyed until something else is ordered."""
+
+
+def _stays(goal: Goal) -> bool:
+    """It is told to stay where it stands, or to rest: such a goal brings its own limits, and is always allowed."""
+    return goal.low == goal.value == goal.high
+
+
+def _goes(goal: Goal) -> bool:
+    """It is told to go to a place."""
+    return goal.quantity in PLACES and not _stays(goal)
+
+
+def _never() -> float:
+    """The time of a gate that was told of no clock: whatever was seen is old."""
+    return inf
+
+
+def _named(exchange: Exchange[Any]) -> set[int]:
+    """Whom it orders something, and who answers it."""
+    nodes = {goal.node for goal in exchange.goals}
+    if isinstance(exchange.replies, tuple):
+        nodes |= {due.node for due in exchange.replies}
+    return nodes
+
+
+def _check(goal: Goal) -> None:
+    if not isfinite(goal.value):
+        raise _refusal(goal, f"{goal.value} is not a finite number", "give a number")
+    if goal.low is None or goal.high is None:
+        raise _refusal(
+            goal, "its limits are not known", "read the device's limits first, for example by identify()"
+        )
+    slack = ROUNDING * max(abs(goal.low), abs(goal.high), 1.0)
+    if not goal.low - slack <= goal.value <= goal.high + slack:
+        raise _refusal(
+            goal,
+            f"{goal.value:.6g} lies outside {goal.low:.6g} to {goal.high:.6g}",
+            "stay inside the limits, or change the limit registers of the device",
+        )
+
+
+def _refusal(goal: Goal, why: str, advice: str) -> LimitExceeded:
+    return LimitExceeded(
+        f"node {goal.node}: goal {goal.quantity} refused: {why}",
+        expected="" if goal.low is None or goal.high is None else f"{goal.low:.6g} to {goal.high:.6g}",
+        advice=f"{advice}; nothing was sent",
+        node=goal.node,
+    )

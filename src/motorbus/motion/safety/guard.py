@@ -1,0 +1,148 @@
+"""What bounds one device beyond its own limits: how far, how quickly, and in what steps from where it is.
+
+A guard knows angles of the device and nothing of axes. Whoever sets it has made it of something that people wrote down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.operation import Answer, Goal, Runnable
+from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.track import Track
+
+ROUNDED: Final = 0.003
+"""rad by which a goal may be beyond: it was rounded to a count, and half of the coarsest one is 0.0026."""
+NOISE: Final = 1e-9
+"""rad that are noise of binary arithmetic."""
+UNIT: Final = 0.08
+"""rad/s by which a speed may be beyond: it was rounded up to the next unit, 0.732 RPM at the coarsest."""
+
+
+class Bounds(NamedTuple):
+    """`low` and `high` position (rad of the device), the farthest `step` from where it is measured to be (rad) and the
+    greatest `speed` (rad/s); infinite where nobody bounds it."""
+
+    low: float = -inf
+    high: float = inf
+    step: float = inf
+    speed: float = inf
+
+
+class Guard:
+    """The bounds of one device that people call `name`, and where it was seen.
+
+    `ask` reads its position, so that a bus can look before it gives an order; `show` words an angle of the device;
+    `answer` is the last one of the bus that was taken in here.
+    `track` is None where the device does not tell where it is: then nothing can be asked of its position.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        bounds: Bounds,
+        *,
+        measures: bool = True,
+        ask: Callable[[], Runnable[Any]] | None = None,
+        show: Callable[[float], str] = "{:.4g} rad".format,
+    ) -> None:
+        self.name: Final = name
+        self.bounds: Final = bounds
+        self.ask: Final = ask
+        self.show: Final = show
+        self.track: Final = Track() if measures else None
+        self.answer: Answer | None = None
+        self._low: Final = bounds.low - ROUNDED
+        self._high: Final = bounds.high + ROUNDED
+        self._step: Final = bounds.step + ROUNDED
+
+    def is_fine(self, to: float, now: float) -> bool:
+        """Whether this place is surely allowed: the quick way of most goals; what is not is looked at more closely."""
+        track = self.track
+        if track is None or track.why_not(now):
+            return False
+        sample = track.sample
+        return sample is not None and self._low <= to <= self._high and abs(to - sample.value) <= self._step
+
+    def check_known(self, node: int, now: float) -> None:
+        """Raise Refused unless it is known where the device is, by a reading that is fresh and can be believed."""
+        if self.track is None or not (why := self.track.why_not(now)):
+            return
+        raise Refused(
+            f"{self.name}: {self._told(why, now)}, so it must not be moved", node=node, **_EXPECTED[why]
+        )
+
+    def check_goal(self, goal: Goal) -> None:
+        """Raise LimitExceeded for a position, or a way, that leads out of the bounds or is too far for one step."""
+        low, high, step, _ = self.bounds
+        sample = self.track.sample if self.track is not None else None
+        here = None if sample is None else sample.value
+        relative = goal.quantity == "relative"
+        to = goal.value if not relative else None if here is None else here + goal.value
+        if to is not None and not self._allows(to, here):
+            raise self._refused(
+                goal, f"{self.show(to)} is outside {self._range()}", f"stay inside {self._range()}"
+            )
+        if to is None and abs(goal.value) > high - low + ROUNDED:
+            raise self._refused(goal, "this way is more than all of its way", "go less far")
+        way = abs(goal.value) if relative else 0.0 if here is None else abs(goal.value - here)
+        if way > self._step:
+            raise self._refused(
+                goal,
+                f"this is {way:.4g} rad of its device from where it is, and one command may be {step:.4g} rad",
+                "go there in smaller steps, or by a move of the axis",
+                "step",
+            )
+
+    def _allows(self, to: float, here: float | None) -> bool:
+        """Whether this place is within the bounds, or no farther out than it stands: it may always come back.
+
+        Where it stands gets no allowance for rounding, or it could be led out bit by bit.
+        """
+        low, high = self._low, self._high
+        if here is not None:
+            low, high = min(low, here - NOISE), max(high, here + NOISE)
+        return low <= to <= high
+
+    def check_speed(self, goal: Goal) -> None:
+        """Raise LimitExceeded for a velocity, or a bound of it, that is above the bound."""
+        if abs(goal.value) > self.bounds.speed + UNIT:
+            raise self._refused(
+                goal,
+                f"{abs(goal.value):.4g} rad/s of its device is above {self.bounds.speed:.4g} rad/s",
+                "be slower; where none was said, say a velocity",
+            )
+
+    def _told(self, why: str, now: float) -> str:
+        if why == "unseen":
+            return "nobody has read where it is"
+        assert self.track is not None
+        if why == "suspect":
+            assert self.track.suspect is not None
+            return f"it was read at {self.show(self.track.suspect.value)}, where no motor can have come so quickly"
+        assert self.track.sample is not None
+        return f"where it is was read {self.track.sample.age(now):.3g} s ago"
+
+    def _range(self) -> str:
+        return f"{self.show(self.bounds.low)} to {self.show(self.bounds.high)}"
+
+    def _refused(self, goal: Goal, why: str, advice: str, reason: str = "limits") -> LimitExceeded:
+        return LimitExceeded(
+            f"{self.name}: {why}", reason=reason, advice=f"{advice}; nothing was sent", node=goal.node
+        )
+
+
+_READ: Final = "read its position, then order it again; nothing was sent"
+_EXPECTED: Final[dict[str, dict[str, str]]] = {
+    "unseen": {"reason": "stale", "advice": _READ},
+    "stale": {"reason": "stale", "expected": "a reading that is fresh", "advice": _READ},
+    "suspect": {
+        "reason": "suspect",
+        "expected": "a second reading that agrees",
+        "cause": "a fault on the line, a servo that lost its supply and counts anew, or a gear that slipped",
+        "advice": _READ,
+    },
+}
+"""By what is wrong with what is known of its position, the parts of the refusal."""

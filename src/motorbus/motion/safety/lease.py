@@ -1,0 +1,129 @@
+"""Who may move, until when, and whether somebody attends.
+
+A program that moves motors for itself needs no lease: when it is gone it sends nothing. One that moves them for
+somebody else, behind a page or on another machine, does: whoever holds the lease says from time to time that he is
+still there. When he is silent the lease is lost; then what moves is stopped, and nothing moves until somebody has said
+that it may. A lease has no clock: the time comes in, in s, and never goes back.
+
+Endless motion, which only its stop ends, needs one who *attends*: he sees the machine and keeps his hand on the stop.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import isfinite
+from typing import Final
+
+from motorbus.errors import Refused, RequestError
+
+LASTS: Final = 0.5
+"""s from one heartbeat to the loss of the lease."""
+
+
+class Standing(Enum):
+    """How a lease stands."""
+
+    FREE = "nobody holds it"
+    HELD = "somebody holds it, and is there"
+    LOST = "who held it fell silent; nothing moves until it is reset"
+
+
+class Lease:
+    """The right to move, which one holder has at a time. It `lasts` so long (s) after each heartbeat."""
+
+    def __init__(self, lasts: float = LASTS) -> None:
+        if not (isfinite(lasts) and lasts > 0):
+            raise RequestError(f"a lease cannot last {lasts} s", expected="a finite number above 0")
+        self.lasts: Final = lasts
+        self.holder = ""
+        self._attended = False
+        self._until = 0.0
+        self._now = 0.0
+        self._lost = ""
+
+    # -- how it stands -------------------------------------------------------------------------------------------------
+
+    def standing(self, now: float) -> Standing:
+        """How it stands at this moment. A lease that has run out is lost from now on, whatever comes later."""
+        self._now = max(self._now, now)
+        if self.holder and self._now > self._until:
+            self._lost, self.holder, self._attended = self.holder, "", False
+        if self._lost:
+            return Standing.LOST
+        return Standing.HELD if self.holder else Standing.FREE
+
+    def is_attended(self, now: float) -> bool:
+        """Whether it is held, and its holder attends."""
+        return self.standing(now) is Standing.HELD and self._attended
+
+    def check(self, now: float) -> None:
+        """Raise Refused when nobody holds it, or it is lost: nothing may move then but to a stop."""
+        standing = self.standing(now)
+        if standing is Standing.LOST:
+            raise self._is_lost()
+        if standing is Standing.FREE:
+            raise Refused(
+                "nobody holds the lease of this machine, so nothing may move",
+                reason="lease",
+                advice="take it first; nothing was sent",
+            )
+
+    # -- what its holder does ------------------------------------------------------------------------------------------
+
+    def take(self, holder: str, now: float, *, attended: bool = False) -> None:
+        """`holder` has it from now on, and again if it has it already. Raises Refused for another's, or a lost one."""
+        if not holder:
+            raise RequestError("a lease needs the name of its holder", advice="say who takes it")
+        standing = self.standing(now)
+        if standing is Standing.LOST:
+            raise self._is_lost()
+        if standing is Standing.HELD and self.holder != holder:
+            raise Refused(
+                f"{self.holder} holds the lease of this machine",
+                reason="lease",
+                expected=f"a lease that is free; this one is held for {self._until - self._now:.2g} s at least",
+                advice="ask for it to be released; nothing was sent",
+            )
+        self.holder, self._attended = holder, attended
+        self._until = self._now + self.lasts
+
+    def beat(self, holder: str, now: float) -> None:
+        """The holder is still there. Raises Refused when it is not, or no longer, the holder."""
+        if self.standing(now) is Standing.LOST:
+            raise self._is_lost()
+        self._check_holder(holder)
+        self._until = self._now + self.lasts
+
+    def attend(self, holder: str, now: float, attended: bool = True) -> None:
+        """The holder attends from now on, or no longer. Raises as `beat`; it counts as one."""
+        self.beat(holder, now)
+        self._attended = attended
+
+    def release(self, holder: str, now: float) -> None:
+        """The holder gives it back; nothing is lost by that. Raises as `beat`."""
+        if self.standing(now) is Standing.LOST:
+            raise self._is_lost()
+        self._check_holder(holder)
+        self.holder, self._attended = "", False
+
+    def reset(self, now: float) -> None:
+        """Somebody says that a machine whose lease was lost may move again. The lease is free then."""
+        self.standing(now)
+        self._lost = ""
+
+    def _check_holder(self, holder: str) -> None:
+        if holder != self.holder or not holder:
+            whose = f"{self.holder} holds it" if self.holder else "nobody holds it"
+            raise Refused(
+                f"{holder} does not hold the lease of this machine: {whose}",
+                reason="lease",
+                advice="take it first; nothing was sent",
+            )
+
+    def _is_lost(self) -> Refused:
+        return Refused(
+            f"the lease of this machine was lost: {self._lost} was silent for more than {self.lasts:g} s",
+            reason="lease",
+            cause="its program ended or hung, or the connection to it is broken",
+            advice="see that the machine is clear, reset the lease, and take it again; nothing was sent",
+        )

@@ -1,0 +1,110 @@
+"""Which readings of a position can be believed, and for how long.
+
+A reading with a good checksum can be wrong all the same: an additive sum of eight bits lets some faults through, a
+servo that lost its supply counts its turns anew, a gear slips. What no motor can have done in that time is *suspect*,
+and another reading must agree with it before it counts. A position grows old, too: who has asked a while ago knows no
+longer where the device is, and asks again before he moves it.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Final, NamedTuple
+
+from motorbus.core.family import Quality
+
+FASTEST: Final = 20.0
+"""rad/s, when nobody says how fast a device can be: 60 degrees in 0.05 s, and no maker of these servos claims that."""
+MARGIN: Final = 1.5
+"""How much farther than at its greatest speed a device may have come before that is called impossible."""
+TREMBLING: Final = 0.01
+"""rad by which readings of a device at rest may differ: two counts of the coarsest servo there is."""
+FRESH: Final = 0.5
+"""s for which a reading counts as fresh, whoever took it: as long as a lease, and longer than whoever leads axes waits
+for one that is silent (0.3 s), so that he says who is."""
+
+
+class Sample(NamedTuple):
+    """A position (rad), when it arrived (s on the link's clock), and how far it can be trusted."""
+
+    value: float
+    at: float
+    quality: Quality = Quality.FRESH
+
+    def age(self, now: float) -> float:
+        """s since it arrived."""
+        return max(0.0, now - self.at)
+
+
+class Track:
+    """What one device has told of its position, judged reading by reading. `speed` (rad/s) is the most it can do."""
+
+    __slots__ = ("_doubt", "_sample", "speed")
+
+    def __init__(self, speed: float = FASTEST) -> None:
+        self.speed: Final = speed
+        self._sample: Sample | None = None
+        self._doubt: Sample | None = None
+
+    @property
+    def sample(self) -> Sample | None:
+        """The last reading that can be believed; None when there is none."""
+        return self._sample
+
+    @property
+    def suspect(self) -> Sample | None:
+        """The last reading, when it is one that cannot be believed yet."""
+        return self._doubt
+
+    def take(self, value: float, at: float) -> Sample:
+        """Judge a reading (rad, s); each reading once.
+
+        It is FRESH where it can have come from the last one; SUSPECT where it cannot, or is no finite number; CONFIRMED
+        where it cannot and agrees with a suspect one before it. One that is older than the last is REPEATED, and
+        changes nothing.
+        """
+        before = self._sample
+        if not isfinite(value):
+            return self._doubted(value, at)
+        if before is None:
+            return self._believed(value, at, Quality.FRESH)
+        if at < before.at:
+            return before._replace(quality=Quality.REPEATED)
+        if self._possible(before, value, at):
+            return self._believed(value, at, Quality.FRESH)
+        doubt = self._doubt
+        if doubt is not None and at >= doubt.at and self._possible(doubt, value, at):
+            return self._believed(value, at, Quality.CONFIRMED)
+        return self._doubted(value, at)
+
+    def latest(self, now: float) -> Sample | None:
+        """What is known of it at this moment: the last reading that can be believed, REPEATED once it is older."""
+        sample = self._sample
+        return sample if sample is None or now <= sample.at else sample._replace(quality=Quality.REPEATED)
+
+    def why_not(self, now: float) -> str:
+        """ "" when the position is fresh and can be believed, else the reason: `unseen`, `suspect` or `stale`."""
+        if self._doubt is not None:
+            return "suspect"
+        if self._sample is None:
+            return "unseen"
+        return "" if now - self._sample.at <= FRESH else "stale"
+
+    def forget(self) -> None:
+        """It may be anywhere: it lost its supply, or was given another zero."""
+        self._sample = self._doubt = None
+
+    def _possible(self, since: Sample, value: float, at: float) -> bool:
+        way = abs(value - since.value)
+        return way <= self.speed * (at - since.at) * MARGIN + TREMBLING
+
+    def _believed(self, value: float, at: float, quality: Quality) -> Sample:
+        self._doubt = None
+        self._sample = Sample(value, at, quality)
+        return self._sample
+
+    def _doubted(self, value: float, at: float) -> Sample:
+        sample = Sample(value, at, Quality.SUSPECT)
+        if isfinite(value) or self._doubt is None:
+            self._doubt = sample
+        return sample

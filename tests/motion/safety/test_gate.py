@@ -1,0 +1,234 @@
+"""The gate lets through what lies inside known limits, and nothing else that moves."""
+
+from __future__ import annotations
+
+from math import inf, nan
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motorbus.core.operation import EVERY_LANE, Answer, Due, Effect, Exchange, Goal, Rank
+from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety import Gate
+from motorbus.motion.safety.guard import Bounds, Guard
+from motorbus.motion.safety.lease import Lease, Standing
+from motorbus.motion.safety.track import FRESH
+
+
+def motion(*goals: Goal, rank: Rank = Rank.POLL) -> Exchange[Answer]:
+    return Exchange(b"\x01", effect=Effect.MOTION, goals=goals, rank=rank)
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, 1.0])
+def test_inside_the_limits_passes(value: float) -> None:
+    Gate()(motion(Goal(1, "position", value, -1.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        (Goal(3, "position", nan, -1.0, 1.0), "not a finite number"),
+        (Goal(3, "position", inf, -1.0, 1.0), "not a finite number"),
+        (Goal(3, "position", 1.01, -1.0, 1.0), "lies outside -1 to 1"),
+        (Goal(3, "position", -1.01, -1.0, 1.0), "lies outside -1 to 1"),
+        (Goal(3, "position", 0.0), "limits are not known"),
+        (Goal(3, "position", 0.0, -1.0, None), "limits are not known"),
+    ],
+)
+def test_everything_else_is_refused_with_the_reason(goal: Goal, why: str) -> None:
+    with pytest.raises(LimitExceeded, match=why) as caught:
+        Gate()(motion(Goal(1, "position", 0.0, -1.0, 1.0), goal))
+    assert caught.value.node == 3
+    assert "nothing was sent" in str(caught.value)
+
+
+def test_motion_that_does_not_say_where_to_is_refused() -> None:
+    with pytest.raises(LimitExceeded, match="does not say where"):
+        Gate()(motion())
+
+
+@pytest.mark.parametrize("effect", [Effect.NONE, Effect.PERSISTENT, Effect.IDENTITY, Effect.TORQUE])
+def test_what_does_not_move_passes(effect: Effect) -> None:
+    Gate()(Exchange(b"\x01", effect=effect))
+
+
+def test_a_stop_always_passes() -> None:
+    Gate()(motion(rank=Rank.STOP))
+
+
+@given(st.floats(), st.floats(-100, 100), st.floats(0, 100))
+def test_a_goal_passes_exactly_when_it_lies_inside(value: float, low: float, width: float) -> None:
+    slack = 1e-6
+    try:
+        Gate()(motion(Goal(1, "position", value, low, low + width)))
+        passed = True
+    except LimitExceeded:
+        passed = False
+    if low <= value <= low + width:
+        assert passed
+    if not low - slack <= value <= low + width + slack:
+        assert not passed
+
+
+# -- guards, faults, leases ----------------------------------------------------------------------------------------
+
+
+def place(value: float, node: int = 1) -> Goal:
+    return Goal(node, "position", value, -9.0, 9.0)
+
+
+class Line:
+    """A gate over node 1, the readings that its bus has heard, and the time."""
+
+    def __init__(self, bounds: Bounds = Bounds(-1.0, 2.0, 0.5, 3.0)) -> None:  # noqa: B008 - a value
+        self.gate = Gate()
+        self.now = 0.0
+        self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
+        self.gate.watch(self.seen, lambda: self.now)
+        self.gate.guards[1] = Guard("elbow", bounds, ask=lambda: QUESTION)
+
+    def reads(self, value: float, at: float | None = None) -> None:
+        self.now = self.now if at is None else at
+        self.seen[1] = Exchange(b"?", tells_position=lambda _: {1: value}), Answer((), (), self.now)
+
+    def passes(self, *goals: Goal, **options: Any) -> bool:
+        try:
+            self.gate(motion(*goals, **options))
+        except Refused:
+            return False
+        return True
+
+    def reason(self, *goals: Goal, effect: Effect = Effect.MOTION) -> str:
+        try:
+            self.gate(Exchange(b"\x01", effect=effect, goals=goals))
+        except Refused as refusal:
+            return refusal.reason
+        return ""
+
+
+QUESTION: Exchange[Answer] = Exchange(b"?")
+
+
+def test_a_guard_wants_to_know_where_it_is_and_looks_by_itself_at_what_the_bus_heard() -> None:
+    line = Line()
+    assert line.reason(place(0.1)) == "stale"
+    line.reads(0.0, 1.0)
+    assert line.passes(place(0.1))
+    assert line.reason(place(0.6)) == "step"
+    line.reads(0.2, 1.2)
+    assert line.passes(place(0.6))
+    line.now = 1.9
+    assert line.reason(place(0.3)) == "stale"
+
+
+def test_one_goal_of_several_that_is_refused_holds_back_all() -> None:
+    line = Line()
+    line.reads(0.0, 1.0)
+    assert line.passes(place(9.0, node=2), place(0.1))
+    assert not line.passes(place(0.1), place(0.6))
+
+
+def test_an_order_for_everyone_is_one_for_those_whom_it_does_not_name() -> None:
+    line = Line()
+    line.reads(0.0, 1.0)
+    everyone = {"effect": Effect.MOTION, "lane": EVERY_LANE}
+    line.gate(Exchange(b"\x01", goals=(place(0.4, node=2),), **everyone))  # type: ignore[arg-type]
+    order: Exchange[Answer] = Exchange(b"\x01", goals=(place(0.6, node=2),), **everyone)  # type: ignore[arg-type]
+    with pytest.raises(LimitExceeded, match="elbow: this is 0.6 rad"):
+        line.gate(order)
+    line.now = 9.0
+    assert line.gate.look(order) == [QUESTION]
+
+
+def test_it_says_what_must_be_asked_before_an_order_can_be_judged() -> None:
+    line = Line()
+    order = motion(place(0.1), Goal(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
+    assert line.gate.look(order) == [QUESTION]
+    assert line.gate.look(motion(place(0.1), rank=Rank.STOP)) == []
+    assert line.gate.look(motion(Goal(1, "position", 0.1, 0.1, 0.1))) == []
+    assert line.gate.look(Exchange(b"")) == []
+    line.reads(0.0, 1.0)
+    assert line.gate.look(order) == []
+    line.reads(1.5, 1.001)
+    assert line.gate.look(order) == [QUESTION]
+    assert line.reason(place(0.1)) == "suspect"
+    line.reads(1.5, 1.002)
+    assert line.gate.look(order) == []
+
+
+def test_staying_is_always_allowed_and_a_number_it_must_be() -> None:
+    line = Line()
+    line.gate.faults[1] = "gone"
+    line.gate.lease = Lease()
+    assert line.passes(Goal(1, "position", 7.0, 7.0, 7.0))
+    assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0))
+    assert not line.passes(Goal(1, "position", nan, nan, nan))
+
+
+def test_a_node_at_fault_neither_moves_nor_gets_torque_and_others_do() -> None:
+    line = Line()
+    line.reads(0.0, 1.0)
+    line.gate.faults[1] = "it has lost its supply"
+    assert line.reason(place(0.1)) == "fault"
+    torque: Exchange[Answer] = Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.TORQUE)
+    with pytest.raises(Refused, match="node 1 is at fault: it has lost its supply"):
+        line.gate(torque)
+    line.gate(Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.TORQUE, rank=Rank.STOP))
+    line.gate(Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.PERSISTENT))
+    line.gate(Exchange(b"\x01", (Due(2, 2, 6),), effect=Effect.TORQUE))
+    assert line.passes(place(0.1, node=2))
+
+
+def test_with_a_lease_only_its_holder_moves_anything_and_while_he_is_there() -> None:
+    line = Line()
+    line.reads(0.0, 1.0)
+    line.gate.lease = lease = Lease()
+    assert line.reason(place(0.1)) == line.reason(effect=Effect.TORQUE) == "lease"
+    lease.take("page", 1.0)
+    assert line.passes(place(0.1))
+    line.now = 1.51
+    assert line.reason(place(0.1)) == "lease"
+    assert lease.standing(1.51) is Standing.LOST
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "load", "current"])
+def test_what_has_no_end_of_its_own_needs_somebody_who_attends(quantity: str) -> None:
+    line = Line()
+    goal = Goal(1, quantity, 0.5, -9.0, 9.0)
+    assert line.passes(goal)
+    line.gate.attended = True
+    assert line.reason(goal) == "unattended"
+    line.gate.lease = lease = Lease()
+    lease.take("page", 0.0)
+    assert line.reason(goal) == "unattended"
+    lease.attend("page", 0.0)
+    assert line.passes(goal)
+    assert line.passes(goal._replace(value=0.0))
+
+
+def test_a_velocity_keeps_its_bound_whether_it_turns_or_only_bounds() -> None:
+    line = Line()
+    for quantity in ("velocity", "speed"):
+        assert line.passes(Goal(1, quantity, -3.0, -9.0, 9.0))
+        assert line.reason(Goal(1, quantity, -4.0, -9.0, 9.0)) == "limits"
+
+
+@given(
+    st.floats(-3, 3),
+    st.floats(0, 1),
+    st.sampled_from(["position", "relative"]),
+    st.floats(allow_nan=True, allow_infinity=True),
+)
+def test_whatever_passes_is_inside_near_and_was_read_lately(
+    here: float, age: float, quantity: str, value: float
+) -> None:
+    line = Line()
+    line.reads(here, 5.0)
+    line.now = 5.0 + age
+    if line.passes(Goal(1, quantity, value, -inf, inf)):
+        to = value if quantity == "position" else here + value
+        assert age <= FRESH
+        assert min(-1.0, here) - 0.004 <= to <= max(2.0, here) + 0.004
+        assert abs(to - here) <= 0.504

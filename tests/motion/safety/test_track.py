@@ -1,0 +1,137 @@
+"""A reading counts when a motor can have come there, and for as long as somebody keeps asking."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motorbus.core.family import Quality
+from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, TREMBLING, Sample, Track
+
+QUICK = st.floats(-FASTEST, FASTEST)
+
+
+def test_the_first_reading_has_nothing_to_disagree_with() -> None:
+    track = Track()
+    assert track.why_not(0.0) == "unseen"
+    assert track.take(1.0, 0.0) == Sample(1.0, 0.0, Quality.FRESH)
+    assert track.why_not(0.0) == ""
+
+
+def test_what_no_motor_can_have_done_is_suspect_and_is_not_where_it_is() -> None:
+    track = Track(speed=5.0)
+    track.take(0.0, 0.0)
+    assert track.take(1.0, 0.01).quality is Quality.SUSPECT
+    assert track.why_not(0.01) == "suspect"
+    assert track.sample == Sample(0.0, 0.0)
+    assert track.suspect == Sample(1.0, 0.01, Quality.SUSPECT)
+
+
+def test_a_second_reading_that_agrees_confirms_it() -> None:
+    track = Track(speed=5.0)
+    track.take(0.0, 0.0)
+    track.take(1.0, 0.01)
+    assert track.take(1.005, 0.02).quality is Quality.CONFIRMED
+    assert track.why_not(0.02) == ""
+    assert track.sample is not None
+    assert track.sample.value == 1.005
+
+
+def test_a_second_reading_that_agrees_with_the_ones_before_refutes_it() -> None:
+    track = Track(speed=5.0)
+    track.take(0.0, 0.0)
+    track.take(1.0, 0.01)
+    assert track.take(0.01, 0.02).quality is Quality.FRESH
+    assert (track.why_not(0.02), track.suspect) == ("", None)
+
+
+def test_two_suspect_readings_that_disagree_confirm_nothing() -> None:
+    track = Track(speed=5.0)
+    track.take(0.0, 0.0)
+    track.take(1.0, 0.01)
+    assert track.take(-1.0, 0.02).quality is Quality.SUSPECT
+    assert track.why_not(0.02) == "suspect"
+
+
+def test_two_readings_at_one_moment_are_judged_too() -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    assert track.take(1.005, 1.0).quality is Quality.FRESH
+    assert track.take(2.0, 1.0).quality is Quality.SUSPECT
+    assert track.take(2.0, 1.0).quality is Quality.CONFIRMED
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf])
+def test_what_is_no_number_is_suspect_and_confirms_nothing(value: float) -> None:
+    track = Track()
+    assert track.take(value, 0.0).quality is Quality.SUSPECT
+    assert track.take(value, 0.1).quality is Quality.SUSPECT
+    assert track.sample is None
+    assert track.take(1.0, 0.2).quality is Quality.FRESH
+
+
+def test_an_older_reading_changes_nothing() -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    assert track.take(5.0, 0.5) == Sample(1.0, 1.0, Quality.REPEATED)
+    assert track.sample == Sample(1.0, 1.0)
+
+
+def test_later_on_it_is_a_repeated_one_with_its_age() -> None:
+    track = Track()
+    assert track.latest(0.0) is None
+    track.take(1.0, 1.0)
+    assert track.latest(1.0) == Sample(1.0, 1.0)
+    later = track.latest(1.2)
+    assert later is not None
+    assert later.quality is Quality.REPEATED
+    assert later.age(1.2) == pytest.approx(0.2)
+
+
+def test_it_is_stale_after_a_while() -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    assert track.why_not(1.0 + FRESH) == ""
+    assert track.why_not(1.0 + FRESH + 1e-6) == "stale"
+
+
+def test_what_was_forgotten_is_unseen_and_may_come_back_anywhere() -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    track.forget()
+    assert track.why_not(1.0) == "unseen"
+    assert track.take(-300.0, 1.001).quality is Quality.FRESH
+
+
+@given(st.floats(-100, 100), st.lists(st.tuples(st.floats(1e-4, 1.0), QUICK), max_size=30))
+def test_nothing_that_a_motor_does_is_ever_suspect(start: float, ways: list[tuple[float, float]]) -> None:
+    track, at, place = Track(), 0.0, start
+    track.take(place, at)
+    for seconds, speed in ways:
+        at, place = at + seconds, place + speed * seconds
+        assert track.take(place, at).quality is Quality.FRESH
+
+
+@given(st.floats(0, 10), st.floats(1e-4, 1.0), st.floats(1e-3, 100), st.sampled_from([-1, 1]))
+def test_whatever_is_farther_than_physics_allows_is_suspect(
+    start: float, seconds: float, beyond: float, sign: int
+) -> None:
+    track = Track(speed=7.0)
+    track.take(start, 3.0)
+    there = start + sign * (7.0 * seconds * MARGIN + TREMBLING + beyond)
+    assert track.take(there, 3.0 + seconds).quality is Quality.SUSPECT
+    assert track.sample == Sample(start, 3.0)
+
+
+@given(st.lists(st.tuples(st.floats(1e-3, 0.3), st.floats(allow_nan=True)), max_size=30))
+def test_what_is_believed_is_always_a_number_and_was_told(readings: list[tuple[float, float]]) -> None:
+    track, at = Track(), 0.0
+    for seconds, value in readings:
+        at += seconds
+        sample = track.take(value, at)
+        assert sample.at == at
+        assert track.sample is None or abs(track.sample.value) < inf
+        assert (track.why_not(at) == "") == (sample.quality in (Quality.FRESH, Quality.CONFIRMED))
