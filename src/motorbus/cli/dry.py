@@ -83,7 +83,7 @@ class DryBus:
         self.turns = bus.turns
         self.frames: list[bytes] = []
         self._bus = bus
-        self._gate = Gate()
+        self.admit = bus.admit or Gate()
         self._written: set[int] = set()
         self._waited = 0.0
         self._read: dict[Data, Any] = {}
@@ -144,7 +144,9 @@ class DryBus:
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
-        self._gate(exchange)
+        for question in self.turns.look(exchange) if self.turns.look is not None else ():
+            self._bus.run(question)
+        self.admit(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
             self._written.add(_EVERYONE)

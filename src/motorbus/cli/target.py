@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli import faces
+from motorbus.cli.fenced import fenced
 from motorbus.cli.machine import addresses
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core.operation import Progress
@@ -115,12 +116,13 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         traced(found)
+        fenced(found, bus, output)
         for warning in found.warnings:
             output.note(f"note: {warning}")
         try:
             yield found
         except (MotorbusError, KeyboardInterrupt) as error:
-            in_words_of_the_shell(error, found.family)
+            in_words_of_the_shell(error, found.family, bus)
             raise
         finally:
             for node, counts in sorted(found.statistics.nodes.items()):

@@ -27,10 +27,10 @@ def gate_of(robot: Any, bus: str = "arm") -> Gate:
 
 def test_bounds_are_in_angles_of_the_device() -> None:
     with machine(arm="1-2", axes={"a2": DOWN}) as (made, _), Robot.of(made) as robot:
-        assert bounds(robot["a1"]) == pytest.approx(
+        assert bounds(robot["a1"].spec) == pytest.approx(
             Bounds(pi - radians(150), pi + radians(150), inf, radians(90))
         )
-        assert bounds(robot["a2"]) == pytest.approx(
+        assert bounds(robot["a2"].spec) == pytest.approx(
             Bounds(pi - radians(40), pi + radians(80), radians(8), radians(180))
         )
         assert gate_of(robot).guards.keys() == {1, 2}

@@ -6,44 +6,70 @@ write, or a group write.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from motorbus.core.operation import Runnable
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
 
 if TYPE_CHECKING:
+    from motorbus.bus.face import BusFace
     from motorbus.motion.body import Body
     from motorbus.motion.capabilities import AxisVerbs
+    from motorbus.motion.machine import AxisSpec
 
 
 def fence(body: Body) -> None:
     """Set a guard over every axis of this machine, by what is known of it by now."""
     for bus in body.buses.values():
         if isinstance(bus.admit, Gate):
-            bus.admit.watch(bus.turns.known.seen, bus.link.now)
-            bus.turns.look = bus.admit.look
+            _watched(bus, bus.admit)
     for axis in body.axes.values():
         gate = body.buses[axis.spec.bus].admit
         if isinstance(gate, Gate):
             gate.guards[axis.spec.node] = guard(axis)
 
 
+def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
+    """The same over the devices of a bus that is open by itself: these axes of a machine file are on it.
+
+    Nothing is sent. Who they are is asked when the first of them is ordered to a place.
+    """
+    if not isinstance(bus.admit, Gate):
+        return
+    _watched(bus, bus.admit)
+    for name, spec in axes.items():
+        device = bus.family.devices.blocking(bus, spec.node)
+        position = getattr(type(device), "position", None)
+        ask = None if position is None else partial(position.function, device)
+        bus.admit.guards[spec.node] = _guard(name, spec, ask)
+
+
+def _watched(bus: BusFace, gate: Gate) -> None:
+    gate.watch(bus.turns.known.seen, bus.link.now)
+    bus.turns.look = gate.look
+
+
 def guard(axis: AxisVerbs) -> Guard:
     """The guard over one axis."""
-    spec = axis.spec
+    position = axis.able.get("position")
+    return _guard(axis.name, axis.spec, None if position is None else partial(position, axis.device))
+
+
+def _guard(name: str, spec: AxisSpec, ask: Callable[[], Runnable[Any]] | None) -> Guard:
+    """A guard over a device that tells where it is when it is asked so; None: it cannot be asked."""
 
     def show(angle: float) -> str:
         return spec.show(spec.from_device(angle))
 
-    if "position" not in axis.able:
-        return Guard(axis.name, bounds(axis), measures=False, show=show)
-    return Guard(axis.name, bounds(axis), ask=lambda: axis.able["position"](axis.device), show=show)
+    return Guard(name, bounds(spec), measures=ask is not None, ask=ask, show=show)
 
 
-def bounds(axis: AxisVerbs) -> Bounds:
-    """What the machine file says of it, in angles of its device."""
-    spec = axis.spec
+def bounds(spec: AxisSpec) -> Bounds:
+    """What the machine file says of an axis, in angles of its device."""
     low, high = spec.device_limits or (-inf, inf)
     step = inf if spec.max_step is None else abs(spec.rate_to_device(spec.max_step))
     return Bounds(low, high, step, abs(spec.rate_to_device(spec.max_velocity)))

@@ -1,0 +1,45 @@
+"""The bounds of the machine file over a bus that a command was given by its address.
+
+Whoever writes a register of a device by its address means a joint of his machine all the same, where the file that
+counts for the command says that it is one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from motorbus.cli.machine import machine_file, shown
+from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from motorbus.bus.face import BusFace
+    from motorbus.cli.output import Output
+
+
+def fenced(bus: BusFace, address: str, output: Output) -> None:
+    """Set the bounds of the axes that the machine file has on this bus; nothing is sent.
+
+    A file that cannot be understood bounds nothing. That is said, and hinders nobody who works on a device.
+    """
+    file = machine_file()
+    if file.path is None:
+        return
+    try:
+        machine = file.machine
+    except RequestError:
+        output.note(f"note: {shown(file.path)} cannot be understood, so its limits bound nothing here")
+        return
+    from motorbus.motion.safety.fence import enclose
+
+    line = _line(address)
+    there = {name for name, spec in machine.buses.items() if _line(spec.address) == line}
+    if axes := {name: spec for name, spec in machine.axes.items() if spec.bus in there}:
+        enclose(bus, axes)
+
+
+def _line(address: str) -> tuple[str, str]:
+    """What tells one bus from another: its family and its port, however it is opened."""
+    from motorbus.session import parse_address
+
+    found = parse_address(address)
+    return found.family, found.port
