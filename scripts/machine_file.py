@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from motorbus.core import units
 from motorbus.motion.machine import keys, schema
-from motorbus.motion.machine.keys import Key
+from motorbus.motion.machine.keys import Key, word
 from motorbus.motion.machine.model import EXITS
 from scripts.pages import kept, listed
 
@@ -188,7 +188,7 @@ def _kind(key: Key, linear: bool) -> str:
     if key.measure:
         return key.measure.of(linear)
     if key.choices(linear):
-        return " or ".join(f"`{choice}`" for choice in key.choices(linear))
+        return " or ".join(f"`{word(choice)}`" for choice in key.choices(linear))
     return {str: "text", float: "number"}.get(key.kind, "list of names")
 
 
@@ -196,7 +196,7 @@ def _default(key: Key, linear: bool) -> str:
     if key.needed:
         return "needed"
     value = key.usual[linear] or key.default
-    return "none" if value is None else f"`{value}`"
+    return "none" if value is None else f"`{word(value)}`"
 
 
 def _exits() -> Iterator[str]:

@@ -51,4 +51,10 @@ def test_a_device_error_carries_code_and_register() -> None:
 
 def test_only_what_was_refused_before_anything_was_sent_says_by_itself_that_nothing_moved() -> None:
     said = {kind.__name__ for kind in CLASSES if kind.unmoved}
-    assert said == {"RequestError", "LimitExceeded"}
+    assert said == {"RequestError", "Refused", "LimitExceeded"}
+
+
+def test_a_refusal_says_why_in_a_word() -> None:
+    assert errors.Refused("no", reason="stale", node=3).reason == "stale"
+    assert errors.LimitExceeded("no").reason == "limits"
+    assert errors.LimitExceeded("no", reason="step").reason == "step"

@@ -17,6 +17,8 @@
     │   │   └── LimitExceeded    the goal lies outside the limits, or the limits are unknown
     │   ├── NotHomed         the reference is not known
     │   ├── Stalled          it stopped moving before it was there
+    │   ├── Faulted          its device let go by itself or has restarted: `reason`; it stays so until cleared
+    │   ├── Overloaded       it pushes too hard for too long, or is too hot: `reason`
     │   └── Interrupted      a stop or a cancellation came in between
     ├── VerificationFailed   written, read back, and different
     └── OutcomeUnknown       sent, and whether it took effect cannot be known
@@ -160,6 +162,26 @@ class NotHomed(MotionError):
 
 class Stalled(MotionError):
     """It stopped moving before it was in position."""
+
+
+class Faulted(MotionError):
+    """Its device has lost what it was told, or let go, without having been told to: `reason` is one word for programs.
+
+    "restart" (its supply dipped, or it started anew) or "let go" (its own protection, or nobody knows). From then on it
+    is at fault: nothing of it moves or gets torque until that is cleared.
+    """
+
+    def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:
+        super().__init__(summary, **parts)  # type: ignore[arg-type]
+        self.reason = reason
+
+
+class Overloaded(MotionError):
+    """Its motor pushed too hard for too long without coming to its goal, or is too hot: `reason` is "load" or "heat"."""
+
+    def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:
+        super().__init__(summary, **parts)  # type: ignore[arg-type]
+        self.reason = reason
 
 
 class Interrupted(MotionError):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ import motorbus
 from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
+from motorbus.core.operation import Data
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
@@ -91,6 +93,17 @@ class Bench(NamedTuple):
     def describe(self, extra: str) -> None:
         """Append to the file."""
         self.file.write_text(self.file.read_text(encoding="utf-8") + extra, encoding="utf-8")
+
+    def at_request(self, monkeypatch: pytest.MonkeyPatch, acts: Mapping[int, Callable[[], object]]) -> None:
+        """Just before the bus arm hears its requests of these numbers, from 1 on, these things happen."""
+        arm = self.simulations["arm"].simulator
+        receive, numbers = arm.receive, count(1)
+
+        def overheard(data: Data, at: float) -> None:
+            acts.get(next(numbers), lambda: None)()
+            receive(data, at)
+
+        monkeypatch.setattr(arm, "receive", overheard)
 
 
 POSES = """

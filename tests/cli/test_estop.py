@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import pytest
@@ -201,13 +201,70 @@ def test_without_a_name_the_machine_is_stopped(bench: Bench, run: Run) -> None:
     assert run("read", "a1", "torque_enable", "--json").document["registers"][0]["raw"] == 0
 
 
+def here(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine file that counts."""
+    monkeypatch.chdir(folder)
+    (folder / "motorbus.toml").write_text(text, encoding="utf-8")
+
+
 def test_a_broken_machine_file_keeps_nobody_from_being_stopped(
     served: Simulated, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "motorbus.toml").write_text("no machine", encoding="utf-8")
+    here("no machine", tmp_path, monkeypatch)
     with program(HANGING, served.bus):
         ran = run("estop", "--json")
-    assert ran.code == 0
-    assert "the machine file is of no help" in ran.err
+    assert ran.code == 6
+    assert ran.document["buses"][0]["acknowledged"] == [1, 2, 3]
+    assert "the file is no TOML" in ran.err
     assert torque(served.bus) == [0, 0, 0]
+
+
+@pytest.mark.parametrize("words", ["estop", "estop both", "estop arm", "estop far"])
+@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
+def test_a_line_of_the_file_that_cannot_be_understood_takes_no_bus_along(
+    held: bool, words: str, served: Simulated, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = f'[bus.arm]\naddress = "{served.bus}"\n[bus.rail]\naddress = "steper:COM7"\n'
+    text += '[axis.a1]\ndevice = "arm#1"\n[axis.far]\ndevice = "arm#999"\n[axis.slide]\ndevice = "rail#1"\n'
+    here(text + '[group.both]\naxes = ["a1",\n"slide"]\n', tmp_path, monkeypatch)
+    with motorbus.open(served.bus) as bus:
+        for node in (1, 2, 3):
+            motorbus.feetech.Servo(bus, node).enable_torque()
+    with program(HANGING, served.bus) if held else nullcontext():
+        ran = run(*words.split(), "--json")
+    assert ran.code == 6
+    acknowledged = ran.document["buses"][0]["acknowledged"]
+    assert set(acknowledged) >= ({1, 2, 3} if held else {1} if words != "estop far" else set()), ran.out
+    why = {"estop both": "slide: there is no family 'steper'", "estop": "slide: there is no family 'steper'"}
+    assert why.get(words, "far: ") in ran.err
+    assert torque(served.bus) == [0, 0, 0]
+
+
+def test_an_option_that_does_not_fit_one_bus_stops_the_others(bench: Bench, run: Run) -> None:
+    ran = run("estop", "--baud", "1M", "--json")
+    assert ran.code == 6
+    arm, can, stage = ran.document["buses"]
+    assert arm["acknowledged"] == [1, 2, 3]
+    assert "unknown option 'baud'" in can["error"]
+    assert stage["error"] == "", "it was tried after the other"
+
+
+def test_a_bus_without_an_axis_is_stopped_with_the_machine(bench: Bench, run: Run) -> None:
+    text = bench.file.read_text(encoding="utf-8")
+    bench.file.write_text(
+        text[: text.index("[axis.a1]")] + text[text.index("[axis.lift]") :], encoding="utf-8"
+    )
+    bench.file.write_text(bench.file.read_text(encoding="utf-8").partition("[group.")[0], encoding="utf-8")
+    assert run("torque", "on", f"{bench.simulations['arm'].url}#1").code == 0
+    ran = run("estop", "--json")
+    assert [one["outcome"].partition(" by ")[0] for one in ran.document["buses"]] == ["acknowledged"] * 3
+    assert bench.simulations["arm"][1].memory["torque_enable"] == 0
+
+
+def test_who_was_named_on_a_silent_bus_is_asked_before_everybody_else(bench: Bench, run: Run) -> None:
+    text = bench.file.read_text(encoding="utf-8").replace('"can#0x25"', '"can#0x26"')
+    bench.file.write_text(text, encoding="utf-8")
+    ran = run("estop", "can", "--json")
+    assert ran.code == 6
+    (stop,) = ran.document["buses"]
+    assert (stop["acknowledged"], stop["silent"]) == ([37], [38])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.cli.conftest import Bench, Run
+from tests.motion.machines import listened, said
 
 
 @pytest.mark.parametrize(
@@ -25,3 +26,40 @@ def test_a_mistyped_flag_is_told_of_as_one(words: str, told: str, bench: Bench, 
 def test_an_option_of_a_bus_is_one(bench: Bench, run: Run) -> None:
     assert run("ping", "feetech:sim#1", "--ids", "1").code == 0
     assert "fast" in run("hold", "a1", "--baud", "fast").err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "jog a1=1deg/s -5 --seconds 1",
+        "follow a1 a2 -5",
+        "replay a.csv -5",
+        "calibrate arm#1 -5",
+        "set-id arm#1 2 -5",
+        "recover arm -5",
+        "stepper home stage -5",
+    ],
+)
+def test_a_word_too_many_is_one_clear_line(words: str, bench: Bench, run: Run) -> None:
+    listened(bench.simulations)
+    ran = run(*words.split())
+    assert (ran.code, ran.out) == (2, "")
+    first, *more = ran.err.splitlines()
+    command = words.partition(" a")[0].partition(" stage")[0]
+    assert first == f"error: `motorbus {command}` has no place for '-5'"
+    assert [line.partition(":")[0] for line in more] == ["  expected", "  what to do"]
+    assert not said(bench.simulations)
+
+
+@pytest.mark.parametrize(
+    "name", ["hold", "park", "home", "teach", "move", "pose", "loop-stats", "stop", "torque"]
+)
+def test_where_any_number_of_names_may_stand_a_word_too_many_is_a_name_that_nobody_has(
+    name: str, bench: Bench, run: Run
+) -> None:
+    ran = run(
+        name, *(["on"] if name == "torque" else []), "extra", *(["--output", "w.csv"] * (name == "teach"))
+    )
+    assert (ran.code, ran.out) == (2, "")
+    assert "extra" in ran.err.splitlines()[0]
+    assert "Tokens" not in ran.err

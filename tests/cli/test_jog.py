@@ -83,10 +83,30 @@ def test_an_axis_goes_in_its_own_unit_and_inside_its_limits(run: Run, bench: Ben
 
 
 def test_a_long_way_of_an_axis_needs_agreement(run: Run, bench: Bench) -> None:
+    assert run("move", "a1=-140deg").code == 0
     ran = run("jog", "a1=90deg/s", "--seconds", "3")
-    assert (ran.code, "--yes" in ran.err) == (8, True)
+    assert (ran.code, "move a1 by 270.0 deg" in ran.err, "--yes" in ran.err) == (8, True, True)
     ran = run("jog", "lift=20mm/s", "--seconds", "6")
     assert (ran.code, "move lift by 120.00 mm" in ran.err) == (8, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["a1=90deg/s", "--seconds", "3"], 8, "the goal 247.5 deg is outside -150.0 deg to 150.0 deg"),
+        (["a1=600deg/s", "--seconds", "3"], 8, "above 90 deg/s, its limit"),
+        (["a1=0", "--seconds", "3"], 2, "is no jog"),
+        (["lift=10mm/s", "--seconds", "30"], 8, "is more than all its way"),
+    ],
+)
+@pytest.mark.parametrize("more", [[], ["--yes"], ["--dry-run"]])
+def test_nobody_is_asked_for_a_jog_that_the_limits_refuse(
+    words: list[str], code: int, told: str, more: list[str], run: Run, bench: Bench
+) -> None:
+    ran = run("jog", *words, *more)
+    assert (ran.code, ran.out) == (code, "")
+    assert told in ran.err
+    assert "--yes" not in ran.err
 
 
 def test_a_dry_run_of_an_axis_moves_nothing(run: Run, bench: Bench) -> None:

@@ -58,18 +58,8 @@ def test_a_person_sees_each_bus(bench: Bench, run: Run) -> None:
 def test_readings_that_are_lost_are_counted_and_end_with_6(
     bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arm = bench.simulations["arm"]
-    receive, heard = arm.simulator.receive, []
-
-    def interrupted(data: object, at: float) -> None:
-        heard.append(at)
-        if len(heard) == 30:
-            arm[2].unplug()
-        if len(heard) == 32:
-            arm[2].plug()
-        receive(data, at)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(arm.simulator, "receive", interrupted)
+    a2 = bench.simulations["arm"][2]
+    bench.at_request(monkeypatch, {30: a2.unplug, 32: a2.plug})
     ran = run("loop-stats", "arm", "--rate", "5", "--seconds", "8", "--json")
     assert ran.code == 6, ran.err
     assert set(ran.document["lost"]) == {"a2"}
@@ -80,16 +70,7 @@ def test_readings_that_are_lost_are_counted_and_end_with_6(
 def test_one_that_stays_silent_ends_it_with_5(
     bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arm = bench.simulations["arm"]
-    receive, heard = arm.simulator.receive, []
-
-    def interrupted(data: object, at: float) -> None:
-        heard.append(at)
-        if len(heard) == 60:
-            arm[2].unplug()
-        receive(data, at)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(arm.simulator, "receive", interrupted)
+    bench.at_request(monkeypatch, {60: bench.simulations["arm"][2].unplug})
     ran = run("loop-stats", "arm", "--rate", "50", "--seconds", "3")
     assert ran.code == 5
     assert "a2" in ran.err

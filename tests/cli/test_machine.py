@@ -60,6 +60,41 @@ def test_a_file_that_somebody_named_must_be_there(
     assert (ran.code, "gone.toml" in ran.err, "named by MOTORBUS_MACHINE" in ran.err) == (2, True, True)
 
 
+WITHOUT_IT = ("read nobody", "hold nobody", "move nobody=1", "pose nobody", "park shoulder", "stop nobody")
+
+
+@pytest.mark.parametrize(
+    "command", [*WITHOUT_IT, "replay wave.csv", "home nobody", "jog nobody=1 --seconds 1"]
+)
+def test_what_is_not_in_the_file_is_told_with_which_file_that_is_and_why(
+    command: str, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch, no_file_of_the_user: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("wave.csv").write_text("time,nobody\n0,1\n1,2\n", encoding="utf-8")
+    no_file_of_the_user.mkdir()
+    own = write(no_file_of_the_user / "motorbus.toml", 1)
+
+    def told(*words: str) -> str:
+        ran = run(*command.split(), *words)
+        assert (ran.code, ran.out) == (2, ""), ran.err
+        (note,) = (line for line in ran.err.splitlines() if line.startswith("  note: the machine file is "))
+        return note.partition(" is ")[2]
+
+    assert told() == f"{own}, your own"
+    write(tmp_path / "motorbus.toml", 2)
+    assert told() == "./motorbus.toml, found in this folder"
+    monkeypatch.setenv("MOTORBUS_MACHINE", str(write(tmp_path / "three.toml", 3)))
+    assert told() == f"{tmp_path}/three.toml, named by MOTORBUS_MACHINE"
+    assert told("--machine", "motorbus.toml") == "./motorbus.toml, named by --machine"
+
+
+def test_a_file_that_is_an_argument_of_its_own_is_not_said_to_come_from_a_flag(
+    tmp_path: Path, run: Run
+) -> None:
+    ran = run("budget", str(write(tmp_path / "two.toml", 2)), "nobody")
+    assert (ran.code, "two.toml, named by the command itself" in ran.err) == (2, True)
+
+
 @pytest.mark.parametrize("words", [["--machine"], ["--machine="], ["--machine", "--json"]])
 def test_the_flag_needs_a_file(words: list[str], run: Run) -> None:
     ran = run("ping", "shoulder", *words)

@@ -118,7 +118,7 @@ def test_a_change_is_given_up(run: Run, half: Simulation) -> None:
     half[3].unplug()
     ran = run("recover", half.url, "--yes")
     assert ran.code == 5
-    assert "`motorbus recover BUS --alone`" in ran.err
+    assert f"`motorbus recover {half.url} --alone`" in ran.err
     assert run("recover", half.url, "--forget").code == 8
     ran = run("recover", half.url, "--forget", "--yes", "-vv")
     assert (ran.code, ran.out) == (0, "simulated\nforgotten: the change of #3 to #7\n")
@@ -297,6 +297,7 @@ def test_a_journal_of_a_later_version_is_told_and_touched_by_nobody(run: Run, se
     told = run("ping", f"{served.bus}#1")
     assert told.code == 0
     assert "does not know" in told.err
+    assert f"`motorbus recover {served.bus} --forget`" in told.err
     for words in (["recover"], ["recover", served.bus], ["set-id", f"{served.bus}#1", "9", "--yes"]):
         ran = run(*words)
         assert ran.code == 2

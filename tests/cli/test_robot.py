@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import pytest
 
+import motorbus
 from motorbus.cli import robot
 from motorbus.cli.machine import using
 from motorbus.cli.output import Output
-from motorbus.core.operation import Progress
+from motorbus.core.operation import INTENT, Journal, Progress
 from motorbus.errors import MotorbusError, RequestError
 from tests.cli.conftest import Bench, Run
 
@@ -39,6 +42,21 @@ def test_what_failed_ends_as_exit_says(bench: Bench, run: Run) -> None:
     error = MotorbusError("on the way")
     assert not open_.__exit__(MotorbusError, error, None)
     assert (torque(run, "a1"), torque(run, "a2")) == (0, 1)
+
+
+def test_a_command_that_is_recommended_names_the_bus_that_is_meant(bench: Bench) -> None:
+    def hint(*axes: str) -> str:
+        error = MotorbusError("x", advice="recover() gives it back")
+        with suppress(MotorbusError), robot.robot(axes, {}, Output()):
+            raise error
+        return error.advice
+
+    assert hint("a1", "a2") == "`motorbus recover arm` gives it back"
+    assert hint("a1", "lift") == "`motorbus recover BUS` gives it back"
+    with motorbus.open(bench.simulations["stage"].url) as bus:
+        assert bus.journal is not None
+        bus.journal(Journal("jog", INTENT, {"node": 1, "what": "the borrow"}))
+    assert hint("a1", "lift") == "`motorbus recover stage` gives it back"
 
 
 def test_options_go_before_the_file_and_only_where_they_are_needed(bench: Bench) -> None:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
 
+from motorbus.cli.simulated import Simulated
 from motorbus.motion.trajectory import Trajectory
 from tests.cli.conftest import Bench, Run
+from tests.motion.machines import described
 
 HELD, LIMP = 1, 0
 
@@ -57,19 +62,53 @@ def test_without_names_it_is_all_who_can_be_taught(bench: Bench, run: Run) -> No
 def test_a_signal_ends_it_and_what_was_taught_is_kept(
     number: signal.Signals, code: int, bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arm = bench.simulations["arm"].simulator
-    receive, heard = arm.receive, []
-
-    def interrupted(data: object, at: float) -> None:
-        heard.append(at)
-        if len(heard) == 60:
-            signal.raise_signal(number)
-        receive(data, at)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(arm, "receive", interrupted)
+    bench.at_request(monkeypatch, {60: lambda: signal.raise_signal(number)})
     ran = run("teach", "arm", "--output", "wave.csv")
     assert ran.code == code, ran.err
     assert 2 < len(Trajectory.load("wave.csv").times) < 60
+
+
+def test_what_was_recorded_until_an_axis_fell_silent_is_kept(
+    bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.at_request(monkeypatch, {60: bench.simulations["arm"][2].unplug})
+    ran = run("teach", "a1", "a2", "--output", "wave.csv", "--smooth", "5")
+    assert (ran.code, ran.out) == (5, ""), ran.err
+    taught = Trajectory.load("wave.csv", bench.machine.axes)
+    assert len(taught.times) > 20
+    assert f"kept {taught.duration:.2f} s, {len(taught.times)} samples until then, in wave.csv" in ran.err
+
+
+def test_what_cannot_be_kept_is_said_beside_the_error(
+    bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = {59: Path("wave.csv").mkdir, 60: bench.simulations["arm"][2].unplug}
+    bench.at_request(monkeypatch, silent)
+    ran = run("teach", "a1", "a2", "--output", "wave.csv")
+    assert ran.code == 5, ran.err
+    assert "what was recorded is lost: wave.csv cannot be written" in ran.err
+
+
+def test_what_was_recorded_until_the_bus_died_is_kept(tmp_path: Path, state_folder: Path) -> None:
+    file, wave = tmp_path / "motorbus.toml", tmp_path / "wave.csv"
+    with Simulated("feetech", ids="1-2", link=tmp_path / "bus") as served:
+        file.write_text(described({"arm": served.bus}, "1-2", "", False, {}, {}), encoding="utf-8")
+        words = ["--machine", str(file), "teach", "arm", "--output", str(wave), "-vv"]
+        command = [sys.executable, "-m", "motorbus.cli", *words]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as teaching:
+            assert teaching.stderr is not None
+            said = takewhile(lambda line: "torque goes off now" not in line, teaching.stderr)
+            assert any("motorbus.cli" in line for line in said)
+            asked = (line for line in teaching.stderr if " tx " in line)
+            for _ in range(40):
+                next(asked)
+            served.process.kill()
+            _, told = teaching.communicate(timeout=60)
+    assert teaching.returncode == 3, told
+    samples = len(Trajectory.load(wave).times)
+    assert samples > 20
+    assert f"{samples} samples until then" in told
 
 
 def test_a_dry_run_lets_nobody_go_and_writes_nothing(bench: Bench, run: Run) -> None:

@@ -79,6 +79,24 @@ def test_what_is_said_of_one_of_several_is_worded_too(run: Run, arm: Simulation)
     assert "use `motorbus torque off`, after which it is limp" in ran.err
 
 
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [
+        ("recover() ends it", "`motorbus recover arm` ends it"),
+        ("then recover(alone=True)", "then `motorbus recover arm --alone`"),
+        ("`motorbus recover BUS --forget` gives", "`motorbus recover arm --forget` gives"),
+        ("`motorbus scan BUS` lists, BUS", "`motorbus scan arm` lists, BUS"),
+        ("set_mode('position') first", "`motorbus feetech mode BUS#ID position` first"),
+        ("`motorbus estop [BUS]`", "`motorbus estop [BUS]`"),
+    ],
+)
+def test_the_bus_of_a_command_that_is_named_is_the_one_at_hand(said: str, meant: str) -> None:
+    error = MotorbusError("x", advice=said)
+    error.add_note(said)
+    wording.in_words_of_the_shell(error, families.load("feetech"), "arm")
+    assert (error.advice, error.__notes__) == (meant, [meant])
+
+
 def test_after_an_emergency_stop_a_shell_is_told_to_begin_again() -> None:
     error = verdict.latched()
     wording.in_words_of_the_shell(error, families.load("stepper"))

@@ -31,6 +31,19 @@ def test_a_symbolic_link_that_leads_nowhere_is_recognised(tmp_path: Path) -> Non
     assert "leads to /dev/pts/no-such-one, which is gone" in str(not_found(str(tmp_path / "arm"), []))
 
 
+def test_a_port_without_a_folder_says_relative_to_what_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = not_found("ttyACM9", [])
+    assert told.cause.endswith(f"relative to the folder in which this program runs: {tmp_path}/ttyACM9")
+    assert f"{tmp_path}/there/bus" in not_found("./there/bus", []).cause
+    assert not_found("tty", []).advice.startswith("did you mean /dev/tty? ")
+    assert "did you mean" not in told.advice
+    for port in ("/dev/ttyACM9", "rfc2217://host:4001", "can://slcan/dev/ttyACM9"):
+        assert not not_found(port, []).cause
+
+
 def test_the_owner_is_named() -> None:
     error = busy("/dev/ttyACM0", Owner(1, "init"))
     assert (error.owner, error.summary) == (1, "/dev/ttyACM0 is held by process 1 (init)")

@@ -14,7 +14,7 @@ from tests.motion.machines import machine
 
 VERBS = {
     *("state", "position", "velocity", "load", "current", "voltage", "temperature"),
-    *("enable_torque", "disable_torque", "stop", "hold", "move", "move_by", "jog", "home", "run"),
+    *("enable_torque", "disable_torque", "stop", "stopped", "hold", "move", "move_by", "jog", "home", "run"),
 }
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from motorbus import PortBusy, PortNotFound, RequestError
+from motorbus.families.feetech import FAMILY
 from motorbus.motion.machine import Machine
-from motorbus.session.plan import Plan, loaded
+from motorbus.session.plan import Plan, estop_options, loaded
 from tests.motion.machines import described, machine
 
 
@@ -86,3 +87,42 @@ def test_a_file_is_loaded_with_its_addresses_checked(tmp_path: Path) -> None:
     file.write_text(described({"arm": "feetech:sim,colour=red"}, "1", "", False, {}, {}), encoding="utf-8")
     with pytest.raises(RequestError, match="motorbus.toml: .*colour"):
         loaded(file)
+
+
+def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:
+    with machine(arm="1-4", can="0x25", axes={"a2": {"estop": "hold"}, "a4": {"estop": "hold"}}) as (made, _):
+        assert estop_options(made, "arm") == {"estop_hold": "2+4"}
+        assert estop_options(made, "can") == {}
+        with Plan.of(made, "a1").open("arm", None) as bus:  # also for those that are not wanted
+            sent = [one.request for one in bus.family.stop({}).exchanges]
+            assert sent == [one.request for one in FAMILY.configured(estop_hold="2+4").stop({}).exchanges]
+
+
+def test_whom_the_address_names_is_held_too() -> None:
+    text = described({"arm": "feetech:sim,ids=1-3,estop_hold=3"}, "1", "", False, {"a1": {"estop": "hold"}}, {})
+    assert estop_options(Machine.parse(text), "arm") == {"estop_hold": "3+1"}
+
+
+def test_what_always_holds_needs_no_option() -> None:
+    with machine(arm="1", can="0x25", axes={"c1": {"estop": "hold"}, "a1": {"estop": "torque_off"}}) as (
+        made,
+        _,
+    ):
+        assert (estop_options(made, "can"), estop_options(made, "arm")) == ({}, {})
+        assert Plan.of(made).buses == ("arm", "can")
+
+
+@pytest.mark.parametrize(
+    ("axis", "estop", "says"),
+    [
+        ("c1", "torque_off", 'axis.c1.estop: an emergency stop of can#0x25 .kst. cannot be "torque_off"'),
+        ("lift", "hold", 'axis.lift.estop: an emergency stop of stage#1 .stepper. cannot be "hold"'),
+        ("lift", "torque_off", "axis.lift.estop"),
+    ],
+)
+def test_an_emergency_stop_that_a_device_does_not_have_is_refused(axis: str, estop: str, says: str) -> None:
+    with (
+        machine(arm="1", can="0x25", lift=True, axes={axis: {"estop": estop}}) as (made, _),
+        pytest.raises(RequestError, match=says),
+    ):
+        Plan.of(made)

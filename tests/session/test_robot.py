@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -207,6 +208,35 @@ def test_both_faces_have_the_same_verbs() -> None:
         "hold",
     }
     assert verbs(Robot) >= {"home", "estop", "reset", "warnings", "simulated", "close"}
+
+
+def test_whoever_wants_to_know_is_told_how_it_was_left_while_it_can_be_asked() -> None:
+    told: list[Any] = []
+    error = RuntimeError("a bug")
+    with machine(arm="1", exit="torque_off") as (made, sims):
+        robot = Robot.of(made)
+        robot.when_left = lambda leaving, ended: told.append((robot["a1"].position(), leaving.errors, ended))
+        with suppress(RuntimeError), robot:
+            robot.move({"a1": 0.2})
+            raise error
+        assert told == [(pytest.approx(0.2, abs=0.02), {}, error)]
+        assert sims["arm"][1].memory["torque_enable"] == 0
+        robot.close()
+        assert len(told) == 1
+
+
+def test_an_async_robot_tells_it_too_also_when_nothing_went_wrong() -> None:
+    async def main() -> None:
+        told: list[BaseException | None] = []
+        with machine(arm="1", exit="torque_off") as (made, sims):
+            async with AsyncRobot.of(made) as robot:
+                robot.when_left = lambda leaving, ended: told.append(ended)
+                await robot.enable_torque()
+                assert not told
+            assert told == [None]
+            assert sims["arm"][1].memory["torque_enable"] == 0
+
+    asyncio.run(main())
 
 
 def test_one_verb_moves_axes_of_all_families() -> None:

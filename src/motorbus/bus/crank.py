@@ -58,6 +58,9 @@ def push(link: Link, turns: Turns) -> None:
 
 def flush(link: Link, turns: Turns) -> float:
     """Put onto the wire whatever may go now; the caller holds the lock. Returns the time."""
+    if turns.chores:
+        for chore in tuple(turns.chores):
+            chore()
     now = link.now()
     if turns.waiting:
         drain(link, turns, now)

@@ -136,11 +136,10 @@ class Stopper:
         if acknowledged and not missing:
             return ()
         try:
-            return self._frames(missing)
+            frames = self._frames(missing)
         except Exception:  # the family's own; the frames it made before do
-            return tuple(
-                one for one in before if not one.replies or not set(_nodes(one)) <= set(acknowledged)
-            )
+            frames = before
+        return tuple(one for one in frames if not one.replies or not set(_nodes(one)) <= set(acknowledged))
 
     def _round(self, exchanges: Iterable[Exchange[Answer]], acknowledged: list[int]) -> None:
         """Send each once, and whatever can be sent once a node has said where it is."""

@@ -58,6 +58,7 @@ class Turns(Air):
         self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
         self.lock = RLock()
         self.look: Look | None = None
+        self.chores: list[Callable[[], None]] = []  # what else whoever pumps does before he sends; see `background`
         self.latched = self.stopping = False
         self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
         self._timers: list[Timer | Listener] = []
@@ -296,8 +297,7 @@ class Turns(Air):
                 self._timers.remove(timer)
                 self._settle(timer, now if isinstance(timer, Timer) else None)
 
-    def _landed(self) -> None:
-        self._grant_claim()
+    _landed = _grant_claim
 
     def _heard(self, notice: Notice) -> None:
         for ticket in list(self._timers):

@@ -45,6 +45,7 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "decode": "Explain the bytes of frames, and why a bad one is bad.",
         "budget": "Say what a control loop would load a bus with, and how fast it can be.",
         "loop-stats": "Measure how well a loop over axes keeps its rate; nothing moves.",
+        "safety": "Say what is guaranteed of a machine, and what is not; nothing is opened.",
     },
     Group("Act", sort_key=2): {
         "write": "Write registers of a device.",
@@ -105,10 +106,9 @@ def _default_shown(default: object) -> str | None:
 
 
 _COMMON: Final = re.compile(rf"--json|--verbose|-v+|{machine.FLAG}=.*")
-_MINUS: Final = "\N{MINUS SIGN}"
 _NEGATIVE: Final = re.compile(r"-[.]?[0-9].*")
 """A negative number, with a unit or without: no flag begins with a digit."""
-_BARE: Final = (int, float, "int", "float")
+_BARE: Final = (int, float, "int", "float", "float | None")
 
 _EPILOGUE = """A bus is FAMILY:PORT with options after commas, a device is BUS#ID:
 
@@ -252,10 +252,13 @@ def _machine_told(words: Sequence[str]) -> list[str]:
 def parse(app: App, words: Sequence[str]) -> tuple[Any, BoundArguments, Mapping[str, Any]]:
     """The command that these words mean, its arguments, and those that it does not take from words.
 
-    Raises CycloptsError for words that mean none.
+    Raises CycloptsError for words that mean none, RequestError for words too many.
     """
     told = _told(words, _numbers(app, words))
-    command, bound, ignored = app.parse_args(told, exit_on_error=False, print_error=False)
+    try:
+        command, bound, ignored = app.parse_args(told, exit_on_error=False, print_error=False)
+    except CycloptsError as error:
+        raise flags.surplus(error) or error from None
     bound.arguments.update({name: _as_said(value) for name, value in bound.arguments.items()})
     return command, bound, ignored
 
@@ -280,13 +283,13 @@ def _told(words: Sequence[str], numbers: set[str]) -> list[str]:
 
 def _positional(word: str) -> str:
     """-30deg is a quantity and no flag: for the parser its sign is written as a minus that begins none."""
-    return _MINUS + word[1:] if _NEGATIVE.fullmatch(word) else word
+    return flags.MINUS + word[1:] if _NEGATIVE.fullmatch(word) else word
 
 
 def _as_said(value: object) -> object:
     """What the parser made of the words, with the sign that was said."""
     if isinstance(value, str):
-        return "-" + value[1:] if value.startswith(_MINUS) else value
+        return "-" + value[1:] if value.startswith(flags.MINUS) else value
     if isinstance(value, tuple):
         return tuple(_as_said(one) for one in value)
     if isinstance(value, dict):

@@ -10,6 +10,7 @@ from motorbus.cli import bus_loads, faces
 from motorbus.cli.exits import Exit
 from motorbus.cli.machine import is_address
 from motorbus.cli.output import Output
+from motorbus.cli.rates import check_rate
 from motorbus.cli.target import said, target
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -60,7 +61,7 @@ Loop = Literal["write-read", "write", "read"]
 def budget(
     *targets: Annotated[str, Parameter(name="BUS")],
     ids: str = "",
-    rate: float = 0.0,
+    rate: float | None = None,
     loop: Loop = "write-read",
     model: str = "",
     latency: str = "0",
@@ -93,17 +94,19 @@ def budget(
     options
         Any option of the bus string, as a flag.
     """
-    thinks = units.parse(turnaround, "time")
+    if rate is not None:
+        check_rate(rate)
+    asked, thinks = rate or 0.0, units.parse(turnaround, "time")
     if len(targets) == 1 and is_address(targets[0]) and target(targets[0]).family.link.kind == "frames":
         if model:
             raise RequestError("--model: frames on CAN are the same for all of them", advice="leave it out")
         times = {"latency": units.parse(latency, "time"), "turnaround": thinks}
-        return _to_the_bit(targets[0], ids, rate, loop, times, reports, options, output)
+        return _to_the_bit(targets[0], ids, asked, loop, times, reports, options, output)
     for name, given in (("loop", loop != "write-read"), ("latency", latency != "0"), ("reports", reports)):
         if given:
             raise RequestError(f"--{name} is for a CAN bus, named by its address", advice="leave it out")
     wanted = bus_loads.wanted(targets, ids, model, options)
-    return bus_loads.shown(wanted, rate, thinks, output)
+    return bus_loads.shown(wanted, asked, thinks, output)
 
 
 def _to_the_bit(

@@ -35,7 +35,7 @@ def wanted(targets: Sequence[str], ids: str, model: str, options: Mapping[str, s
             f"{given[0]} goes with the address of a bus", advice="leave it out; nothing was sent"
         )
     of_file = bool(targets) and targets[0].endswith(".toml")
-    with using(targets[0]) if of_file else nullcontext():
+    with using(targets[0], "the command itself") if of_file else nullcontext():
         return _machine(tuple(targets[of_file:]))
 
 

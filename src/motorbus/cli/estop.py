@@ -9,20 +9,23 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.machine import axes_called, machine_file
+from motorbus.cli.machine import is_name
 from motorbus.cli.output import Output
-from motorbus.cli.rough import forgiving
-from motorbus.cli.target import everyone, gathered, opened, said, target, targets
+from motorbus.cli.rough import beside_others, forgiving, readable, together, understood
+from motorbus.cli.target import Target, everyone, opened, said, target, targets
 from motorbus.core.operation import Effect
 from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
     from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
     from motorbus.core.family import Family
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
+BY_HAND: Final = "cut the power by hand"
 
 app = App(
     name="estop",
@@ -40,7 +43,8 @@ before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
 some did, 5 when nobody did. A port that a foreign program holds cannot be
 reached: the error names that program. Without BUS, every bus that a motorbus
 process of yours holds is stopped, and those of the machine file if there is
-one. By its names, a group or an axis stops its whole buses.
+one. By its names, a group or an axis stops its whole buses. A line of the file
+that cannot be understood keeps no other bus from being stopped: exit code 6.
 
 From here KST servos must say where they are before they can be held there. On
 a bus without ids everyone is asked who is there first, and the answers are
@@ -72,12 +76,20 @@ def estop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving((bus,) if bus else ()):
-        stops = _stop_each(_wanted(bus), options, output) if bus else _stop_all(options, output)
+    with forgiving((bus,) if bus else ()) as meant:
+        wanted, unclear = _wanted((*meant.known, *meant.unclear) if bus else tuple(readable().buses))
+        unclear = {**meant.unclear, **unclear}
+        if bus and not wanted:
+            raise together(list(unclear.values()))
+        stops = (
+            _stop_each(wanted, options, output, unclear)
+            if bus
+            else _stop_all(wanted, options, output, unclear)
+        )
         output.document("motorbus.estop/1", {"buses": stops})
         for one in stops:
             output.text("\n  ".join(_lines(one)))
-        return _verdict(stops)
+        return _verdict(stops, unclear)
 
 
 class Wanted(NamedTuple):
@@ -89,15 +101,47 @@ class Wanted(NamedTuple):
     others: bool
 
 
-def _wanted(word: str) -> list[Wanted]:
-    """What a word means; by the name of a bus the devices of its axes are named, and whoever else is there is meant."""
-    called = axes_called((word,))
-    return [
-        Wanted(
-            one.bus, one.family, one.nodes or tuple(id_ for at, id_ in called if at == one.bus), not one.nodes
-        )
-        for one in targets(word)
-    ]
+def _wanted(words: Iterable[str]) -> tuple[list[Wanted], dict[str, RequestError]]:
+    """The buses that words mean, each once, and by name the errors of axes on them whose ids cannot be.
+
+    By the name of a bus the devices of its axes are named, and whoever else is there is meant. Nobody is named by a
+    word that cannot be understood, and its bus is stopped all the same where that is known.
+    """
+    found: dict[str, Wanted] = {}
+    unclear: dict[str, RequestError] = {}
+    for word in words:
+        for one in _buses_of(word):
+            axes = understood(_axes_on(word, one.bus), {})
+            unclear |= axes.unclear
+            named = one.nodes or tuple(node for axis in axes.known for node in target(axis).nodes)
+            before = found.get(one.bus, Wanted(one.bus, one.family, (), False))
+            nodes = tuple(dict.fromkeys((*before.nodes, *named)))
+            found[one.bus] = before._replace(nodes=nodes, others=before.others or not one.nodes)
+    return list(found.values()), unclear
+
+
+def _buses_of(word: str) -> list[Target]:
+    """What a word means; the bus of an axis whose id cannot be, and nothing where nobody can tell."""
+    with suppress(RequestError):
+        return targets(word)
+    machine = readable()
+    if not is_name(word) or word not in machine.axes or word in machine.buses:
+        return []
+    with suppress(RequestError):
+        return targets(machine.buses[machine.axes[word].bus].address)
+    return []
+
+
+def _axes_on(word: str, bus: str) -> tuple[str, ...]:
+    """The axes on a bus that is called by its name."""
+    if not is_name(word):
+        return ()
+    machine = readable()
+    return tuple(
+        axis
+        for axis, spec in machine.axes.items()
+        if word in machine.buses and machine.buses[spec.bus].address == bus
+    )
 
 
 def _lines(one: dict[str, Any]) -> list[str]:
@@ -135,11 +179,13 @@ def _ask(port: str) -> StopOutcome:
 def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
     """Nobody offers the stop: send it from here, then have each device that was named confirm it."""
     with opened(wanted.bus, options, output) as opening:
-        _meet(opening, wanted, output)
+        unmet = _meet(opening, wanted, output)
         outcome = opening.estop()
         confirmed, silent = set(outcome.acknowledged), set(outcome.silent)
         for node in wanted.nodes:
             (confirmed if node in confirmed or _confirms(opening, node) else silent).add(node)
+        if unmet is not None and not confirmed and not silent:
+            raise unmet
     outcome = outcome._replace(
         acknowledged=tuple(sorted(confirmed)), silent=tuple(sorted(silent - confirmed))
     )
@@ -147,14 +193,27 @@ def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> 
     return _facts(wanted.bus, "this process", outcome, note)
 
 
-def _meet(opening: Bus, wanted: Wanted, output: Output) -> None:
-    """Where a device can be stopped only at a place that is known, ask it, or everyone, where it is."""
+def _meet(opening: Bus, wanted: Wanted, output: Output) -> MotorbusError | None:
+    """Where a device can be stopped only at a place that is known, ask it, or everyone, where it is.
+
+    The error where everyone was asked and that failed: whoever is named is stopped all the same.
+    """
     needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
     if not needs or not all(needs):
-        return
+        return None
+    _ask_where(opening, wanted.nodes)
     called = faces.offer(opening.family.name, "ping_everyone")
-    found = [*wanted.nodes, *(called(opening) if called and wanted.others else ())]
-    for node in dict.fromkeys(found or everyone(wanted.bus, opening, (), output)):
+    try:
+        found = called(opening) if called and wanted.others else ()
+        found = found or (() if wanted.nodes else everyone(wanted.bus, opening, (), output))
+    except MotorbusError as error:
+        return error
+    _ask_where(opening, [node for node in dict.fromkeys(found) if node not in wanted.nodes])
+    return None
+
+
+def _ask_where(opening: Bus, nodes: Iterable[int]) -> None:
+    for node in nodes:
         for exchange in opening.family.stop({node: None}).exchanges:
             with suppress(MotorbusError):  # the stop itself will say who is silent
                 opening.run(exchange)
@@ -174,9 +233,11 @@ def _confirms(opening: Bus, node: int) -> bool:
     return bool(answers) and all(answers)
 
 
-def _stop_each(wanted: list[Wanted], options: dict[str, str], output: Output) -> list[dict[str, Any]]:
+def _stop_each(
+    wanted: list[Wanted], options: dict[str, str], output: Output, unclear: Collection[str]
+) -> list[dict[str, Any]]:
     """Several buses one after the other; one that is out of reach keeps nobody waiting."""
-    if len(wanted) == 1:
+    if len(wanted) == 1 and not unclear:
         return [_stop(wanted[0], options, output)]
     stops = []
     for one in wanted:
@@ -187,7 +248,9 @@ def _stop_each(wanted: list[Wanted], options: dict[str, str], output: Output) ->
     return stops
 
 
-def _stop_all(options: dict[str, str], output: Output) -> list[dict[str, Any]]:
+def _stop_all(
+    wanted: list[Wanted], options: dict[str, str], output: Output, unclear: Mapping[str, RequestError]
+) -> list[dict[str, Any]]:
     """Every bus that a motorbus process holds, then those of the machine file that none of them holds."""
     from motorbus.link.lock import holders, real_name
 
@@ -200,31 +263,29 @@ def _stop_all(options: dict[str, str], output: Output) -> list[dict[str, Any]]:
             stops.append(_facts(owner.port, by, _ask(owner.port)))
         except MotorbusError as error:
             stops.append(_failed(owner.port, by, error))
-    mine = [one for one in _of_machine(options, output) if one[0] not in held]
+    mine = [one for one in wanted if _port(one.bus, options) not in held]
     if not stops and not mine:
-        raise RequestError(
-            "no motorbus process holds a bus",
-            expected="BUS, as feetech:/dev/ttyACM0",
-            advice="name the bus, and it is opened and stopped from here",
-        )
-    return stops + (_stop_each([one for _, one in mine], options, output) if mine else [])
+        raise together([*unclear.values(), _nothing_to_stop()])
+    return stops + (_stop_each(mine, options, output, [*unclear, *held]) if mine else [])
 
 
-def _of_machine(options: dict[str, str], output: Output) -> list[tuple[str, Wanted]]:
-    """The buses of the machine file with the devices of its axes, each behind the name of its port."""
+def _nothing_to_stop() -> RequestError:
+    return RequestError(
+        "no motorbus process holds a bus",
+        expected="BUS, as feetech:/dev/ttyACM0",
+        advice="name the bus, and it is opened and stopped from here",
+    )
+
+
+def _port(bus: str, options: dict[str, str]) -> str:
+    """The real name of its port; "" for an address or options that cannot be, as the stop itself will say."""
     from motorbus import session
     from motorbus.link.lock import real_name
 
-    if machine_file().path is None:
-        return []
     try:
-        known = machine_file().machine
-        nodes = gathered(known.axes)
-    except MotorbusError as error:  # whoever is held must be stopped all the same
-        output.note(f"note: the machine file is of no help: {error.summary}")
-        return []
-    wanted = [Wanted(bus, target(bus).family, nodes[bus], others=True) for bus in nodes]
-    return [(real_name(session.lock_name(one.bus, said(options))), one) for one in wanted]
+        return real_name(session.lock_name(bus, said(options)))
+    except RequestError:
+        return ""
 
 
 def _failed(bus: str, by: str, error: MotorbusError) -> dict[str, Any]:
@@ -252,14 +313,17 @@ def _list(nodes: list[int], nothing: str = "none") -> str:
     return ", ".join(f"#{node}" for node in nodes) or nothing
 
 
-def _verdict(stops: list[dict[str, Any]]) -> Exit:
+def _verdict(stops: list[dict[str, Any]], unclear: Mapping[str, RequestError]) -> Exit:
+    lost = beside_others(list(unclear.values()))
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
-    if failed and len(failed) == len(stops):
-        raise MotorbusError("; ".join(failed))
     missing = [one for one in stops if not one["error"] and (one["silent"] or not one["acknowledged"])]
     silent = [f"{one['bus']}: no acknowledgement from {_list(one['silent'], 'anybody')}" for one in missing]
+    told = "; ".join([*failed, *silent, *(error.summary for error in lost)])
+    if failed and len(failed) == len(stops):
+        raise MotorbusError(told)
     if not any(one["acknowledged"] for one in stops):
-        raise NoReply("; ".join([*failed, *silent]), advice="cut the power by hand")
-    if failed or silent:
-        raise Partial("; ".join([*failed, *silent]), advice="cut the power by hand")
+        raise NoReply(told, advice=BY_HAND)
+    if told:
+        by_hand = [BY_HAND] if failed or silent else []
+        raise Partial(told, advice="; ".join(dict.fromkeys([*by_hand, *(error.advice for error in lost)])))
     return Exit.OK

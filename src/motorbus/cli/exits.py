@@ -77,6 +77,8 @@ CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.LimitExceeded: Exit.UNSAFE,
     errors.NotHomed: Exit.UNSAFE,
     errors.Stalled: Exit.FAILURE,
+    errors.Faulted: Exit.FAILURE,
+    errors.Overloaded: Exit.FAILURE,
     errors.Interrupted: Exit.CANCELLED,
     errors.VerificationFailed: Exit.VERIFICATION_FAILED,
     errors.OutcomeUnknown: Exit.FAILURE,

@@ -6,6 +6,7 @@ counts for the command says that it is one.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from motorbus.cli.machine import machine_file, shown
@@ -33,8 +34,10 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
 
     line = _line(address)
     there = {name for name, spec in machine.buses.items() if _line(spec.address) == line}
-    if axes := {name: spec for name, spec in machine.axes.items() if spec.bus in there}:
-        enclose(bus, axes)
+    for name, spec in machine.axes.items():
+        with suppress(RequestError):  # an id that no device can have bounds nobody, and keeps no other from being stopped
+            if spec.bus in there:
+                enclose(bus, {name: spec})
 
 
 def _line(address: str) -> tuple[str, str]:

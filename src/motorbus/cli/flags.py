@@ -4,12 +4,33 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from inspect import Parameter, signature
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+
+from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from motorbus.errors import RequestError
+    from cyclopts import CycloptsError
+
+MINUS: Final = "\N{MINUS SIGN}"
+"""Stands for the hyphen of a negative number while the parser looks at it, for it begins no flag."""
+
+
+def surplus(error: CycloptsError) -> RequestError | None:
+    """The error for words that a command has no place for; None for any other error of the parser."""
+    from cyclopts import UnusedCliTokensError
+
+    if not isinstance(error, UnusedCliTokensError) or not error.unused_tokens:
+        return None
+    words = " ".join(word.replace(MINUS, "-") for word in error.unused_tokens)
+    chain = " ".join(["motorbus", *(error.command_chain or ())])
+    usage = str(error.app.usage or "") if error.app is not None else ""
+    return RequestError(
+        f"`{chain}` has no place for {words!r}",
+        expected=usage.removeprefix("Usage: ").strip(),
+        advice=f"leave it out; `{chain} --help` shows how to say it; nothing was sent",
+    )
 
 
 def explain(error: RequestError, command: Callable[..., object], options: dict[str, str]) -> None:

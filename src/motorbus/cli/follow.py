@@ -11,6 +11,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.moving import consent_to_far
 from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.rates import check_rate
 from motorbus.cli.robot import place, robot
 from motorbus.cli.teach import counted
 from motorbus.core import units
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
+    from motorbus.motion.clamping import Policy
     from motorbus.motion.follow import Followed
 
 app = App(
@@ -30,9 +32,9 @@ app = App(
 followed by the first of the other, and so on. Leaders are let go, so that they
 can be led by hand: AN ARM SAGS, hold it. They stay limp. What has no torque
 switch cannot be let go, and leads only when something else moves it: that is
-told. A follower goes where
-its leader is, within its own velocity and acceleration; while its leader
-stands where it may not go, it stays.
+told. A follower goes where its leader is, within its own velocity and
+acceleration; while its leader stands where it may not go, it stays, or with
+--clamp goes as far as it may; that is told.
 
 Ends with Enter, with Ctrl-C or after --seconds; the followers brake then, and
 keep their torque. Where the two are far apart at first, the follower has a
@@ -54,6 +56,7 @@ def follow(
     *,
     seconds: str = "",
     rate: float = 100.0,
+    clamp: Flag = False,
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -71,6 +74,8 @@ def follow(
         How long, in s or as 1500ms; until Enter or Ctrl-C when left out.
     rate
         Cycles per second.
+    clamp
+        While a leader stands beyond the limits of its follower, go as far as these allow.
     yes
         Do not ask before a long way of a follower to its leader.
     options
@@ -78,8 +83,9 @@ def follow(
     """
     pairs = _pairs(leader, follower)
     span = units.parse(seconds, "time") if seconds else None
-    if not rate > 0 or (span is not None and not span > 0):
-        raise RequestError("--rate and --seconds must be above 0", advice="nothing was sent")
+    check_rate(rate)
+    if span is not None and not span > 0:
+        raise RequestError("--seconds must be above 0", advice="nothing was sent")
     with robot([*pairs, *pairs.values()], options, output) as hand:
         present = {name: at for name, at in hand.robot.positions().items() if at is not None}
         if dry_run:
@@ -90,7 +96,8 @@ def follow(
         _warn(hand, pairs)
         with hand.working("following"), asked_to_end() as ended:
             until = counted(hand, "following", ended, rate, span)
-            followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until)
+            policy: Policy = "clamp" if clamp else "reject"
+            followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until, policy=policy)
     _tell(followed, output)
     return Exit.OK
 
@@ -151,6 +158,7 @@ def _tell(followed: Followed, output: Output) -> None:
     axes, found = machine().axes, followed.statistics
     facts = [
         {"leader": one, "follower": other, "apart": followed.apart[other], "held": followed.held[other]}
+        | {"clamped": found.clamped[other]}
         for one, other in followed.pairs.items()
     ]
     loop = {"cycles": found.cycles, "overruns": found.overruns, "skipped": found.skipped}

@@ -10,7 +10,7 @@ from motorbus.cli.acting import acted
 from motorbus.cli.consent import FAR
 from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_named, is_name, machine
-from motorbus.cli.moving import FAR_LINEAR
+from motorbus.cli.moving import FAR_LINEAR, Goal, absolute, inside
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
 from motorbus.cli.robot import able, place, rehearse, robot
@@ -126,13 +126,15 @@ def _axis(
 
 def _rehearse(hand: InHand, name: str, velocity: float, span: float, *, show: bool) -> None:
     """What it would be refused for, and what would be sent. Of an axis that is led, that is made on the way only."""
-    from motorbus.motion import limits
+    from motorbus.motion.moving.jogging import way_of_jog
 
     axis = hand.robot[name]
     if "train" not in axis.able:
         rehearse(hand, [name], lambda one: one.jog(velocity, span), show=show)
         return
-    limits.check_velocity(name, axis.spec, velocity)
+    goes, _ = way_of_jog(axis, velocity, span)
+    present, goals = absolute(hand, {name: Goal(goes, way=True)})
+    inside(hand, present, goals)
     if show:
         way = axis.spec.show(velocity * span)
         facts = {"axis": name, "velocity": velocity, "seconds": span, "at_most": velocity * span}

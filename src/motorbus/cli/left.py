@@ -5,13 +5,14 @@ What `exit` does may take the torque or drive an axis away, so nothing that was 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
 
 from motorbus.errors import MotorbusError
 from motorbus.session.robot import Robot
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
@@ -25,65 +26,76 @@ NEAR_LINEAR: Final = 0.001
 """m; the same of a linear axis."""
 
 
-class ToldRobot(Robot):
-    """A robot whose error says how it was left; what takes its time is announced on `output`."""
+@contextmanager
+def opened(
+    machine: Machine, axes: Sequence[str], output: Output, *, late: float, report: Callable[[object], None]
+) -> Iterator[Robot]:
+    """A robot whose error says how it was left; what takes its time then is announced on `output`.
 
-    output: Output
-    late = 0.0
-    _concerned: Mapping[str, str] = {}
+    Its devices may be `late` (s) from the first question on. Raises as `Robot.of`.
+    """
+    ended: BaseException | None = None
+    try:
+        with (_patient(late) if late else Robot).of(machine, axes, report=report) as robot:
+            try:
+                yield robot
+            except BaseException as error:
+                ended = error
+                robot.when_left = _Told(robot, output)
+                raise
+    except KeyboardInterrupt as again:  # the second one: it tells what the first would have told
+        if ended is not None and again is not ended:
+            if isinstance(ended, MotorbusError):
+                again.add_note(f"before it: {ended}")
+            for note in getattr(ended, "__notes__", ()):
+                again.add_note(note)
+        raise
 
-    def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
-        super().__init__(machine, buses, axes)
-        for bus in buses.values():
-            bus.turns.latency = max(self.late, bus.turns.latency)
 
-    def _end(self, others: BaseException | None) -> None:
-        if others is not None and not self._shut:
-            self._concerned = {name: axis.spec.exit for name, axis in self.axes.items() if axis.engaged}
-            parked = [name for name, how in self._concerned.items() if how == "park"]
-            if parked:
-                self.output.note(f"note: parking {', '.join(parked)}; Ctrl-C stops that too")
-        try:
-            super()._end(others)
-        except KeyboardInterrupt as again:  # the second one: it tells what the first would have told
-            if others is not None and again is not others:
-                if isinstance(others, MotorbusError):
-                    again.add_note(f"before it: {others}")
-                for note in getattr(others, "__notes__", ()):
-                    again.add_note(note)
-            raise
+def _patient(late: float) -> type[Robot]:
+    class Patient(Robot):
+        def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
+            super().__init__(machine, buses, axes)
+            for bus in buses.values():
+                bus.turns.latency = max(late, bus.turns.latency)
 
-    def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
-        try:
-            super()._ended(leaving, others)
-        finally:
-            if others is not None and (self._concerned or isinstance(others, KeyboardInterrupt)):
-                told = [f"{name}: {self._left(name, leaving)}" for name in self._concerned or self.axes]
-                others.add_note("; ".join(told))
+    return Patient
+
+
+class _Told:
+    """Adds to an error how each axis was left that had been given torque or moved, in what way, and where it is."""
+
+    def __init__(self, robot: Robot, output: Output) -> None:
+        self._robot = robot
+        self._concerned = {name: axis.spec.exit for name, axis in robot.axes.items() if axis.engaged}
+        if parked := [name for name, how in self._concerned.items() if how == "park"]:
+            output.note(f"note: parking {', '.join(parked)}; Ctrl-C stops that too")
+
+    def __call__(self, leaving: Leaving, error: BaseException | None) -> None:
+        """See `RobotVerbs.when_left`."""
+        if error is not None and (self._concerned or isinstance(error, KeyboardInterrupt)):
+            told = [f"{name}: {self._left(name, leaving)}" for name in self._concerned or self._robot.axes]
+            error.add_note("; ".join(told))
 
     def _left(self, name: str, leaving: Leaving) -> str:
         """How it was left, and where: `let go at 15.4 deg`."""
         from motorbus.cli.robot import place
 
         try:
-            at = self.positions([name])[name]
+            at = self._robot.positions([name])[name]
         except (MotorbusError, KeyboardInterrupt):
             return "does not tell where it stands"
-        axis = self.axes[name]
-        where = f"at {place(self, name, at)}"
-        if name not in self._concerned or name in leaving.errors or self.buses[axis.spec.bus].turns.latched:
+        axis = self._robot.axes[name]
+        where = f"at {place(self._robot, name, at)}"
+        latched = self._robot.buses[axis.spec.bus].turns.latched
+        if name not in self._concerned or name in leaving.errors or latched:
             return where
         return f"{self._how(axis, at)} {where}"
 
-    def _how(self, axis: Any, at: float | None) -> str:
+    def _how(self, axis: Axis, at: float | None) -> str:
         how = self._concerned[axis.name]
         if how != "park":
             return {"hold": "holds", "torque_off": "let go", "leave": "left as it was, last"}[how]
         near = NEAR_LINEAR if axis.spec.linear else NEAR
         parked = at is not None and abs(at - (axis.spec.park or 0.0)) < near
         return "parked" if parked else "not parked, holds"
-
-
-def left_as_told(output: Output, late: float) -> type[ToldRobot]:
-    """`ToldRobot` with what it tells on, and how late (s) its devices may be, from its first question on."""
-    return type("ToldRobot", (ToldRobot,), {"output": output, "late": late})

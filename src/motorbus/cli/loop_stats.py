@@ -10,6 +10,7 @@ from motorbus.cli.ending import asked_to_end
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_named
 from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.rates import check_rate
 from motorbus.cli.robot import rehearse, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
@@ -51,7 +52,7 @@ USUAL: Final = 0.8
 @app.default
 def loop_stats(
     *names: Annotated[str, Parameter(name="NAME")],
-    rate: float = 0.0,
+    rate: float | None = None,
     seconds: str = "5",
     hold: Flag = False,
     dry_run: DryRun = False,
@@ -74,10 +75,10 @@ def loop_stats(
         Any option of the buses, as a flag.
     """
     axes, span = axes_named(names), units.parse(seconds, "time")
-    if not span > 0 or not rate >= 0:
-        raise RequestError(
-            "--seconds must be above 0, --rate not below 0", expected="s, and Hz", advice="nothing was sent"
-        )
+    if rate is not None:
+        check_rate(rate)
+    if not span > 0:
+        raise RequestError("--seconds must be above 0", expected="s", advice="nothing was sent")
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",
@@ -88,7 +89,7 @@ def loop_stats(
         if dry_run:
             rehearse(hand, axes, lambda axis: axis.hold())
             return Exit.OK
-        budget = hand.robot.budget(rate, axes)
+        budget = hand.robot.budget(rate or 0.0, axes)
         chosen = rate or (USUAL * budget.highest_rate if budget.buses else 1.0)
         took, without, found = _run(hand, axes, chosen, span, hold=hold)
     _tell(took, without, found, budget, output)

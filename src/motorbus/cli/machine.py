@@ -34,17 +34,18 @@ class Place(NamedTuple):
 
 
 class MachineFile:
-    """The machine file of one command. `told` is what --machine says, "" when it is not there."""
+    """The machine file of one command. `told` is what was said, `by` what said it: --machine; "" when nothing did."""
 
-    def __init__(self, told: str = "") -> None:
+    def __init__(self, told: str = "", by: str = FLAG) -> None:
         self.told = told
+        self.by = by
 
     @property
     def places(self) -> list[Place]:
         """Where it is looked for, in order."""
-        named = [(self.told, FLAG), (os.environ.get(VARIABLE, ""), VARIABLE)]
+        named = [(self.told, self.by), (os.environ.get(VARIABLE, ""), VARIABLE)]
         found = [Place(Path(path), by, True) for path, by in named if path]
-        usual = [Place(Path(FILE), "this folder", False), Place(of_user(), "your own file", False)]
+        usual = [Place(Path(FILE), "found in this folder", False), Place(of_user(), "your own", False)]
         return [*found, *usual]
 
     @cached_property
@@ -66,10 +67,16 @@ class MachineFile:
         try:
             return loaded(self.path)
         except RequestError as error:
-            by = next((place.by for place in self.places if place.told), "")
-            if by:
-                error.add_note(f"the file was named by {by}")
+            self.told_of(error)
             raise
+
+    def told_of(self, error: RequestError) -> None:
+        """Add to an error about what is in the file which file that is, and how it came to be this one."""
+        for place in self.places:
+            if place.path == self.path:
+                how = f"named by {place.by}" if place.told else place.by
+                error.add_note(f"the machine file is {shown(place.path)}, {how}")
+                return
 
     def searched(self) -> str:
         """Where a file would have been found, in words."""
@@ -80,9 +87,9 @@ _used: ContextVar[MachineFile | None] = ContextVar("machine_file", default=None)
 
 
 @contextmanager
-def using(told: str) -> Iterator[MachineFile]:
+def using(told: str, by: str = FLAG) -> Iterator[MachineFile]:
     """Within it, the file that counts for a command that was given `--machine told`, "" for none."""
-    file = MachineFile(told)
+    file = MachineFile(told, by)
     token = _used.set(file)
     try:
         yield file
@@ -227,4 +234,17 @@ def _unknown(text: str, name: str, known: Machine, *, of_bus: bool = False) -> R
     else:
         advice = nearest(name, names, "an address needs a colon: FAMILY:PORT")
     summary = f"{text!r}: {shown(file)} has no {what} {name!r}"
-    return RequestError(summary, expected=listed(names), advice=f"{advice}; nothing was sent")
+    error = RequestError(summary, expected=listed(names), advice=f"{advice}; nothing was sent")
+    machine_file().told_of(error)
+    return error
+
+
+@contextmanager
+def asked_of_the_file() -> Iterator[None]:
+    """Around a look at what is in the machine file: an error for what is not says which file that is."""
+    machine()  # what is wrong with the file as a whole says so itself
+    try:
+        yield
+    except RequestError as error:
+        machine_file().told_of(error)
+        raise

@@ -11,6 +11,7 @@ from motorbus.cli import alarms, faces, traffic
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_called, machine
 from motorbus.cli.output import Output
+from motorbus.cli.rates import check_rate
 from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
 from motorbus.core.operation import Pause
@@ -78,8 +79,9 @@ def monitor(
     options
         Any option of the bus string, as a flag.
     """
-    if not rate > 0 or count < 0 or not duration >= 0:
-        raise RequestError("--rate must be above 0, --count and --duration not below 0")
+    check_rate(rate)
+    if count < 0 or not duration >= 0:
+        raise RequestError("--count and --duration must not be below 0")
     if listen:
         return traffic.listen(devices, count, duration, options, output)
     wanted, called = gathered(devices), axes_called(devices)

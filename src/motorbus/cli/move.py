@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from cyclopts import App, Parameter
 
@@ -114,22 +114,24 @@ def move(
     if _for_axes(goals, [*bounds, *([] if wait else ["no-wait"])], [duration, speed, *assume], home):
         how = how_of(duration, kind, speed)
         return _axes(goals, how, assume, options, output, home=home, yes=yes, dry_run=dry_run)
+    asked = _Asked(bounds, wait, yes, dry_run)
     if any(_is_relative(text) for text in goals):
-        return _moved_by(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
-    return _moved_to(goals, bounds, options, output, wait=wait, yes=yes, dry_run=dry_run)
+        return _moved_by(goals, asked, options, output)
+    return _moved_to(goals, asked, options, output)
 
 
-def _moved_to(
-    texts: tuple[str, ...],
-    bounds: dict[str, float],
-    options: Mapping[str, str],
-    output: Output,
-    *,
-    wait: bool,
-    yes: bool,
-    dry_run: bool,
-) -> Exit:
+class _Asked(NamedTuple):
+    """How devices shall move: within these bounds, waited for, without a question, only shown."""
+
+    bounds: dict[str, float]
+    wait: bool
+    yes: bool
+    dry_run: bool
+
+
+def _moved_to(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str], output: Output) -> Exit:
     """Devices to positions, those of one bus in the same instant where their family can do that."""
+    bounds, wait, yes, dry_run = asked
     results = []
     for bus, wanted in _wanted(texts).items():
         with opened(bus, options, output) as opening:
@@ -246,17 +248,9 @@ def _knows_where_it_is(family: Family, text: str) -> None:
     offers(family, "move")
 
 
-def _moved_by(
-    texts: tuple[str, ...],
-    bounds: dict[str, float],
-    options: Mapping[str, str],
-    output: Output,
-    *,
-    wait: bool,
-    yes: bool,
-    dry_run: bool,
-) -> Exit:
+def _moved_by(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str], output: Output) -> Exit:
     """One device by an angle from where it stands. Raises RequestError for several, or where that is not possible."""
+    bounds, wait, yes, dry_run = asked
     if len(texts) != 1 or "acceleration" in bounds:
         raise RequestError(
             "by an angle one device goes at a time, with the acceleration that it is set to",

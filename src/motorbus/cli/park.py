@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import axes_named, machine
+from motorbus.cli.machine import asked_of_the_file, axes_named, machine
 from motorbus.cli.moving import Goal, Known, go, how_of, positions_of
 from motorbus.cli.parameters import Assume, DryRun, Duration, First, Flag, Shape, Silent, Speed
 from motorbus.cli.robot import robot
@@ -55,16 +55,18 @@ def park(
         Any option of the bus string, as a flag.
     """
     how, known = how_of(duration, kind, speed), Known(positions_of(assume), home)
-    goals = _places(axes)
+    named = axes_named(axes)
+    with asked_of_the_file():
+        goals = _places(axes, named)
     with robot(list(dict.fromkeys([*goals, *known.stands])), options, output) as hand:
         go(hand, "park", goals, how, known, yes=yes, dry_run=dry_run)
     return Exit.OK
 
 
-def _places(words: tuple[str, ...]) -> dict[str, Goal]:
+def _places(words: tuple[str, ...], axes: list[str]) -> dict[str, Goal]:
     """Where each parks. Raises RequestError for one that is named and has no place, and when none has one."""
     found: dict[str, Goal] = {}
-    for name in axes_named(words):
+    for name in axes:
         spec = machine().axes[name]
         if spec.park is not None:
             found[name] = Goal(spec.park, way=False)

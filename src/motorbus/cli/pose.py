@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import replaced
-from motorbus.cli.machine import axes_named, machine, machine_file, shown
+from motorbus.cli.machine import asked_of_the_file, axes_named, machine, machine_file, shown
 from motorbus.cli.moving import Goal, How, Known, go, how_of, positions_of
 from motorbus.cli.parameters import Assume, DryRun, Duration, First, Flag, Shape, Silent, Speed
 from motorbus.cli.robot import robot
@@ -90,7 +90,8 @@ def pose(
             expected="NAME, or --save NAME [AXIS]...",
             advice="nothing was sent",
         )
-    goals = {axis: Goal(at, way=False) for axis, at in machine().pose(names[0]).items()}
+    with asked_of_the_file():
+        goals = {axis: Goal(at, way=False) for axis, at in machine().pose(names[0]).items()}
     with robot(list(dict.fromkeys([*goals, *known.stands])), options, output) as hand:
         go(hand, "pose", goals, how, known, yes=yes, dry_run=dry_run)
     return Exit.OK

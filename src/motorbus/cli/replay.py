@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import machine
+from motorbus.cli.machine import machine, machine_file
 from motorbus.cli.moving import Goal, absolute, consent_to_far, tell
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.robot import place, robot
@@ -98,7 +98,12 @@ def replay(
 def _read(file: Path, smooth: float) -> Trajectory:
     from motorbus.motion.trajectory import Trajectory
 
-    wanted = Trajectory.load(file, machine().axes)
+    try:
+        wanted = Trajectory.load(file, machine().axes)
+    except RequestError as error:
+        if "there is no axis" in error.summary:
+            machine_file().told_of(error)
+        raise
     return wanted.smoothed(smooth) if smooth else wanted
 
 

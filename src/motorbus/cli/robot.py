@@ -6,7 +6,7 @@ left them. When it ends in any other way, each axis ends as its `exit` in the ma
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
 from msgspec import structs
@@ -17,9 +17,10 @@ from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.machine import machine
 from motorbus.cli.output import Bar
 from motorbus.cli.target import face, said, traced
-from motorbus.cli.wording import in_words_of_the_shell
+from motorbus.cli.wording import in_words_of_the_shell, shell_words
 from motorbus.core.operation import Progress
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.clamping import Clamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -52,6 +53,9 @@ class InHand:
         if isinstance(event, Progress):
             self._bar.advance(event.done, event.total, event.what)
             return
+        if isinstance(event, Clamped):
+            self.output.note(_clamped(event))
+            return
         for family in (
             {bus.family.name for bus in self.robot.buses.values()} if hasattr(self, "robot") else ()
         ):
@@ -59,6 +63,13 @@ class InHand:
             if say is not None and (text := say(event)):
                 self.output.note(f"note: {text}")
                 return
+
+
+def _clamped(event: Clamped) -> str:
+    """That an axis does not go where it was to go, and why."""
+    spec = machine().axes[event.axis]
+    why = {"limits": "its limits", "step": "max_step", "velocity": "max_velocity"}[event.reason]
+    return f"note: {event.axis} goes to {spec.show(event.given)} instead of {spec.show(event.asked)}, for {why}"
 
 
 def place(robot: Robot, name: str, at: float | None) -> str:
@@ -78,26 +89,37 @@ def robot(
 
     Raises RequestError for what is wrong with file or options, and what opening raises.
     """
-    from motorbus.cli.left import left_as_told
+    from motorbus.cli.left import opened
 
     wanted = with_options(machine(), axes, options)
     hand = InHand(output)
     try:
-        with left_as_told(output, late).of(wanted, axes, report=hand.heard) as hand.robot:
+        with opened(wanted, axes, output, late=late, report=hand.heard) as hand.robot:
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
-                output.note(f"note: {warning}")
+                output.note(f"note: {shell_words(warning, bus=warning.partition(':')[0])}")
             for bus in hand.robot.buses.values():
                 traced(bus)
             yield hand
             for axis in hand.robot.axes.values():
                 axis.engaged = False
     except (MotorbusError, KeyboardInterrupt) as error:
-        for family in {
-            address.partition(":")[0] for address in (bus.address for bus in wanted.buses.values())
-        }:
-            in_words_of_the_shell(error, families.load(family))
+        meant = _bus_meant(hand, wanted, axes)
+        for family in {bus.address.partition(":")[0] for bus in wanted.buses.values()}:
+            in_words_of_the_shell(error, families.load(family), meant)
         raise
+
+
+def _bus_meant(hand: InHand, wanted: Machine, axes: Iterable[str]) -> str:
+    """The bus that an error is about: the one where something is unfinished, or the only one; "" where nobody knows."""
+    from motorbus.session import unfinished
+
+    there = hand.robot.buses if hasattr(hand, "robot") else {}
+    cut_off: list[str] = []
+    with suppress(RequestError):  # a journal of a later version
+        cut_off += [name for name, bus in there.items() if unfinished(cast("Bus", bus)) is not None]
+    used = cut_off or list({wanted.axes[name].bus for name in axes})
+    return used[0] if len(used) == 1 else ""
 
 
 def with_options(known: Machine, axes: Sequence[str], options: Mapping[str, str]) -> Machine:

@@ -105,7 +105,7 @@ def _each(
             if isinstance(error, LinkError):
                 _cut_off(name, bus, done, rate, output)
                 raise
-            in_words_of_the_shell(error, bus.family)
+            in_words_of_the_shell(error, bus.family, name)
             errors.append(error)
         except BaseException:
             _cut_off(name, bus, done, rate, output)

@@ -8,11 +8,8 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import axes_named, machine_file
 from motorbus.cli.output import Output
-from motorbus.cli.rough import forgiving
-from motorbus.cli.target import targets
-from motorbus.errors import RequestError
+from motorbus.cli.rough import beside_others, forgiving, together
 
 app = App(
     name="stop",
@@ -58,28 +55,9 @@ def stop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving(devices):
-        wanted = devices or (tuple(axes_named(())) if machine_file().path else ())
-        known, unknown = _understood(wanted)
-        return each("stop", "stop", known, options, output, dry_run=dry_run, unknown=unknown)
-
-
-def _understood(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[RequestError]]:
-    """The words that mean a device, and the errors of the others: whoever is known is stopped all the same.
-
-    Raises RequestError when none means any.
-    """
-    errors: list[RequestError] = []
-    known: list[str] = []
-    for word in words:
-        try:
-            targets(word)
-        except RequestError as error:
-            errors.append(error)
-        else:
-            known.append(word)
-    if errors and not known:
-        raise errors[0]
-    for one in errors:
-        one.advice = one.advice.replace("nothing was sent", "the others were visited")
-    return tuple(known), errors
+    with forgiving(devices) as meant:
+        unknown = list(meant.unclear.values())
+        if unknown and not meant.known:
+            raise together(unknown)
+        others = beside_others(unknown)
+        return each("stop", "stop", meant.known, options, output, dry_run=dry_run, unknown=others)

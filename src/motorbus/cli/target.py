@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from motorbus import families
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli import faces
+from motorbus.cli.estops import with_estops
 from motorbus.cli.fenced import fenced
 from motorbus.cli.machine import addresses
-from motorbus.cli.wording import in_words_of_the_shell
+from motorbus.cli.wording import in_words_of_the_shell, shell_words
 from motorbus.core.operation import Progress
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 
@@ -112,13 +113,13 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         if say is not None and (text := say(event)):
             output.note(f"note: {text}")
 
-    with session.open(bus, report=tell, **said(options)) as found:
+    with session.open(bus, report=tell, **with_estops(bus, said(options))) as found:
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         traced(found)
         fenced(found, bus, output)
         for warning in found.warnings:
-            output.note(f"note: {warning}")
+            output.note(f"note: {shell_words(warning, found.family, bus)}")
         try:
             yield found
         except (MotorbusError, KeyboardInterrupt) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,13 +14,14 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.rates import check_rate
 from motorbus.cli.robot import place, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
@@ -34,8 +36,11 @@ off afterwards. An axis without a torque switch cannot be led by hand; with
 --no-limp nothing is switched, and whatever moves the axes is written down.
 
 Ends with Enter, with Ctrl-C or after --seconds, and writes the file then; it
-is written when the program is told to end (SIGTERM), too. A
-servo tells its position in steps, and steps are hard: let --smooth take them
+is written when the program is told to end (SIGTERM), too. When an axis falls
+silent or its port is gone, what was recorded until then is written, and the
+exit code is that of the error.
+
+A servo tells its position in steps, and steps are hard: let --smooth take them
 out, here or in `motorbus replay`.
 
 Examples:
@@ -88,7 +93,7 @@ def teach(
         if dry_run:
             return _plan(hand, axes, limp=limp)
         _judge(hand, axes, rate, named=bool(names), limp=limp)
-        with hand.working("recording"), asked_to_end(also=END) as ended:
+        with hand.working("recording"), asked_to_end(also=END) as ended, _rescued(smooth, output_):
             until = counted(hand, "recording", ended, rate, span)
             taught = hand.robot.teach(
                 axes if names else None, seconds=span, rate=rate, until=until, limp=limp
@@ -120,10 +125,9 @@ def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
     """Raise RequestError for what cannot be, before anything is let go."""
     if span is not None and not span > 0:
         raise RequestError("--seconds must be above 0", advice="nothing was sent")
-    if not rate > 0 or not smooth >= 0:
-        raise RequestError(
-            "--rate must be above 0, and --smooth not below", expected="Hz", advice="nothing was sent"
-        )
+    check_rate(rate)
+    if not smooth >= 0:
+        raise RequestError("--smooth must not be below 0", expected="Hz", advice="nothing was sent")
     check_writable(file)
 
 
@@ -164,13 +168,43 @@ def _plan(hand: InHand, axes: list[str], *, limp: bool) -> Exit:
     return Exit.OK
 
 
+@contextmanager
+def _rescued(smooth: float, file: Path) -> Iterator[None]:
+    """When it ends by an error, what was recorded until then is written all the same."""
+    try:
+        yield
+    except MotorbusError as error:
+        _rescue(error, smooth, file)
+        raise
+
+
+def _rescue(error: MotorbusError, smooth: float, file: Path) -> None:
+    """Write what was recorded before this error, and add to it what is kept."""
+    taught: Trajectory | None = error.so_far
+    if taught is None:
+        return
+    with suppress(MotorbusError):  # what cannot be smoothed is kept as it is
+        taught = taught.smoothed(smooth) if smooth else taught
+    try:
+        _write(taught, file)
+    except MotorbusError as failure:
+        error.add_note(f"what was recorded is lost: {failure.summary}")
+    else:
+        samples = len(taught.times)
+        error.add_note(f"kept {taught.duration:.2f} s, {samples} samples until then, in {file}")
+
+
+def _write(taught: Trajectory, file: Path) -> None:
+    with usable(file, "written"):
+        file.write_text(taught.text(machine().axes), encoding="utf-8")
+
+
 def _keep(taught: Trajectory, wanted: list[str], file: Path, output: Output) -> None:
     """Write it into its file, and say how far each axis went, and who of those wanted is not in it."""
-    axes = machine().axes
     if left := [name for name in wanted if name not in taught.axes]:
         output.note(f"note: not taught, for nobody can lead them by hand: {', '.join(left)}")
-    with usable(file, "written"):
-        file.write_text(taught.text(axes), encoding="utf-8")
+    _write(taught, file)
+    axes = machine().axes
     reach = {name: (min(places), max(places)) for name, places in taught.axes.items()}
     facts = [{"name": name, "low": low, "high": high} for name, (low, high) in reach.items()]
     samples = len(taught.times)

@@ -37,21 +37,25 @@ PHRASES: Final[Mapping[str, str]] = {
     "limp=False writes": "`--no-limp` writes",
 }
 """What only a program that goes on can do -> what comes to the same where the program has ended."""
+_BUS: Final = re.compile(r"(`motorbus [^`\[]*?\b)BUS(?![#\w])")
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 
-def in_words_of_the_shell(error: BaseException, family: Family | None = None) -> None:
-    """Name commands where this error and its notes name methods; what has no command stays as it is."""
+def in_words_of_the_shell(error: BaseException, family: Family | None = None, bus: str = "") -> None:
+    """Name commands where this error and its notes name methods; what has no command stays as it is.
+
+    Where those commands want a `bus`, it is this one: its address, or its name.
+    """
     for part in _PARTS if isinstance(error, MotorbusError) else ():
-        setattr(error, part, shell_words(getattr(error, part), family))
+        setattr(error, part, shell_words(getattr(error, part), family, bus))
     notes = getattr(error, "__notes__", None)
     if notes:
-        notes[:] = [shell_words(note, family) for note in notes]
+        notes[:] = [shell_words(note, family, bus) for note in notes]
 
 
-def shell_words(text: str, family: Family | None = None) -> str:
-    """A text that names methods, with commands in their place."""
+def shell_words(text: str, family: Family | None = None, bus: str = "") -> str:
+    """A text that names methods, with commands in their place, for this bus where there is one."""
     for phrase, instead in PHRASES.items():
         text = text.replace(phrase, instead)
     own = faces.offer(family.name, "COMMANDS") if family is not None else None
@@ -60,4 +64,5 @@ def shell_words(text: str, family: Family | None = None) -> str:
     def said(call: re.Match[str]) -> str:
         return words.get(call[0]) or words.get(call[1] or "", call[0]).format(call[2])
 
-    return _CALL.sub(said, text)
+    found = _CALL.sub(said, text)
+    return _BUS.sub(lambda hint: hint[1] + bus, found) if bus else found

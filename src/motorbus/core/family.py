@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
+from motorbus.core.assurance import Assurance
 from motorbus.core.entry import Table, Value
 from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Runnable
 
@@ -40,6 +41,8 @@ class LinkNeeds(NamedTuple):
     `window`    how many lanes may be in flight at once
     `only`      the id of the only device that a line of this family can have; None: there may be many
     `both_ways` a device hears while it speaks: a stop waits for no reply
+    `stops`     what an emergency stop may do to an axis, `torque_off` or `hold`, the usual first; () where that cannot
+                be said. Who has both takes a setting `estop_hold`, the ids of those that it holds
     """
 
     kind: str
@@ -50,6 +53,7 @@ class LinkNeeds(NamedTuple):
     window: int = 1
     only: int | None = None
     both_ways: bool = False
+    stops: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,19 @@ class State:
     moving: bool | None = None
     alarm: tuple[str, ...] = ()
     quality: Quality = Quality.FRESH
+
+
+class Health(NamedTuple):
+    """How a device fares, from one cheap exchange; what it does not tell is None, also in its `state`.
+
+    `torque` whether its torque is on, None where it has no switch. `blank`: what it was told to keep until power-off is
+    as power-up leaves it. `restarts` counts how often it has said that it starts anew, where it says so.
+    """
+
+    state: State
+    torque: bool | None = None
+    blank: bool | None = None
+    restarts: int | None = None
 
 
 class Positions(NamedTuple):
@@ -305,10 +322,12 @@ class Device(Protocol):
 
 
 class Devices(NamedTuple):
-    """The verb classes of a family: each is called with a bus and a node id."""
+    """The verb classes of a family: each is called with a bus and a node id. `assures`: what they give to whoever relies
+    on them; None where the family does not say."""
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]
+    assures: Assurance | None = None
 
 
 class Family(Protocol):
@@ -380,6 +399,7 @@ class Family(Protocol):
         Each is called with a device (what `devices` makes) and gives an operation, but `train`. They are
 
             state position velocity load current voltage temperature    what it tells: a `State`, else a number
+            health(device)                      how it fares, a `Health`: of a known device an exchange that can be kept
             enable_torque(device)  disable_torque(device)               without a jump; limp
             move(device, to, *, wait)  stop(device)                     to rad; decelerate and stay, gives a promise
             move_by(device, angle, *, velocity, wait)                   by rad from where it stands

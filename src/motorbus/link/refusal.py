@@ -29,12 +29,26 @@ class Owner(NamedTuple):
 def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     """There is no such port, but there are these."""
     names = [f"{info.device} ({info.guess})" if info.guess else info.device for info in others]
+    relative = os.name != "nt" and "://" not in port and not os.path.isabs(port)
+    meant = f"/dev/{port}" if relative and port.startswith("tty") and os.path.exists(f"/dev/{port}") else ""
     return PortNotFound(
         f"{port}: there is no such port",
         expected=f"one of {', '.join(names)}" if names else "a serial port; this machine has none at present",
-        cause=f"it leads to {os.readlink(port)}, which is gone" if os.path.islink(port) else "",
-        advice="is the adapter plugged in, the simulator running? `motorbus ports` lists what there is",
+        cause=_why_not(port, relative),
+        advice=(f"did you mean {meant}? " if meant else "")
+        + "is the adapter plugged in, the simulator running? `motorbus ports` lists what there is",
     )
+
+
+def _why_not(port: str, relative: bool) -> str:
+    if os.path.islink(port):
+        return f"it leads to {os.readlink(port)}, which is gone"
+    if relative:
+        where = os.path.abspath(port)
+        return (
+            f"it does not begin with /, so it is relative to the folder in which this program runs: {where}"
+        )
+    return ""
 
 
 def busy(port: str, owner: Owner | None) -> PortBusy:

@@ -9,7 +9,9 @@ from motorbus.core.verbs import Awaiting, Blocking
 from motorbus.motion import capabilities as axis
 from motorbus.motion import reckoning
 from motorbus.motion.capabilities import AxisVerbs, ability
+from motorbus.motion.moving import jogging
 from motorbus.motion.moving import verbs as moving
+from motorbus.motion.safety import standstill
 
 
 class _Verbs(AxisVerbs):
@@ -23,10 +25,11 @@ class _Verbs(AxisVerbs):
     enable_torque = ability("enable_torque", axis.enable_torque)
     disable_torque = ability("disable_torque", axis.disable_torque)
     stop = ability("stop", axis.stop)
+    stopped = ability("stop", standstill.stopped)
     hold = ability(("enable_torque", "stop"), axis.hold)
     move = ability(("train", "keep_time"), moving.move_axis)
     move_by = ability(("train", "move_by"), moving.move_by)
-    jog = ability(("train", "jog"), moving.jog)
+    jog = ability(("train", "jog"), jogging.jog)
     home = ability("home", reckoning.home)
     run = ability("run", reckoning.run)
 

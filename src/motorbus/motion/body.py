@@ -36,6 +36,11 @@ class Body:
             {name: bus.link.now() for name, bus in buses.items()} if origins is None else origins
         )
 
+    @property
+    def now(self) -> float:
+        """s since this was made: what the clock of the robot shows, by that clock of its buses which is ahead."""
+        return max((bus.link.now() - self.origins[name] for name, bus in self.buses.items()), default=0.0)
+
     def chosen(self, names: str | Iterable[str] | None = None) -> dict[str, Any]:
         """The axes that these names of axes, groups and buses stand for, each once; None: all that are open.
 

@@ -18,6 +18,9 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
+from motorbus.motion.safety import canary
+from motorbus.motion.safety.canary import Canary
+from motorbus.motion.safety.gate import blamed
 from motorbus.motion.safety.track import Track
 from motorbus.motion.several import named, names
 
@@ -44,7 +47,8 @@ def _telling(
         try:
             return (yield from function(axis, *args, **kwargs))
         except MotorbusError as error:
-            found = error if names(error, axis.name) else named(axis.name, error)
+            why = blamed(error, [axis.bus])
+            found = why if names(why, axis.name) else named(axis.name, why)
             if found is error:
                 raise
             raise found from error
@@ -110,6 +114,7 @@ class AxisVerbs:
         self.orders = 0
         self._movement: Movement | None = None
         self.track = Track()
+        self.canary = Canary()
         self.recognised(able)
 
     def recognised(self, able: Able, model: str = "") -> None:
@@ -228,7 +233,7 @@ class AxisVerbs:
             self.under_way = self.under_way and not (movement is not None and movement.stopped)
             self._movement = None
 
-    def stopped(self) -> None:
+    def accepted_stop(self) -> None:
         """It accepted a stop. Whoever moves a reckoned axis says when that has come to its end."""
         if self._movement is not None and self._moved():
             self._movement.stopped = True
@@ -255,11 +260,13 @@ def _is_moving(name: str) -> RequestError:
 def state(axis: AxisVerbs) -> Operation[State]:
     """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C.
 
-    One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that.
+    One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that. An axis
+    that has torque from here is looked at for a restart of its device, at most every `HEALTH`: see `Robot.faults`.
     """
     found, quality = yield from _judged(axis)
     if quality is Quality.SUSPECT:
         found, quality = yield from _judged(axis)
+    yield from canary.looked_after(axis, found.at)
     spec = axis.spec
     return replace(
         found,
@@ -319,8 +326,10 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
     """Torque on without a jump; the cap of the machine file, where there is one, is set before.
 
     Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits; Interrupted
-    when somebody lets it go, stops it or moves it meanwhile: then no torque comes behind that.
+    when somebody lets it go, stops it or moves it meanwhile: then no torque comes behind that; Refused while it is at
+    fault.
     """
+    canary.check(axis)
     axis.orders += 1
     command = Command([axis])
     axis.engaged = True
@@ -330,6 +339,7 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
         if (lost := command.lost()) is not None:
             raise lost from error
         raise
+    canary.armed(axis)
 
 
 def _given_torque(axis: AxisVerbs) -> Operation[None]:
@@ -359,7 +369,7 @@ def stop(axis: AxisVerbs) -> Operation[Enum]:
     axis.orders = order = axis.orders + 1
     promise: Enum = yield from axis.able["stop"](axis.device)
     if axis.orders == order:  # else it is the next movement already, which this was not said to
-        axis.stopped()
+        axis.accepted_stop()
     return promise
 
 

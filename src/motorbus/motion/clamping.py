@@ -8,7 +8,8 @@ refuses. What is no finite number is never made into one.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias
+from math import inf
+from typing import Final, Literal, NamedTuple, TypeAlias, get_args
 
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion import limits
@@ -16,16 +17,34 @@ from motorbus.motion.machine import AxisSpec
 
 Policy: TypeAlias = Literal["reject", "clamp"]
 """What becomes of a goal that goes too far."""
+SPAN: Final = 0.5
+"""s between two clamps of one axis that are told."""
 
 
 class Clamped(NamedTuple):
     """An event: this axis was `asked` for a place (rad, m) that it may not go to, and was `given` another, for that
-    `reason`: "limits", or "step" where it is too far from where it was measured to be."""
+    `reason`: "limits", "step" where it is too far from where it was measured to be, or "velocity" where it is farther
+    from the last goal than the axis may go in that time."""
 
     axis: str
     asked: float
     given: float
     reason: str
+
+
+class Tidings:
+    """Which of many clamps are told: of each axis the first, and then at most one in `SPAN` s. A loop has hundreds of
+    cycles a second, and who holds a joystick against its end has one clamp in each."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, float] = {}
+
+    def worth(self, event: Clamped, now: float) -> bool:
+        """Whether this one, at this moment (s), is to be told."""
+        if now - self._told.get(event.axis, -inf) < SPAN:
+            return False
+        self._told[event.axis] = now
+        return True
 
 
 def kept(
@@ -42,8 +61,7 @@ def kept(
     Judged is as in `limits.check_goal`. Raises LimitExceeded for what goes too far with the policy `reject`, and for
     what is no finite number with any.
     """
-    if policy not in ("reject", "clamp"):
-        raise RequestError(f"{policy!r} is no policy", expected="reject or clamp", advice="nothing was sent")
+    check_policy(policy)
     if policy == "reject":
         limits.check_goal(name, spec, goal, measured=measured, device=device)
         return goal, None
@@ -54,6 +72,12 @@ def kept(
         given, reason = _within(spec, goal, measured, device)
         return given, Clamped(name, goal, given, reason)
     return goal, None
+
+
+def check_policy(policy: object) -> None:
+    """Raise RequestError for what is no `Policy`."""
+    if policy not in get_args(Policy):
+        raise RequestError(f"{policy!r} is no policy", expected="reject or clamp", advice="nothing was sent")
 
 
 def _within(spec: AxisSpec, goal: float, measured: float | None, device: limits.Device) -> tuple[float, str]:

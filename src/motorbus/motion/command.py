@@ -193,7 +193,7 @@ class Command:
         }
         for axis in axes:
             if axis.name not in errors:
-                axis.stopped()
+                axis.accepted_stop()
         return errors
 
     def _stopped(self, axis: AxisVerbs) -> bool:

@@ -5,15 +5,17 @@ Work on one bus goes straight to it, for a control loop does so thousands of tim
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.concert import Concert
 from motorbus.bus.concert_loop import LoopConcert
+from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
+from motorbus.motion.safety.gate import blamed
 
 T = TypeVar("T")
 
@@ -28,9 +30,17 @@ class Conductor:
     def run(self, work: Abreast[T]) -> T:
         """Carry out everything, then combine.
 
-        Raises what `combine` raises. Whatever is no MotorbusError, KeyboardInterrupt included, interrupts the work on
-        every bus and is raised when all of it has cleaned up.
+        Raises what `combine` raises, and Refused for what was ended because the lease was lost. Whatever is no
+        MotorbusError, KeyboardInterrupt included, interrupts the work on every bus and is raised when all of it has
+        cleaned up.
         """
+        try:
+            return self._run(work)
+        except MotorbusError as error:
+            _raise_blamed(error, self._buses.values())
+            raise
+
+    def _run(self, work: Abreast[T]) -> T:
         operations = work.operations
         if len(operations) != 1:
             return work.combine(self._concert.run(operations))
@@ -51,6 +61,13 @@ class LoopConductor:
 
     async def run(self, work: Abreast[T]) -> T:
         """As `Conductor.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
+        try:
+            return await self._run(work)
+        except MotorbusError as error:
+            _raise_blamed(error, self._buses.values())
+            raise
+
+    async def _run(self, work: Abreast[T]) -> T:
         operations = work.operations
         if len(operations) != 1:
             return work.combine(await self._concert.run(operations))
@@ -60,3 +77,10 @@ class LoopConductor:
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
+
+
+def _raise_blamed(error: MotorbusError, buses: Iterable[BusFace]) -> None:
+    """Raise what it was ended by, where that is the loss of the lease."""
+    why = blamed(error, buses)
+    if why is not error:
+        raise why from error

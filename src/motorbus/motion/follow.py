@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+from motorbus.core.family import Quality
 from motorbus.errors import RequestError
 from motorbus.motion import group
 from motorbus.motion.body import Body
+from motorbus.motion.clamping import Policy, check_policy
 from motorbus.motion.loop.faces import Errand, LoopFace
 from motorbus.motion.loop.grid import ROUNDING, Statistics
 from motorbus.motion.loop.readings import LoopState
@@ -28,9 +30,9 @@ class Followed:
     `pairs`       who followed whom: follower by leader
     `seconds`     that it lasted
     `apart`       how far (rad, m) each follower was from its leader in the end, by the name of the follower
-    `held`        cycles in which a follower got no new goal, because its leader was not heard or stood where the
-                  follower may not go, by its name
-    `statistics`  of the loop
+    `held`        cycles in which a follower got no new goal, because its leader was not heard, could not be believed
+                  or stood where the follower may not go, by its name
+    `statistics`  of the loop; with the policy `clamp` it has how often a leader stood where its follower may not go
     """
 
     pairs: Mapping[str, str]
@@ -53,47 +55,51 @@ def follow(
     rate: float = 100.0,
     until: Callable[[], bool] | None = None,
     jerk: float | None = None,
+    policy: Policy = "reject",
 ) -> Errand[Followed]:
     """Have axes follow others: `{leader: follower}`, on whatever buses, in a loop of `rate` (Hz).
 
     Leaders that have a switch for their torque are let go first. A follower goes to the position of its leader, rad for
     rad or m for m, within its own limits, with a `jerk` (rad/s³, m/s³) also within that. While its leader is not heard,
-    or stands where the follower may not go, it gets no new goal and stays at the last one.
+    or stands where the follower may not go, it gets no new goal and stays at the last one. With the policy `clamp` it
+    goes as far as it may then, and that is told (`Clamped`).
 
     It ends after `seconds`, or when `until`, which is asked in each cycle, gives True; followers that are on their way
     brake then. Without either, Ctrl-C ends it and what became of it is given. Raises RequestError for pairs that cannot
     be, and what a `Loop` raises.
     """
     wanted = dict(pairs)
+    check_policy(policy)
     _check(body, wanted)
     check_seconds(seconds)
     limp = [name for name in wanted if "disable_torque" in body.axes[name].able]
     return Errand(
-        _Following(wanted, rate, seconds, until),
+        _Following(wanted, Ending(rate, seconds, until), policy == "clamp"),
         rate,
         (*wanted, *wanted.values()),
         before=group.disable_torque(body, limp) if limp else None,
         jerk=jerk,
         endless=seconds is None and until is None,
+        policy=policy,
     )
 
 
 class _Following:
-    def __init__(
-        self, pairs: Mapping[str, str], rate: float, seconds: float | None, until: Callable[[], bool] | None
-    ) -> None:
+    def __init__(self, pairs: Mapping[str, str], over: Ending, clamps: bool) -> None:
         self._pairs = pairs
-        self._over = Ending(rate, seconds, until)
+        self._over = over
+        self._clamps = clamps
         self._apart = dict.fromkeys(pairs.values(), 0.0)
         self._held = dict.fromkeys(pairs.values(), 0)
 
     def step(self, loop: LoopFace, state: LoopState) -> bool:
         """See `loop.Course`."""
-        position, missing = state.position, state.missing
+        position, missing, doubts = state.position, state.missing, state.doubts
         for leader, follower in self._pairs.items():
             here = position[leader]
             self._apart[follower] = position[follower] - here
-            if leader in missing or not loop.allows(follower, here):
+            unheard = leader in missing or doubts.get(leader) is Quality.SUSPECT
+            if unheard or not (self._clamps or loop.allows(follower, here)):
                 self._held[follower] += 1
             else:
                 loop.goal[follower] = here

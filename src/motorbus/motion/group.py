@@ -6,19 +6,21 @@ and names all whom it befell.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from functools import partial
 from typing import Any, TypeAlias
 
 from motorbus.core.family import State
 from motorbus.core.operation import Operation
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import capabilities as one
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.safety import standstill
+from motorbus.motion.safety.standstill import Stopped
 from motorbus.motion.several import Act, Told, everyone, insisted, of_each, raised
 
 Names: TypeAlias = "str | Iterable[str] | None"
@@ -64,6 +66,24 @@ def stop(body: Body, names: Names = None) -> Abreast[dict[str, Enum]]:
     An interruption, and what one of them raised, is raised when all were visited.
     """
     return _each(body, body.chosen(names), one.stop, dict, insisted)
+
+
+def stopped(
+    body: Body, names: Names = None, *, patience: float = standstill.PATIENCE
+) -> Abreast[dict[str, Stopped]]:
+    """As `stop`, then look whether they rest, for at most `patience` s; gives what was promised and what was seen.
+
+    Everyone is stopped before anybody is looked at. That one was not seen to rest is no error: see `Stopped.rest`. An
+    interruption ends the looking.
+    """
+    return _each(body, body.chosen(names), one.stop, dict, partial(_looked_at, patience=patience))
+
+
+def _looked_at(axes: Sequence[AxisVerbs], act: Act[Enum], patience: float) -> Operation[Told]:
+    told = yield from insisted(axes, act)
+    heard = [axis for axis in axes if not isinstance(told[axis.name], MotorbusError)]
+    looked = yield from everyone(heard, lambda axis: standstill.seen(axis, told[axis.name], patience))
+    return {**told, **looked}
 
 
 def hold(body: Body, names: Names = None) -> Abreast[None]:

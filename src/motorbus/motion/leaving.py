@@ -13,12 +13,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from motorbus.core.operation import Operation
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
 from motorbus.motion import capabilities as one
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.moving.verbs import park
+from motorbus.motion.safety.gate import Gate
 from motorbus.motion.several import Act, errors_of, gathered, insisted, of_each
 
 TRIES: Final = 3
@@ -37,7 +39,9 @@ class Leaving:
         self.said: list[str] = []
         self._body = body
         self._axes = {
-            name: axis for name, axis in body.axes.items() if axis.engaged and axis.spec.exit != "leave"
+            name: axis
+            for name, axis in body.axes.items()
+            if (axis.engaged or goes_on(axis)) and axis.spec.exit != "leave"
         }
         self._visited: set[tuple[str, str]] = set()
         self._tries: dict[str, int] = {}
@@ -78,7 +82,7 @@ class Leaving:
 
     def _to_stop(self) -> list[str]:
         """Those under way. After an emergency stop nothing moves, and a goal would be refused."""
-        moving = [name for name, axis in self._axes.items() if axis.under_way]
+        moving = [name for name, axis in self._axes.items() if axis.under_way or goes_on(axis)]
         latched = [name for name in moving if self._latched(name)]
         if latched and not self._tries:
             self.said.append(
@@ -150,6 +154,8 @@ class Leaving:
             axis = self._axes[name]
             if self._latched(name):
                 self.said.append(f"{name}: not parked, for the emergency stop is still in force")
+            elif _lost(axis):
+                self.said.append(f"{name}: not parked, for the lease of the machine was lost")
             elif name not in self.errors and self._known(axis):
                 able.append(name)
         return [able] if able else []
@@ -163,3 +169,35 @@ class Leaving:
             self.errors[axis.name] = error
             return False
         return True
+
+
+# -- without its holder --------------------------------------------------------------------------------------------------
+
+
+def given_up(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
+    """The axes of one bus when the lease is lost: what moves is stopped, then what is to be limp lets go.
+
+    What moves is stopped whatever its `exit` says, `leave` included: nobody is there any more. Nothing is parked, for
+    that would be a movement; who would be parked stays where it stops. After an emergency stop nothing is to be done.
+    Gives the errors by name; every axis is visited.
+    """
+    there = [axis for axis in axes if not axis.bus.turns.latched]
+    told = yield from insisted([axis for axis in there if axis.under_way or goes_on(axis)], one.stop)
+    limp = [axis for axis in there if axis.engaged and axis.spec.exit == "torque_off"]
+    return errors_of(told) | errors_of((yield from insisted(limp, one.disable_torque)))
+
+
+def stopped_going_on(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
+    """Those axes of one bus that were told to go on without an end are told to stop. Gives the errors by name."""
+    return errors_of((yield from insisted([axis for axis in axes if goes_on(axis)], one.stop)))
+
+
+def goes_on(axis: AxisVerbs) -> bool:
+    """Whether it was told to go on without an end, by whatever spelling, and nothing else since."""
+    gate = axis.bus.admit
+    return isinstance(gate, Gate) and gate.goes_on(axis.spec.node)
+
+
+def _lost(axis: AxisVerbs) -> bool:
+    gate = axis.bus.admit
+    return isinstance(gate, Gate) and gate.loss() is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 
-from motorbus.errors import MotionError, RequestError
+from motorbus.errors import MotionError, MotorbusError, RequestError
 from motorbus.motion import group
 from motorbus.motion.body import Body
 from motorbus.motion.budget import divided
@@ -37,16 +37,19 @@ def teach(
     It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it
     and what was taught is given. With as many samples as a trajectory can have (`MOST`) it ends too, and the log says
     so. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or
-    whose device cannot be asked in a loop; MotionError for less than two samples; and what a `Loop` raises.
+    whose device cannot be asked in a loop; MotionError for less than two samples; and what a `Loop` raises, as when an
+    axis falls silent or a port is gone: the trajectory until then is `so_far` of that error.
     """
     check_seconds(seconds)
     axes = _taught(body, names, limp)
+    teaching = _Teaching(rate, seconds, until)
     return Errand(
-        _Teaching(rate, seconds, until),
+        teaching,
         rate,
         axes,
         before=group.disable_torque(body, axes) if limp else None,
         endless=seconds is None and until is None,
+        failed=teaching.failed,
     )
 
 
@@ -71,12 +74,14 @@ def _taught(body: Body, names: str | Iterable[str] | None, limp: bool) -> tuple[
 class _Teaching:
     def __init__(self, rate: float, seconds: float | None, until: Callable[[], bool] | None) -> None:
         self._over = Ending(rate, seconds, until)
+        self._axes: tuple[str, ...] = ()
         self._times: list[float] = []
         self._rows: list[tuple[float, ...]] = []
 
     def step(self, loop: LoopFace, state: LoopState) -> bool:
         """See `loop.Course`."""
         if not state.missing:
+            self._axes = loop.axes
             self._times.append(state.at)
             self._rows.append(tuple(state.position.values()))
         if self._over(state.number):
@@ -96,6 +101,14 @@ class _Teaching:
                 expected="two cycles or more in which every axis was heard",
                 advice="teach longer, at a higher rate, or see why an axis is silent; the axes stay as they are",
             )
+        return self._seen()
+
+    def failed(self, error: MotorbusError) -> None:
+        """See `loop.Errand`: what was taught goes along with what ended it."""
+        if len(self._rows) >= 2:
+            error.so_far = self._seen()
+
+    def _seen(self) -> Trajectory:
         times = [at - self._times[0] for at in self._times]
         columns = zip(*self._rows, strict=True)
-        return Trajectory(times, dict(zip(loop.axes, columns, strict=True)))
+        return Trajectory(times, dict(zip(self._axes, columns, strict=True)))

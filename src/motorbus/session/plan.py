@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from os import PathLike
 from typing import NamedTuple, Self
 
+from motorbus import families
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import shown
@@ -15,6 +16,7 @@ from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
 from motorbus.motion.several import named
+from motorbus.session.address import parse_address
 from motorbus.session.buses import AnyBus, open, open_async
 from motorbus.session.opening import lock_name, prepare
 
@@ -31,7 +33,7 @@ class Plan(NamedTuple):
         """What these axes, groups and buses of a machine need; None: all of its axes.
 
         Raises RequestError for a name that it does not have, a machine that does not fit together, an address that
-        cannot be, and two buses on one port.
+        cannot be, two buses on one port, and an emergency stop that a device does not have.
         """
         if not isinstance(machine, Machine):
             raise RequestError(
@@ -45,19 +47,21 @@ class Plan(NamedTuple):
             raise RequestError("the machine has no axis", expected="a file with [axis.NAME]")
         buses = tuple(dict.fromkeys(machine.axes[name].bus for name in names))
         _check_ports(machine, buses)
+        _check_estops(machine, buses)
         return cls(machine, names, buses)
 
     def open(self, name: str, report: Callable[[object], None] | None) -> Bus:
         """Open one of the buses. Raises as `motorbus.open`, naming the bus."""
         try:
-            return open(self.machine.buses[name].address, report=report)
+            return open(self.machine.buses[name].address, report=report, **estop_options(self.machine, name))
         except MotorbusError as error:
             raise named(f"bus.{name}", error) from error
 
     def open_async(self, name: str, report: Callable[[object], None] | None) -> AsyncBus:
         """The same for asyncio."""
         try:
-            return open_async(self.machine.buses[name].address, report=report)
+            options = estop_options(self.machine, name)
+            return open_async(self.machine.buses[name].address, report=report, **options)
         except MotorbusError as error:
             raise named(f"bus.{name}", error) from error
 
@@ -84,6 +88,38 @@ class Plan(NamedTuple):
 def loaded(path: str | PathLike[str]) -> Machine:
     """The machine of a file, with every address in it checked. Raises RequestError as `Machine.load`."""
     return Machine.load(path, check_address=lambda address: prepare(address, {}))
+
+
+def estop_options(machine: Machine, bus: str) -> dict[str, object]:
+    """The options with which this bus of a machine is opened, so that its emergency stop does as `estop` says.
+
+    All axes of the file count, also those that are not wanted, and whom the address itself names as well.
+    """
+    address = parse_address(machine.buses[bus].address)
+    held = [str(axis.node) for axis in machine.axes.values() if (axis.bus, axis.estop) == (bus, "hold")]
+    if not held or "hold" not in families.load(address.family).link.stops[1:]:
+        return {}
+    said = address.options.get("estop_hold")
+    return {"estop_hold": "+".join([*([said] if said else []), *held])}
+
+
+def _check_estops(machine: Machine, buses: Iterable[str]) -> None:
+    """Raise RequestError for an axis whose device an emergency stop cannot stop as the file says."""
+    for bus in buses:
+        family = families.load(parse_address(machine.buses[bus].address).family)
+        for name, axis in machine.axes.items():
+            if axis.bus == bus and axis.estop is not None and axis.estop not in family.link.stops:
+                raise _no_such_stop(name, axis, family.name, family.link.stops)
+
+
+def _no_such_stop(name: str, axis: AxisSpec, family: str, stops: Iterable[str]) -> RequestError:
+    return RequestError(
+        f'axis.{name}.estop: an emergency stop of {axis.device} ({family}) cannot be "{axis.estop}"',
+        expected=" or ".join(f'"{one}"' for one in stops) or "no such key: it has one kind of stop",
+        cause="its protocol has no order for that",
+        advice="take estop out of the file; nothing was opened",
+        node=axis.node,
+    )
 
 
 def _chosen(machine: Machine, names: str | Iterable[str]) -> tuple[str, ...]:

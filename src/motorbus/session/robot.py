@@ -8,7 +8,8 @@
         await robot.positions()
 
 Loading reads, and writes nothing to any device. When it is closed, however that comes, each axis that was moved from
-here does what the file says: `hold`, `torque_off`, `park` or `leave`.
+here does what the file says: `hold`, `torque_off`, `park` or `leave`. That is so at the normal end, on an exception, on
+Ctrl-C, and in the main thread on SIGTERM and SIGHUP, unless the program has a handler of its own (see `signals`).
 """
 
 from __future__ import annotations
@@ -37,8 +38,11 @@ from motorbus.motion.moving import verbs as moving
 from motorbus.motion.recognition import recognise
 from motorbus.motion.safety.fence import fence
 from motorbus.motion.teach import teach
+from motorbus.session.attended import Leased, awaiting_attended, blocking_attended
 from motorbus.session.buses import LOG
+from motorbus.session.faults import clear, distrust, faults
 from motorbus.session.plan import Plan, loaded
+from motorbus.session.signals import Cancelling, Signals, ended
 from motorbus.session.stopping import estop, reset
 
 Notify = Callable[[object], None]
@@ -49,7 +53,7 @@ NOT_OPEN: Final = "not open: use `async with`"
 CLOSED: Final = "closed: load it again"
 
 
-class RobotVerbs(Body):
+class RobotVerbs(Leased):
     """What a robot can do, blocking or async. `names` are names of axes, groups and buses; None means every axis."""
 
     positions = together(group.positions)
@@ -57,6 +61,7 @@ class RobotVerbs(Body):
     enable_torque = together(group.enable_torque)
     disable_torque = together(group.disable_torque)
     stop = together(group.stop)
+    stopped = together(group.stopped)
     hold = together(group.hold)
     home = together(group.home)
     move = together(moving.move)
@@ -98,6 +103,21 @@ class RobotVerbs(Body):
         """What the user ought to know of its buses, as a guarded change that was cut off, and of how it was left."""
         buses = (f"{name}: {text}" for name, bus in self.buses.items() for text in bus.warnings)
         return (*buses, *self._said)
+
+    @property
+    def faults(self) -> dict[str, str]:
+        """Why each axis that is at fault is so, by its name: its device has restarted, or has let go by itself, or a
+        guarded change of it was cut off. Such an axis is not moved and gets no torque; stop and torque off always go.
+        """
+        return faults(self)
+
+    def clear_fault(self, names: Names = None) -> None:
+        """Somebody has seen to these axes: they may be given torque and moved again. None: all that are at fault.
+
+        Nothing is sent. Raises RequestError for a name that there is not; Refused, and none is cleared, for one whose
+        guarded change is unfinished still: `motorbus recover` ends that.
+        """
+        clear(self, names)
 
     def estop(self) -> dict[str, StopOutcome]:
         """Emergency stop on every bus at the same time; see `motorbus.bus.face.BusFace.estop`. From any thread.
@@ -142,6 +162,7 @@ class Robot(RobotVerbs, Led):
 
     axes: Mapping[str, Axis]
     loop = blocking_loop
+    attended = blocking_attended
 
     def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
         super().__init__(machine, buses, axes)
@@ -149,6 +170,7 @@ class Robot(RobotVerbs, Led):
         self._ports = tuple(buses.values())
         self._exits = ExitStack()
         self._leaving: Leaving | None = None
+        self._signals = Signals(ended)
 
     @classmethod
     def load(
@@ -175,6 +197,7 @@ class Robot(RobotVerbs, Led):
             robot = cls(machine, buses, plan.blocking(buses))
             robot.conductor.run(recognise(robot))
             fence(robot)
+            distrust(robot)
             robot._exits = stack.pop_all()
         return robot
 
@@ -192,6 +215,7 @@ class Robot(RobotVerbs, Led):
 
     def __enter__(self) -> Self:
         self._refuse_shut()
+        self._signals.take()
         return self
 
     def __exit__(
@@ -204,6 +228,7 @@ class Robot(RobotVerbs, Led):
             return
         first: BaseException | None = None
         try:
+            self._lay_down()
             first = self._leave()
             if self._leaving is not None:
                 self._ended(self._leaving, others or first)
@@ -215,6 +240,8 @@ class Robot(RobotVerbs, Led):
                 for bus in self._ports:
                     bus.close()
                 self._shut = CLOSED
+                self._retire()
+                self._signals.give_back()
         if first is not None:
             raise first
 
@@ -244,6 +271,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
 
     axes: Mapping[str, AsyncAxis]
     loop = awaiting_loop
+    attended = awaiting_attended
     _shut = NOT_OPEN
 
     def __init__(self, plan: Plan, report: Notify | None = None) -> None:
@@ -277,10 +305,15 @@ class AsyncRobot(RobotVerbs, LedAsync):
             conductor = LoopConductor(buses, body.origins)
             await conductor.run(recognise(body))
             fence(body)
+            distrust(body)
             Body.__init__(self, body.machine, buses, body.axes, body.origins)
             self.conductor = conductor
             self._exits = stack.pop_all()
         self._shut = ""
+        self.lease = self._lease
+        self._cancelling = Cancelling()
+        self._signals = Signals(self._cancelling)
+        self._signals.take()
         return self
 
     def __getitem__(self, name: str) -> AsyncAxis:
@@ -301,6 +334,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
         if self._shut or self._ending:
             return
         self._ending = True
+        self._lay_down()
         try:
             async with self._exits:
                 leaving = Leaving(self)
@@ -310,6 +344,9 @@ class AsyncRobot(RobotVerbs, LedAsync):
                     raise interruption
         finally:
             self._ending, self._shut = False, NOT_OPEN
+            self._retire()
+            self._signals.give_back()
+            self._cancelling.check()
 
     async def _leave(self, leaving: Leaving) -> BaseException | None:
         """Carry out all of it; the first cancellation that came meanwhile."""

@@ -40,4 +40,4 @@ def test_nobody_at_all_is_silence_with_cause_and_advice(run: Run, arm: Simulatio
     ran = run("feetech", "duplicates", f"{arm.url}#9")
     assert (ran.code, ran.out) == (5, "")
     assert "likely cause: no such id on this bus" in ran.err
-    assert "`motorbus scan BUS` lists who answers" in ran.err
+    assert f"`motorbus scan {arm.url}` lists who answers" in ran.err

@@ -73,12 +73,14 @@ def test_what_may_turn_refuses_until_its_time_is_over() -> None:
     node = Node()
     looks(refuse_unless_idle(node, "jog()"), 5.0)
     node.memory.turning = 5.1
-    with pytest.raises(RequestError, match="a move may not be over, so jog\\(\\) is refused"):
+    with pytest.raises(RequestError, match="a move may not be over, so jog\\(\\) is refused") as told:
         looks(refuse_unless_idle(node, "jog()"), 5.0)
+    assert told.value.advice == "wait 0.1 s more, or say stop() first; nothing was sent"
     looks(refuse_unless_idle(node, "jog()"), 5.1)
     node.memory.owed = True
-    with pytest.raises(RequestError, match="may still run, so jog\\(\\) is refused"):
+    with pytest.raises(RequestError, match="may still run, so jog\\(\\) is refused") as told:
         looks(refuse_unless_idle(node, "jog()"), 1e6)
+    assert "a project that runs until it is stopped has none" in told.value.advice, "it may be waited for in vain"
 
 
 def test_the_slowest_reading_counts_for_slowing_down_too() -> None:

@@ -13,7 +13,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import Interrupted, LimitExceeded, LinkError, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
-from motorbus.motion.loop.rounds import PATIENCE
+from motorbus.motion.loop.readings import PATIENCE
 from motorbus.session.robot import Robot
 from tests.motion.machines import Heard, machine
 

@@ -46,6 +46,7 @@ high = "2 rad"
 exit = "park"
 park = "0 deg"
 current = "0.4 A"
+guard = false
 
 [axis.slide]
 device = "gimbal#0x25"
@@ -138,6 +139,8 @@ BROKEN = (
     Broken('"120 deg/s"', '"-120 deg/s"', "axis.shoulder.max_velocity: '-120 deg/s' is out", "above 0"),
     Broken('"500 deg/s2"', "0", "axis.shoulder.max_acceleration: 0 is out of range", "above 0"),
     Broken('exit = "hold"', 'exit = "torque-off"', "axis.shoulder.exit: 'torque-off' is", "did you mean torque_off?"),
+    Broken("guard = false", 'guard = "no"', "axis.elbow.guard: 'no' is not possible", "true"),
+    Broken("guard = false", "guard = 0", "axis.elbow.guard: 0 is not possible", "write it as guard = false"),
     Broken("torque = 0.5", "torque = 50", "axis.shoulder.torque: 50 is out of range", 'write "50 %"'),
     Broken('"0.4 A"', '"0.4 V"', "axis.elbow.current: current '0.4 V' has the unit", "A, mA"),
     Broken('"0.4 A"', "[0.4]", "axis.elbow.current: a list is no current", "a finite number in A"),
@@ -194,6 +197,7 @@ def axes(draw: st.DrawFn, device: str = "arm#1") -> AxisSpec:
         max_acceleration=draw(st.floats(1e-3, 1e3)),
         max_step=draw(st.none() | st.floats(1e-3, 1e3)),
         exit=exit_,
+        guard=draw(st.booleans()),
         park=draw(inside) if exit_ == "park" else None,
         **limits,
         **draw(st.sampled_from(caps)),

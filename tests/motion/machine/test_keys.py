@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.core import units
 from motorbus.motion.machine import AxisSpec, keys
-from motorbus.motion.machine.keys import AXIS, Key, api_unit
+from motorbus.motion.machine.keys import AXIS, Key, api_unit, word
 from motorbus.motion.machine.model import LOAD, POSITION
 from motorbus.motion.machine.reading import read
 
@@ -58,6 +58,8 @@ def test_choices_and_ranges_in_words() -> None:
     assert AXIS["unit"].choices(True) == ("mm", "m")
     assert AXIS["unit"].choices(False) == ("deg", "rad", "turn")
     assert AXIS["exit"].choices(False) == ("hold", "torque_off", "park", "leave")
+    assert AXIS["guard"].choices(False) == (True, False)
+    assert [word(one) for one in (True, "hold", -1)] == ["true", "hold", "-1"]
     assert AXIS["gear"].choices(False) == ()
     assert AXIS["torque"].range(False) == "above 0, at most 1"
     assert AXIS["low"].range(True) == "-1000000 to 1000000 m"

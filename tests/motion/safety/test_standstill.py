@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
+import pkgutil
+from collections.abc import Callable
 from enum import Enum
+from importlib import import_module
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus import families
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Data, Operation
+from motorbus.errors import MotorbusError
+from motorbus.link.base import Delivery, Side
 from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
 from motorbus.motion.safety.track import Sample
-from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from motorbus.session.robot import AsyncRobot, Robot
+from tests.motion.machines import Heard, listened, machine, said
 
 
 class Promise(Enum):
@@ -122,3 +129,93 @@ def test_an_axis_that_does_not_tell_where_it_is_is_never_said_to_have_stopped() 
 
 def test_it_says_both_what_was_seen_and_what_was_promised() -> None:
     assert str(Stopped(Promise.HOLD, Rest.STOPPED, 1.0)) == f"{Rest.STOPPED.value}; held"
+
+
+def test_every_axis_is_told_to_stop_before_any_is_looked_at() -> None:
+    with machine(arm="1-3", can="0x25", lift=True) as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        listened(sims)
+        found = robot.stopped()
+        assert {name: one.rest for name, one in found.items()} == {
+            **dict.fromkeys(("a1", "a2", "a3", "c1"), Rest.STOPPED),
+            "lift": Rest.UNSEEN,
+        }
+        frames = sims["arm"].line.sent  # type: ignore[attr-defined]
+        goals = [place for place, data in enumerate(frames) if data[4] == 3]
+        looks = [
+            place for place, data in enumerate(frames) if data[4] == 2 and data[5] == 56 and data[6] == 2
+        ]
+        last = {node: max(place for place in goals if frames[place][2] == node) for node in (1, 2, 3)}
+        assert sum(place > max(last.values()) for place in looks) >= 3 * 3, "each was looked at afterwards"
+
+
+def test_on_an_event_loop_it_is_the_same() -> None:
+    async def main() -> None:
+        with machine(arm="1-2", lift=True) as (made, _):
+            async with AsyncRobot.of(made) as robot:
+                await robot.enable_torque()
+                found = await robot.stopped()
+                assert [one.rest for one in found.values()] == [Rest.STOPPED, Rest.STOPPED, Rest.UNSEEN]
+                assert (await robot["a1"].stopped()).rest is Rest.STOPPED
+
+    asyncio.run(main())
+
+
+def test_who_does_not_accept_it_is_an_error_and_the_others_are_looked_at() -> None:
+    with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
+        sims["arm"][1].unplug()
+        listened(sims)
+        with pytest.raises(MotorbusError, match="a1"):
+            robot.stopped()
+        assert sum("servo 2" in frame for frame in said(sims)) >= READS
+        assert sum("node 37" in frame for frame in said(sims)) >= READS
+
+
+def test_what_goes_on_by_itself_is_told_as_moving_by_the_verb_of_the_robot() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        moved = iter(range(10_000))
+        sims["arm"].line = Pushed(lambda: setattr(sims["arm"][2], "raw_position", 2048 + 20 * next(moved)))
+        found = robot.stopped(patience=0.3)
+        assert (found["a1"].rest, found["a2"].rest) == (Rest.STOPPED, Rest.MOVING)
+
+
+class Pushed(Heard):
+    """A wire; while it carries something, something else happens."""
+
+    def __init__(self, act: Callable[[], object]) -> None:
+        super().__init__()
+        self.act = act
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        self.act()
+        return super().carry(sender, data, at)
+
+
+# -- nobody else says so -------------------------------------------------------------------------------------------
+
+CAREFUL = (
+    "standstill was not verified",
+    "nothing tells",
+    "limp",
+    "nothing was sent",
+    "runs out without holding",
+)
+
+
+@pytest.mark.parametrize("family", ["feetech", "kst", "stepper"])
+def test_no_promise_of_a_device_claims_that_it_rests(family: str) -> None:
+    found = {
+        one
+        for module in pkgutil.walk_packages(
+            import_module(f"motorbus.families.{family}").__path__, f"motorbus.families.{family}."
+        )
+        for one in vars(import_module(module.name)).values()
+        if isinstance(one, type) and issubclass(one, Enum) and one.__name__ == "Promise"
+    }
+    assert found
+    for promise in (one for kind in found for one in kind):
+        assert promise.name != "STOPPED"
+        assert any(words in promise.value or "torque off ends" in promise.value for words in CAREFUL), promise
+    said_ = families.load(family).configured().stop({1: None}).promise
+    assert any(words in said_ for words in CAREFUL)

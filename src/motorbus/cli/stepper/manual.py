@@ -170,7 +170,7 @@ def _flags(parameters: tuple[Parameter, ...]) -> str:
     """Those that must be said."""
     fields = [one for one in parameters if one.kind is one.KEYWORD_ONLY and one.default is one.empty]
     names = [one.name.strip("_") for one in fields if one.annotation is not Silent]
-    return "".join(f" --{words(name)} {name.upper()}" for name in names)
+    return "".join(f" --{words(name)} N" for name in names)
 
 
 def _help(name: str) -> str:

@@ -23,6 +23,7 @@ from motorbus.core.family import (
     Stop,
 )
 from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.errors import RequestError
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
     AsyncServo,
@@ -40,15 +41,18 @@ from motorbus.families.feetech.driver import (
     action_all,
     copyable,
     disable_torque_all,
+    holding,
     line,
     prepare_all,
     read_positions,
+    reg_write_all,
     scan,
     sync_read,
     sync_read_positions,
     sync_write,
     sync_write_positions,
 )
+from motorbus.families.feetech.driver.assured import ASSURANCE
 from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
 
 __all__ = [
@@ -71,6 +75,7 @@ __all__ = [
     "disable_torque_all",
     "prepare_all",
     "read_positions",
+    "reg_write_all",
     "scan",
     "sync_read",
     "sync_read_positions",
@@ -86,6 +91,7 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "current": driver.current,
     "voltage": driver.voltage,
     "temperature": driver.temperature,
+    "health": driver.health,
     "enable_torque": driver.enable_torque,
     "disable_torque": driver.disable_torque,
     "move": driver.move,
@@ -102,13 +108,25 @@ _ONLY_WHERE: Final[Mapping[str, Callable[[str], object]]] = {
 }
 """What only servos of some maps can, and which maps these are."""
 
+_SETTINGS: Final = (
+    Option(
+        "estop_hold",
+        str,
+        "",
+        "ids of servos that an emergency stop holds where they are, as 1+4, instead of letting them go",
+    ),
+)
+
 
 class Feetech:
     """The family of FEETECH servos; see `motorbus.core.family.Family` for each member."""
 
     name: Final = "feetech"
     tables: Final[Mapping[str, Table]] = TABLES
-    devices: Final = Devices(Servo, AsyncServo)
+    devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
+
+    def __init__(self, hold: frozenset[int] = frozenset()) -> None:
+        self._hold: Final = hold
 
     @cached_property
     def link(self) -> LinkNeeds:
@@ -122,10 +140,24 @@ class Feetech:
             Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
             Option("model", str, "sts3215", "model of the simulated servos, or one for each joined by +"),
         )
-        return LinkNeeds("bytes", usual, tuple(BAUD_CODES.values()), (*options, *OPTIONS))
+        return LinkNeeds(
+            "bytes",
+            usual,
+            tuple(BAUD_CODES.values()),
+            (*options, *OPTIONS),
+            _SETTINGS,
+            stops=("torque_off", "hold"),
+        )
 
     def configured(self, **settings: object) -> Feetech:
-        return self
+        unknown = settings.keys() - {option.name for option in _SETTINGS}
+        if unknown:
+            raise RequestError(
+                f"a feetech bus has no setting {min(unknown)!r}",
+                expected=f"one of {', '.join(option.name for option in _SETTINGS)}",
+            )
+        said: Any = settings.get("estop_hold")
+        return self if said is None else Feetech(holding.held_ids(said))
 
     def lane(self, node: int) -> int:
         return 0
@@ -154,7 +186,7 @@ class Feetech:
         return line.probe(node, attempt)
 
     def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
-        return line.stop(nodes)
+        return line.stop(nodes, self._hold)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(Node(node))

@@ -51,6 +51,7 @@ from motorbus.families.kst.driver import (
     scan,
     scan_bit_rates,
 )
+from motorbus.families.kst.driver.assured import ASSURANCE
 from motorbus.families.kst.table import DEFAULT_RATE, PROFILES, RATES, TABLES
 
 __all__ = [
@@ -83,6 +84,7 @@ __all__ = [
 _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "state": driver.telemetry,
     "position": driver.position,
+    "health": driver.health,
     "move": driver.move,
     "stop": driver.stop,
     "limits": driver.limits,
@@ -116,7 +118,7 @@ class Kst:
 
     name: Final = "kst"
     tables: Final[Mapping[str, Table]] = TABLES
-    devices: Final = Devices(Servo, AsyncServo)
+    devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
 
     def __init__(self, dialect: Dialect = driver.PLAIN, window: int = driver.WINDOW) -> None:
         self._dialect = dialect
@@ -126,7 +128,9 @@ class Kst:
     def link(self) -> LinkNeeds:
         from motorbus.families.kst.simulator import OPTIONS
 
-        return LinkNeeds("frames", DEFAULT_RATE, RATES, OPTIONS, _SETTINGS, self._window)
+        return LinkNeeds(
+            "frames", DEFAULT_RATE, RATES, OPTIONS, _SETTINGS, self._window, stops=("hold",)
+        )
 
     def configured(self, **settings: object) -> Kst:
         unknown = settings.keys() - {option.name for option in _SETTINGS}

@@ -66,6 +66,7 @@ from motorbus.families.stepper.driver import (
     presence,
     stopping,
 )
+from motorbus.families.stepper.driver.assured import ASSURANCE
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Profile, Program
 from motorbus.families.stepper.program.backups import Backup
@@ -133,7 +134,7 @@ class Stepper:
 
     name: Final = "stepper"
     tables: Final[Mapping[str, Table]] = TABLES
-    devices: Final = Devices(Controller, AsyncController)
+    devices: Final = Devices(Controller, AsyncController, ASSURANCE)
 
     def __init__(
         self,

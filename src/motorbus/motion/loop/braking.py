@@ -1,7 +1,7 @@
 """How a loop is left: those that follow a goal and are on their way brake, as hard as they may, and stay there.
 
-Positions are read meanwhile, so that an axis that does not come along is seen. Whatever befalls one, the others brake;
-what went wrong is told when they rest.
+Positions are read meanwhile, so that an axis that does not come along is seen; one that is silent for too long is left
+at its last small goal. Whatever befalls one, the others brake; what went wrong is told when they rest.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ def braked(parts: Mapping[str, Part], grid: Grid) -> Works:
     Raises what went wrong when all others rest. What was sent direct is the last that its device knows.
     """
     for part in parts.values():
+        part.watch = None
         part.release_lost()
         for place in part.places.values():
             place.halt()
     failures: dict[str, MotorbusError] = {}
-    while left := {bus: part for bus, part in parts.items() if bus not in failures and part.brakes()}:
+    while left := {bus: part for bus, part in parts.items() if bus not in failures and _brakes(part)}:
         grid.forgive(latest(left.values()))
         yield from _cycle(left, grid.take(latest(left.values())), failures)
     for bus, part in parts.items():
@@ -38,6 +39,11 @@ def braked(parts: Mapping[str, Part], grid: Grid) -> Works:
             if place.follows and bus not in failures:
                 place.axis.arrives()
     settled({**failures, **refusals(parts)})
+
+
+def _brakes(part: Part) -> bool:
+    part.release_silent()
+    return part.brakes()
 
 
 def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, MotorbusError]) -> Works:

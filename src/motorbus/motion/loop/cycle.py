@@ -6,12 +6,13 @@ other, on several they are all in flight at once. A device that does not answer 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
-from motorbus.core.family import Positions, Train
+from motorbus.core.family import Positions, Quality, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import (
     Interrupted,
@@ -20,14 +21,23 @@ from motorbus.errors import (
     MotorbusError,
     NoReply,
     OutcomeUnknown,
+    Overloaded,
     WireError,
 )
+from motorbus.motion import capabilities as single
 from motorbus.motion.capabilities import AxisVerbs, cap
 from motorbus.motion.command import Command
-from motorbus.motion.loop.place import Place
+from motorbus.motion.loop.place import STALE, Place
+from motorbus.motion.safety import canary
+from motorbus.motion.safety.track import FASTEST, MARGIN, TREMBLING
+
+if TYPE_CHECKING:
+    from motorbus.motion.safety.watch import Watch
 
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
 """Ways in which a reading, or the acknowledgement of a goal, is lost and a loop goes on."""
+HALF: Final = 0.5
+"""Of a period; after a hitch two readings may be closer together than that, and it is no matter."""
 SPIN: Final = 0.0002
 """s before a slot from which on a blocking loop looks at the clock without a pause: no system wakes it that exactly."""
 
@@ -37,10 +47,19 @@ class Part:
 
     `origin` is what the clock of its link showed when that of the robot was at 0. Those who wait `exactly` burn the
     processor for the last bit. `command` is over those who are led; `refused` are those of the last orders that could
-    not be given, and stay where they are.
+    not be given, and stay where they are. While `unsure`, it may be that nobody knows where one of them is: `left_out`
+    are those whom the last orders left out for that, `doubts` has by name how far the last reading of those can be
+    believed for whom that is in question. A `watch` asks now and then, where there is time, how those fare who are led.
     """
 
-    def __init__(self, bus: BusFace, origin: float, places: Sequence[Place], train: Train) -> None:
+    def __init__(
+        self,
+        bus: BusFace,
+        origin: float,
+        places: Sequence[Place],
+        train: Train,
+        watch: Watch | None = None,
+    ) -> None:
         self.bus: Final = bus
         self.link: Final = bus.link
         self.origin: Final = origin
@@ -52,6 +71,11 @@ class Part:
         self.abreast: Final = len({exchange.lane for exchange in self.reads}) > 1
         self.command = Command(())
         self.refused: list[LimitExceeded] = []
+        self.watch = watch
+        self.unsure = False
+        self.left_out: list[str] = []
+        self.doubts: dict[str, Quality] = {}
+        self._sure: Final = TREMBLING + FASTEST * MARGIN * HALF * (places[0].period if places else 0.0)
 
     @property
     def now(self) -> float:
@@ -65,21 +89,51 @@ class Part:
 
         Raises RequestError when one of them was set up anew, and takes goals of another kind now.
         """
-        to: dict[int, float] = {}
-        for node, place in self.places.items():
-            if place.begun:
-                try:
-                    to[node] = place.step(periods)
-                except LimitExceeded as error:
-                    to[node] = place.stay()
-                    self.refused.append(error)
+        if self.unsure:
+            to = self._of_some(periods)
+        else:
+            to = {}
+            for node, place in self.places.items():
+                if place.begun:
+                    try:
+                        to[node] = place.step(periods)
+                    except LimitExceeded as error:
+                        to[node] = place.stay()
+                        self.refused.append(error)
         if not to:
             return ()
         guarded = self.command.guarded
         return [guarded(exchange) for exchange in self.train.goals(to)]
 
+    def _of_some(self, periods: int) -> dict[int, float]:
+        """The same while it may be that nobody knows where one is: those are left out, and the others go on."""
+        to: dict[int, float] = {}
+        self.left_out.clear()
+        for node, place in self.places.items():
+            if not place.begun:
+                continue
+            if place.unsure:
+                place.left += 1
+                self.left_out.append(place.name)
+                continue
+            since, place.left = periods + place.left, 0
+            try:
+                to[node] = place.step(since)
+            except LimitExceeded as error:
+                to[node] = place.stay()
+                self.refused.append(error)
+        self.unsure = bool(self.left_out)
+        return to
+
     def cycle(self, orders: Sequence[Exchange[Any]], moment: float) -> Operation[list[Any]]:
-        """Send these from a moment of robot time on, then ask for all positions; what came of each exchange."""
+        """Send these from a moment of robot time on, then ask for all positions; what came of each exchange.
+
+        Raises Faulted and Overloaded as `Watch.take`, before anything of this has left.
+        """
+        if (watch := self.watch) is not None:
+            now = self.link.now()
+            if watch.due(now, moment + self.origin - now) is not None:
+                yield from self._asked(watch, moment)
         for pause in self._wait(moment + self.origin):
             yield from pause
         self.began = self.link.now() - self.origin
@@ -101,6 +155,10 @@ class Part:
 
         There is nothing to clean up, so an interruption is raised at once.
         """
+        if (watch := self.watch) is not None:
+            now = self.link.now()
+            if watch.due(now, moment + self.origin - now) is not None:
+                bus.run(self._asked(watch, moment))
         for pause in self._wait(moment + self.origin):
             bus.run(iter(pause))
         self.began = self.link.now() - self.origin
@@ -122,21 +180,66 @@ class Part:
             while link.now() < moment:
                 pass
 
+    def _asked(self, watch: Watch, moment: float) -> Operation[None]:
+        """Ask who is due how he fares, while the wire is free anyway before a slot that begins at this moment.
+
+        Who pushes too hard is told to stay where he is.
+        """
+        led = [place for place in self.places.values() if place.begun]
+        goals = {place.node: place.stay() for place in led}
+        places = {place.node: place.zero + place.position * place.ratio for place in led}
+        try:
+            yield from watch.asking(moment - self.now, goals, places)
+        except Overloaded as error:
+            for place in led:
+                if place.node == error.node:
+                    failure = yield from outcome(single.stop(place.axis))
+                    if isinstance(failure, MotorbusError):
+                        error.add_note(f"and it did not accept the stop that followed: {failure}")
+            raise
+
     def take(self, told: Sequence[Any]) -> list[str]:
-        """Note where they are, by what came of a cycle; the names of those who were not heard."""
+        """Note where they are, by what came of a cycle; the names of those who were not heard.
+
+        A reading is taken as it is where any motor can have come there since the last one; else see `_judged`.
+        """
         places = self.places
+        sure = self._sure
         heard = 0
         at = 0.0
+        if self.doubts:
+            self.doubts = {}
         for found in told:
             if type(found) is Positions:
                 at = found.at - self.origin
                 for node, angle in found.values.items():
                     place = places[node]
-                    place.position = (angle - place.zero) / place.ratio
-                    place.heard = at
-                    place.silent = 0
+                    if -sure <= angle - place.angle <= sure:
+                        place.angle = angle
+                        place.position = (angle - place.zero) / place.ratio
+                        place.heard = at
+                        place.silent = 0
+                    else:
+                        self._judged(place, angle, found.at)
                     heard += 1
         return [] if heard == len(places) else self._unheard(told)
+
+    def _judged(self, place: Place, angle: float, at: float) -> None:
+        """Judge a reading that is far from the last one, or has none before it, by the track of its axis."""
+        track = place.axis.track
+        if isfinite(place.angle):
+            track.take(place.angle, place.heard + self.origin)
+        quality = track.take(angle, at).quality
+        if quality is Quality.SUSPECT:
+            place.doubt()
+            self.unsure = True
+        else:
+            anew = place.silent > STALE or quality is Quality.CONFIRMED
+            place.hear(angle, at - self.origin)
+            if anew and place.begun:
+                place.resume()
+        if quality in (Quality.SUSPECT, Quality.CONFIRMED):
+            self.doubts[place.name] = quality
 
     def heard(self, told: Sequence[Any]) -> dict[str, float]:
         """When each was heard (s of robot time) of whom there is a reading among what came of a cycle, by name."""
@@ -152,6 +255,11 @@ class Part:
         missing = [place for node, place in self.places.items() if node not in heard]
         for place in missing:
             place.silent += 1
+            if place.silent > STALE:
+                self.unsure = True
+                if isfinite(place.angle):
+                    place.axis.track.take(place.angle, place.heard + self.origin)
+                    place.angle = nan
         return [place.name for place in missing]
 
     # -- the beginning -------------------------------------------------------------------------------------------------
@@ -159,15 +267,18 @@ class Part:
     def begin(self, fresh: Sequence[Place]) -> Operation[None]:
         """Give these torque without a jump, with the caps of the machine file, and see where they stand.
 
-        Raises Interrupted when somebody else tells one of them something meanwhile: nothing of this leaves any more
-        then, so whoever has let an axis go finds it limp.
+        Raises Interrupted when somebody else has told one of them something since its goal was set: nothing of this
+        leaves any more then, so whoever has let an axis go finds it limp. Raises Faulted and Overloaded as
+        `Watch.begin`.
         """
         axes = [place.axis for place in fresh]
-        command = Command(axes)
+        for axis in axes:
+            canary.check(axis)
+        command = _claimed(fresh)
         train = yield from train_of(self.bus, axes)
         try:
             command.depart()
-            angles = yield from _begun(train, command)
+            angles = yield from _begun(train, command, self.watch)
         except MotionError as error:
             if lost := set(axes).difference(command.held()):
                 raise stopped([axis.name for axis in axes if axis in lost]) from error
@@ -184,12 +295,40 @@ class Part:
         """Who was told something from elsewhere is led no more; their names. After an emergency stop all of them."""
         self.command = command = Command(()) if self.bus.turns.latched else self.command.rest()
         lost = [place for place in self.places.values() if place.begun and place.axis not in command.axes]
-        for place in lost:
+        return self._release(lost)
+
+    def release_unbegun(self) -> None:
+        """Who has got no torque here is to get none."""
+        self._release([place for place in self.places.values() if not place.begun])
+
+    def release_claimed(self) -> list[str]:
+        """Who was told something from elsewhere since its first goal was set is not to be led; their names."""
+        waiting = [place for place in self.places.values() if place.asked is not None and not place.begun]
+        return self._release([one for one in waiting if one.claim is not None and one.claim.lost()])
+
+    def release_silent(self) -> None:
+        """Who has not been heard for too long to be ordered is left at the last goal that he was told."""
+        self._release([place for place in self.places.values() if place.begun and place.silent > STALE])
+
+    def _release(self, places: Iterable[Place]) -> list[str]:
+        names = []
+        for place in places:
             place.release()
-        return [place.name for place in lost]
+            names.append(place.name)
+            if self.watch is not None:
+                self.watch.dismiss(place.node)
+        return names
 
 
-def _begun(train: Train, command: Command) -> Operation[list[float]]:
+def _claimed(fresh: Iterable[Place]) -> Command:
+    """The command over these, each from when its goal was set."""
+    command = Command(())
+    for place in fresh:
+        command = command.joined(place.claim or Command((place.axis,)))
+    return command
+
+
+def _begun(train: Train, command: Command, watch: Watch | None) -> Operation[list[float]]:
     """Torque on, and as quick in following as the axis may be; where the device of each stands then (rad)."""
 
     def ready() -> Operation[None]:
@@ -200,6 +339,8 @@ def _begun(train: Train, command: Command) -> Operation[list[float]]:
 
     try:
         yield from command.watched(ready())
+        if watch is not None:
+            yield from watch.begin(command.axes)
         return (yield from Together([axis.able["position"](axis.device) for axis in command.axes]))
     except BaseException:
         for axis in command.held():  # they may have torque, and go nowhere

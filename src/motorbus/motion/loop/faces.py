@@ -13,7 +13,11 @@ Who leaves the `for` and stays in the `with` leaves the axes at their last small
 Ctrl-C while they brake ends that as abruptly. A loop that was left takes no goals and has no cycles any more.
 
 An axis belongs to who told it something last. When somebody else stops it, lets it go or moves it, another loop
-included, the loop sends it no goal any more and raises Interrupted; the next goal that is set takes it back.
+included, the loop sends it no goal any more and raises Interrupted; the next goal that is set takes it back. That holds
+from when a goal is set, also before the cycle in which its axis gets torque.
+
+Nobody is ordered anywhere who was silent for more than two cycles, or whose last reading cannot be believed: he is left
+out, the others go on, and when he is heard again he goes on from where he is.
 
 A collection of garbage may hold Python up for longer than a period. A program with a quick loop had better call
 `gc.collect()` and `gc.freeze()` before it.
@@ -22,6 +26,7 @@ A collection of garbage may hold Python up for longer than a period. A program w
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.bus.pump import Bus
@@ -30,6 +35,7 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
+from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
@@ -88,8 +94,12 @@ class LoopFace:
         direct: bool = False,
         jerk: float | None = None,
         exactly: bool = False,
+        policy: Policy = "reject",
+        watch: bool = True,
     ) -> None:
-        self._rounds = Rounds(body, rate, axes, direct=direct, jerk=jerk, exactly=exactly)
+        self._rounds = Rounds(
+            body, rate, axes, direct=direct, jerk=jerk, exactly=exactly, policy=policy, watch=watch
+        )
         self.goal = Goals(self._rounds)
 
     @property
@@ -127,7 +137,8 @@ class Loop(LoopFace):
 
     Raises RequestError on entering for a rate that a bus cannot carry, NoReply when an axis is silent too long,
     LimitExceeded for a goal that must not be sent (nothing was sent then, and the loop can go on) or for an axis that
-    is held back (it stays, the others go on), Interrupted when an axis was stopped from elsewhere; see `Rounds`.
+    is held back (it stays, the others go on), Interrupted when an axis was stopped from elsewhere, Faulted when one has
+    lost its torque or restarted, Overloaded when one pushes too hard for too long or is too hot; see `Rounds`.
     """
 
     def __init__(
@@ -188,22 +199,42 @@ class AsyncLoop(LoopFace):
 
 
 def blocking_loop(
-    robot: Any, rate: float, axes: Names = None, *, direct: bool = False, jerk: float | None = None
+    robot: Any,
+    rate: float,
+    axes: Names = None,
+    *,
+    direct: bool = False,
+    jerk: float | None = None,
+    policy: Policy = "reject",
+    watch: bool = True,
 ) -> Loop:
     """A control loop of `rate` (Hz) over these axes, for a `with` and a `for` in it; see `motorbus.motion.loop`.
 
     `direct` sends goals as they are: one that is farther from the last than the velocity of the axis allows is refused.
-    Else they are followed, with a `jerk` (rad/s³, m/s³) also within that, by ruckig, an extra. Raises RequestError for
-    what cannot be; nothing is sent before the `with` is entered.
+    Else they are followed, with a `jerk` (rad/s³, m/s³) also within that, by ruckig, an extra.
+
+    A goal that goes too far is refused; with the policy `clamp` it is brought to the nearest that is allowed, which is
+    counted, and told as a `Clamped` event where it has not been lately. What is no finite number is refused always.
+    While axes are led, each is asked now and then how it fares, where the wire is free for that; `watch=False` leaves
+    that out. Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
     """
-    return Loop(robot, robot.conductor, rate, axes, direct=direct, jerk=jerk)
+    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
+    return Loop(robot, robot.conductor, rate, axes, **how)
 
 
 def awaiting_loop(
-    robot: Any, rate: float, axes: Names = None, *, direct: bool = False, jerk: float | None = None
+    robot: Any,
+    rate: float,
+    axes: Names = None,
+    *,
+    direct: bool = False,
+    jerk: float | None = None,
+    policy: Policy = "reject",
+    watch: bool = True,
 ) -> AsyncLoop:
     """The same for an `async with` and an `async for` in it; see `blocking_loop`."""
-    return AsyncLoop(robot, robot.conductor, rate, axes, direct=direct, jerk=jerk)
+    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
+    return AsyncLoop(robot, robot.conductor, rate, axes, **how)
 
 
 def _told(failure: MotorbusError, error: BaseException | None) -> None:
@@ -262,11 +293,12 @@ class Course(Protocol[T_co]):
 
 
 class Errand(NamedTuple, Generic[T]):
-    """A course and the loop that it needs: its rate (Hz), its axes, its `jerk`.
+    """A course and the loop that it needs: its rate (Hz), its axes, its `jerk`, its `policy`.
 
     `before` is carried out once the loop has been entered, where there is something: what refuses the loop, as a rate
     that cannot be, refuses that too. One that is `endless` has no other end than an interruption of its caller, so then
-    Ctrl-C ends it and its result is given; else it is raised as everywhere.
+    Ctrl-C ends it and its result is given; else it is raised as everywhere. What ends it early is told to `failed`,
+    where there is that, before it is raised.
     """
 
     course: Course[T]
@@ -275,6 +307,8 @@ class Errand(NamedTuple, Generic[T]):
     before: Abreast[Any] | None = None
     jerk: float | None = None
     endless: bool = False
+    failed: Callable[[MotorbusError], None] | None = None
+    policy: Policy = "reject"
 
 
 class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
@@ -296,9 +330,19 @@ class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
         return self.method(machine, lambda errand: carry_out(machine, errand))
 
 
+@contextmanager
+def _telling(errand: Errand[Any]) -> Iterator[None]:
+    try:
+        yield
+    except MotorbusError as error:
+        if errand.failed is not None:
+            errand.failed(error)
+        raise
+
+
 def _blocking(machine: Any, errand: Errand[T]) -> T:
-    course = errand.course
-    with Loop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
+    course, how = errand.course, {"jerk": errand.jerk, "policy": errand.policy}
+    with _telling(errand), Loop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
         if errand.before is not None:
             machine.conductor.run(errand.before)
         try:
@@ -312,11 +356,12 @@ def _blocking(machine: Any, errand: Errand[T]) -> T:
 
 
 async def _awaiting(machine: Any, errand: Errand[T]) -> T:
-    course = errand.course
-    async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, jerk=errand.jerk) as loop:
-        if errand.before is not None:
-            await machine.conductor.run(errand.before)
-        async for state in loop:
-            if not course.step(loop, state):
-                break
+    course, how = errand.course, {"jerk": errand.jerk, "policy": errand.policy}
+    with _telling(errand):
+        async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
+            if errand.before is not None:
+                await machine.conductor.run(errand.before)
+            async for state in loop:
+                if not course.step(loop, state):
+                    break
     return course.result(loop)

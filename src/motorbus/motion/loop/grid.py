@@ -49,6 +49,9 @@ class Statistics:
     `skipped`   slots in which no cycle began, because one before took so long
     `begun`     cycles of their own in which axes were given torque; they are no overruns
     `lost`      readings that did not come, by the name of the axis
+    `suspect`   readings that cannot be believed: no motor can have come there so quickly; by name
+    `unordered` cycles in which an axis that is led got no goal, because nobody knew where it was; by name
+    `clamped`   goals that were brought within the limits of their axis, with the policy `clamp`; by name
     `lateness`  how long after the beginning of its slot a cycle began, s
     `cycle`     how long a cycle took from there until all was in, on all buses, s
     `buses`     the same of each bus alone, by its name
@@ -60,6 +63,9 @@ class Statistics:
     skipped: int = 0
     begun: int = 0
     lost: dict[str, int] = field(default_factory=dict)
+    suspect: dict[str, int] = field(default_factory=dict)
+    unordered: dict[str, int] = field(default_factory=dict)
+    clamped: dict[str, int] = field(default_factory=dict)
     lateness: Took = field(default_factory=Took)
     cycle: Took = field(default_factory=Took)
     buses: dict[str, Took] = field(default_factory=dict)
@@ -67,16 +73,36 @@ class Statistics:
     @classmethod
     def of(cls, rate: float, axes: Iterable[str], buses: Iterable[str]) -> Statistics:
         """Nothing yet."""
-        return cls(rate, lost=dict.fromkeys(axes, 0), buses={name: Took() for name in buses})
+        none = dict.fromkeys(axes, 0)
+        return cls(
+            rate,
+            lost=none,
+            suspect=dict(none),
+            unordered=dict(none),
+            clamped=dict(none),
+            buses={name: Took() for name in buses},
+        )
 
     def __str__(self) -> str:
-        lost = ", ".join(f"{name} {count}" for name, count in self.lost.items() if count)
         return (
             f"{self.cycles} cycles at {self.rate:g} Hz, {self.overruns} overruns, {self.skipped} slots skipped; "
             f"a cycle took {self.cycle.mean * 1e3:.2f} ms, at most {self.cycle.most * 1e3:.2f} ms; "
             f"late by {self.lateness.mean * 1e3:.3f} ms, at most {self.lateness.most * 1e3:.3f} ms; "
-            f"readings lost: {lost or 'none'}"
+            f"readings lost: {_counted(self.lost) or 'none'}"
+            + "".join(f"; {what}: {told}" for what, told in self._seldom() if told)
         )
+
+    def _seldom(self) -> list[tuple[str, str]]:
+        """What is told only where there was some."""
+        return [
+            ("readings not believed", _counted(self.suspect)),
+            ("not ordered", _counted(self.unordered)),
+            ("clamped", _counted(self.clamped)),
+        ]
+
+
+def _counted(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items() if count)
 
 
 class Grid:

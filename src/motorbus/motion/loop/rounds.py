@@ -12,30 +12,30 @@ gets no goal any more: who told it last has the command. So it is with two loops
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from functools import partial
 from math import isfinite
-from types import MappingProxyType
 from typing import Any, Final
 
 from motorbus.bus.pump import Bus
-from motorbus.core.operation import Exchange, Operation
-from motorbus.errors import Interrupted, MotorbusError, RequestError
+from motorbus.core.operation import Exchange, Operation, Report
+from motorbus.errors import Faulted, Interrupted, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget, bus_budget, divided, refuse_above
 from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.clamping import Clamped, Policy, Tidings, check_policy
+from motorbus.motion.command import Command
 from motorbus.motion.limits import Device
 from motorbus.motion.loop.braking import Works, braked, latest, refusals
 from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
 from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
-from motorbus.motion.loop.readings import LoopState
+from motorbus.motion.loop.readings import PATIENCE, LoopState, state_of
+from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named
 
-PATIENCE: Final = 5
-"""Cycles in a row in which an axis may be silent; in the next one the loop raises NoReply."""
-NOBODY: Final[frozenset[str]] = frozenset()
+LOST: Final = (Interrupted, Faulted, Overloaded)
+"""Errors after which it is seen who is not to be led any more."""
 
 
 class Rounds:
@@ -54,7 +54,10 @@ class Rounds:
         direct: bool,
         jerk: float | None,
         exactly: bool,
+        policy: Policy = "reject",
+        watch: bool = True,
     ) -> None:
+        check_policy(policy)
         if not (isfinite(rate) and rate > 0):
             raise RequestError(
                 f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
@@ -83,6 +86,10 @@ class Rounds:
         self._direct = direct
         self._jerk = jerk
         self._exactly = exactly
+        self._policy = policy
+        self._watch = watch
+        self._clamps: list[Clamped] = []
+        self._tidings = Tidings()
         self._grid: Grid | None = None
         self._entered = self._left = False
         self._askable: Mapping[str, Place] = {}
@@ -117,7 +124,8 @@ class Rounds:
         for bus, (train, devices, _) in opened.items():
             there = [self._place(axis, devices[axis.name]) for axis in parts[bus]]
             face = self._body.buses[bus]
-            self.parts[bus] = Part(face, self._body.origins[bus], there, train)
+            watch = Watch(face, parts[bus]) if self._watch else None
+            self.parts[bus] = Part(face, self._body.origins[bus], there, train, watch)
             self.parts[bus].exactly = self._exactly and not face.link.virtual
         self._one = next(iter(self.parts.values())) if len(self.parts) == 1 else None
         self.places = {name: place for name in self._led for place in self._placed() if place.name == name}
@@ -144,7 +152,9 @@ class Rounds:
         return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
 
     def _place(self, axis: AxisVerbs, device: Device) -> Place:
-        return Place(axis, device, 1 / self.rate, self._direct, self._jerk)
+        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy)
+        place.clamps = self._clamps
+        return place
 
     def _placed(self) -> Iterable[Place]:
         return (place for part in self.parts.values() for place in part.places.values())
@@ -170,6 +180,7 @@ class Rounds:
             place = self.places[name]
         place.asked = goal
         if not place.begun:
+            place.claim = Command((place.axis,))
             self._fresh = True
 
     def check(self, name: str, goal: float) -> float:
@@ -195,6 +206,8 @@ class Rounds:
         now = self.now
         periods = max(1, grid.upcoming(now) - self._stepped)
         self._judge(periods)
+        if self._clamps:
+            yield from self._tell_clamps(now)
         if self._fresh and (fresh := self._unbegun()):
             grid.book(now)
             try:
@@ -223,20 +236,38 @@ class Rounds:
 
     def _orders(self, periods: int) -> dict[str, Sequence[Exchange[Any]]]:
         try:
-            return {bus: part.orders(periods) for bus, part in self.parts.items()}
+            orders = {bus: part.orders(periods) for bus, part in self.parts.items()}
         except MotorbusError:  # nothing leaves, on any bus
             for place in self._all:
                 place.rest()
             raise
+        for part in self.parts.values():
+            if part.unsure:
+                for name in part.left_out:
+                    self.statistics.unordered[name] += 1
+        return orders
 
     def _judge(self, periods: int) -> None:
         """Before anything is sent: has somebody been told something, and may all goals be sent?"""
         for part in self.parts.values():
             if part.command.lost() is not None:
                 self._release_lost()
+        if self._fresh and (lost := [one for part in self.parts.values() for one in part.release_claimed()]):
+            raise stopped(lost)
         for place in self._all:
             if place.asked is not None:
                 place.judge(periods)
+
+    def _tell_clamps(self, now: float) -> Works:
+        """Count what was clamped, and tell of it where it has not been told of lately."""
+        events: dict[str, list[Clamped]] = {}
+        for event in self._clamps:
+            self.statistics.clamped[event.axis] += 1
+            if self._tidings.worth(event, now):
+                events.setdefault(self.places[event.axis].axis.spec.bus, []).append(event)
+        self._clamps.clear()
+        if events:
+            yield Abreast({bus: _reported(found) for bus, found in events.items()}, settled)
 
     def _release_lost(self) -> None:
         lost = [name for part in self.parts.values() for name in part.release_lost()]
@@ -263,9 +294,8 @@ class Rounds:
         try:
             yield Abreast({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
         except MotorbusError:
-            for place in self._all:
-                if not place.begun:
-                    place.release()
+            for part in self.parts.values():
+                part.release_unbegun()
             self._fresh = False
             raise
         self._fresh = False
@@ -298,7 +328,7 @@ class Rounds:
                 refused = True
         if failed:
             self._fail(told)
-        state = self._state(last, number, missing, told)
+        state = state_of(parts, told, self._all, missing, last, number, statistics)
         if refused:
             settled(refusals(parts))
         return state
@@ -311,32 +341,11 @@ class Rounds:
                 part = self.parts[bus]
                 for place in part.places.values():
                     place.rest()
-                if isinstance(error, Interrupted) and (lost := part.release_lost()):
+                lost = part.release_lost() if isinstance(error, LOST) else []
+                if lost and isinstance(error, Interrupted):
                     found[bus] = stopped(lost)
                     found[bus].__cause__ = error
         settled({**found, **refusals(self.parts)})
-
-    def _state(self, at: float, number: int, missing: list[str], told: Mapping[str, Any]) -> LoopState:
-        position = {place.name: place.position for place in self._all}
-        if not missing:
-            return LoopState(at, number, position, NOBODY, partial(self._ages, told, _NEVER))
-        for name in missing:
-            self.statistics.lost[name] += 1
-        silent = [name for name in missing if self.places[name].silent > PATIENCE]
-        if silent:
-            error = silence(silent, PATIENCE + 1, self.places, at)
-            for name in silent:
-                self.places[name].silent = 0
-            raise error
-        heard = {name: self.places[name].heard for name in missing}
-        return LoopState(at, number, position, frozenset(missing), partial(self._ages, told, heard))
-
-    def _ages(self, told: Mapping[str, Any], before: Mapping[str, float], at: float) -> dict[str, float]:
-        """How old (s) a position is that came with what was told in this cycle, or was heard before."""
-        heard = dict(before)
-        for bus, part in self.parts.items():
-            heard |= part.heard(told[bus])
-        return {name: max(0.0, at - moment) for name, moment in heard.items()}
 
     # -- leaving -------------------------------------------------------------------------------------------------------
 
@@ -362,7 +371,9 @@ class Rounds:
             )
 
 
-_NEVER: Final[Mapping[str, float]] = MappingProxyType({})
+def _reported(events: Iterable[Clamped]) -> Operation[None]:
+    for event in events:
+        yield from Report(event)
 
 
 def _number(name: str, goal: object) -> float:

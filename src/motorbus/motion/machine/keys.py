@@ -50,6 +50,8 @@ class Key(NamedTuple):
         """The values it may have, where they can be counted."""
         if self.name == "unit":
             return LINEAR_UNITS if linear else TURNING_UNITS
+        if self.kind is bool:
+            return True, False
         return get_args(self.kind) if get_origin(self.kind) is Literal else ()
 
     def units(self, linear: bool) -> tuple[str, ...]:
@@ -65,6 +67,11 @@ class Key(NamedTuple):
             words = f"above {meta.gt:.10g}, at most {meta.le:.10g}"
         unit = api_unit(self.measure.of(linear)) if self.measure else ""
         return f"{words} {unit}".strip() if words else ""
+
+
+def word(choice: object) -> str:
+    """One of the values that can be counted, as TOML has it: `hold`, `-1`, `true`."""
+    return str(choice).lower() if isinstance(choice, bool) else str(choice)
 
 
 def api_unit(quantity: str) -> str:

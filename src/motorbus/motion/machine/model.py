@@ -31,6 +31,7 @@ TURNING_UNITS: Final = ("deg", "rad", "turn")
 LINEAR_UNITS: Final = ("mm", "m")
 
 Exit: TypeAlias = Literal["hold", "torque_off", "park", "leave"]
+Estop: TypeAlias = Literal["torque_off", "hold"]
 Unit: TypeAlias = Literal["deg", "rad", "turn", "mm", "m"]
 
 EXITS: Final[Mapping[Exit, str]] = {
@@ -40,6 +41,11 @@ EXITS: Final[Mapping[Exit, str]] = {
     "leave": "nothing is sent",
 }
 """What each way to end means."""
+ESTOPS: Final[Mapping[Estop, str]] = {
+    "torque_off": "it lets go at once, and may fall",
+    "hold": "it is told to stay where it is, and keeps its torque",
+}
+"""What each emergency stop means."""
 
 
 class Measure(NamedTuple):
@@ -138,9 +144,17 @@ Park: TypeAlias = Annotated[
         ge=-FARTHEST, le=FARTHEST,
     ),
 ]  # fmt: skip
+EstopPolicy: TypeAlias = Annotated[
+    Estop, _key("what an emergency stop does to it; left out: what is usual for its device", '"hold"')
+]
 Torque: TypeAlias = Annotated[float, _key("cap of its torque; not with `current`", "0.5", LOAD, gt=0, le=1)]
 Current: TypeAlias = Annotated[
     float, _key("cap of its current; not with `torque`", '"0.4 A"', CURRENT, gt=0, le=1e3)
+]
+
+Guard: TypeAlias = Annotated[
+    bool,
+    _key("whether a movement ends when its motor pushes too hard for too long, or is too hot", "false"),
 ]
 
 
@@ -163,9 +177,11 @@ class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     max_acceleration: MaxAcceleration
     max_step: MaxStep | None = None
     exit: Annotated[Exit, _key("what it does when the program ends, however that comes", '"hold"')] = "hold"
+    estop: EstopPolicy | None = None
     park: Park | None = None
     torque: Torque | None = None
     current: Current | None = None
+    guard: Guard = True
 
     # -- which device ------------------------------------------------------------------------------------------
 

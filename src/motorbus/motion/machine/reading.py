@@ -225,8 +225,8 @@ def _choice(place: Place) -> Any:
     advice = ""
     if isinstance(written, str):
         other = written in place.key.choices(not place.linear)
-        advice = _other_kind(place.linear) if other else nearest(written, map(str, choices))
-    raise place.refused(f"{said(written)} is not possible", listed(map(str, choices)), advice)
+        advice = _other_kind(place.linear) if other else nearest(written, map(keys.word, choices))
+    raise place.refused(f"{said(written)} is not possible", listed(map(keys.word, choices)), advice)
 
 
 def _amount(place: Place) -> float:

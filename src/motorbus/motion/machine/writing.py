@@ -50,7 +50,7 @@ def _axis(axis: AxisSpec, told: set[str]) -> Iterator[str]:
     """The lines of one axis; what a key means is said where it first stands."""
     for key in keys.AXIS.values():
         value = getattr(axis, key.name)
-        if value is None:
+        if value is None or (key.kind is bool and value == key.default):
             continue
         yield _line(key.name, _value(value, key, axis), "" if key.name in told else key.says)
         told.add(key.name)
@@ -64,6 +64,8 @@ def _line(name: str, value: str, says: str) -> str:
 def _value(value: Any, key: Key, axis: AxisSpec | None) -> str:
     if isinstance(value, str):
         return quoted(value)
+    if isinstance(value, bool):
+        return keys.word(value)
     if key.measure is None or axis is None or not isfinite(value):
         return str(value)
     quantity = key.measure.of(axis.linear)

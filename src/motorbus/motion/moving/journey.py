@@ -31,7 +31,11 @@ ROUNDING: Final = 1e-6
 
 
 class Journey:
-    """A movement of these `axes`, by their names; `origins` as in a `Body`. `rate` (Hz) is that of what is led."""
+    """A movement of these `axes`, by their names; `origins` as in a `Body`. `rate` (Hz) is that of what is led.
+
+    `tolerance` (rad, m) is how near to its goal each that is led must come, `timeout` (s) within how long after the end;
+    None: as usual.
+    """
 
     def __init__(
         self,
@@ -39,7 +43,12 @@ class Journey:
         plan: Plan,
         origins: Mapping[str, float],
         rate: float | None = None,
+        *,
+        tolerance: float | None = None,
+        timeout: float | None = None,
     ) -> None:
+        self.tolerance: Final = tolerance
+        self.timeout: Final = timeout
         self.plan: Final = plan
         self.rate: Final = rate
         self.fate: Final = Fate()

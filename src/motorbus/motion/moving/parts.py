@@ -16,10 +16,13 @@ from motorbus.motion import capabilities as single
 from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moving.forgiving import forgiven
+from motorbus.motion.moving.lagging import does_not_begin
 from motorbus.motion.moving.moved import STILL, Arrived, Track
 from motorbus.motion.moving.plan import Fact, Gone, Planned
-from motorbus.motion.moving.stream import SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
+from motorbus.motion.moving.stream import SETTLE, SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 from motorbus.motion.reckoning import Movement, cut_short
+from motorbus.motion.safety import canary
+from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named, names
 
 if TYPE_CHECKING:
@@ -44,7 +47,12 @@ NEAR: Final = 3
 
 
 def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
-    """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
+    """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop.
+
+    Raises Refused for an axis that is at fault, before anything is sent.
+    """
+    for axis in axes:
+        canary.check(axis)
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     journey.commands.append(work.command)
@@ -93,6 +101,7 @@ class LedPart:
 
     def __init__(self, journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> None:
         self.command: Final = Command(axes)
+        self.watch: Final = Watch(axes[0].bus, axes)
         self.begun = False
         self.gone: Gone | None = None
         self._journey: Final = journey
@@ -119,9 +128,11 @@ class LedPart:
             planned.course,
             rate=rate,
             speeds=planned.speeds,
-            within={axis.name: _within(axis, facts[axis.name], planned) for axis in axes},
+            within={axis.name: self._within(axis, facts[axis.name], planned) for axis in axes},
             command=self.command,
+            watch=self.watch,
             fate=journey.fate,
+            patience=SETTLE if journey.timeout is None else journey.timeout,
             reports=journey.reports(self._party),
         )
         yield from self._ready(train, facts)
@@ -145,7 +156,7 @@ class LedPart:
             silent = [axis for axis in axes if axis.spec.node == error.node]
             if not silent:
                 raise
-            raise _silent(silent[0]) from error
+            raise does_not_begin(silent[0]) from error
 
     def _looked(self, train: Any) -> Operation[tuple[float, dict[str, Fact]]]:
         """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
@@ -169,7 +180,7 @@ class LedPart:
             missing = [axis for axis in self._axes if axis.spec.node not in angles]
             if not missing:
                 return angles
-        raise _silent(missing[0])
+        raise does_not_begin(missing[0])
 
     def _ready(self, train: Any, facts: Mapping[str, Fact]) -> Operation[None]:
         """Torque on where they stand, and as quick in following as the axis may be."""
@@ -184,6 +195,12 @@ class LedPart:
             if (lost := self.command.lost()) is not None:  # what was let go meanwhile tells that in many ways
                 raise lost from error
             raise
+        yield from self.watch.begin(self._axes)
+
+    def _within(self, axis: AxisVerbs, fact: Fact, planned: Planned) -> float:
+        """How near to its goal it must come (rad of the device)."""
+        asked = self._journey.tolerance
+        return _within(axis, fact, planned) if asked is None else asked * abs(axis.spec.ratio)
 
     def _begin(self, train: Any) -> Operation[None]:
         for axis in self._axes:
@@ -344,7 +361,7 @@ def _check_still(axis: AxisVerbs, stood: float, stands: float) -> None:
             f"{axis.name} is moving: it was at {axis.spec.show(stood)}, and is at {axis.spec.show(stands)}",
             expected="an axis at rest, for a movement begins from rest",
             cause="another movement leads it, or it is moved by hand",
-            advice="wait for it, or stop it first; nobody was moved, others of the movement may have torque by now",
+            advice="wait until it rests, or stop it first; nobody was moved, others of the movement may have torque",
             node=axis.spec.node,
         )
 
@@ -376,12 +393,3 @@ def _within(axis: AxisVerbs, fact: Fact, planned: Planned) -> float:
     if not _goes(axis, fact, planned):
         return TOLERANCE
     return min(TOLERANCE, max(NEAR * fact.grain, planned.ways[axis.name] * abs(axis.spec.ratio) / 2))
-
-
-def _silent(axis: AxisVerbs) -> NoReply:
-    return NoReply(
-        f"{axis.name} ({axis.spec.device}) does not answer, so this movement does not begin",
-        cause="its cable, its supply, or another device in between",
-        advice="look at the cable and the supply; nothing was sent that moves anything",
-        node=axis.spec.node,
-    )

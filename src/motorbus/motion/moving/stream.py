@@ -22,14 +22,15 @@ from motorbus.errors import (
     Interrupted,
     LimitExceeded,
     MotorbusError,
-    NoReply,
     RequestError,
     Stalled,
 )
 from motorbus.motion.command import Command
 from motorbus.motion.moving.forgiving import forgiven
+from motorbus.motion.moving.lagging import behind, not_there, silent
 from motorbus.motion.moving.moved import STILL, Cycles, Track
 from motorbus.motion.profile.shapes import NOTHING
+from motorbus.motion.safety.watch import Watch
 from motorbus.motion.trajectory import Course
 
 if TYPE_CHECKING:
@@ -150,7 +151,8 @@ class Stream:
     """Axes of one bus that are led along a course; `speeds` are the highest of it by name (rad/s, m/s).
 
     `within` is by name how near to its goal each must come in the end (rad of the device).
-    `command` is over these axes, `fate` that of the whole movement. With `reports` it reports its progress.
+    `command` is over these axes, `watch` over how they fare, `fate` is that of the whole movement. `patience` (s) is how
+    long after the end all must be in position. With `reports` it reports its progress.
     """
 
     def __init__(
@@ -163,7 +165,9 @@ class Stream:
         speeds: Mapping[str, float],
         within: Mapping[str, float],
         command: Command,
+        watch: Watch,
         fate: Fate,
+        patience: float = SETTLE,
         reports: bool = False,
     ) -> None:
         self._axes: Final = {axis.spec.node: axis for axis in axes}
@@ -173,7 +177,9 @@ class Stream:
         self._allowed: Final = {axis.name: _allowed(axis, speeds[axis.name]) for axis in axes}
         self._within: Final = within
         self._command: Final = command
+        self._watch: Final = watch
         self._fate: Final = fate
+        self._patience: Final = patience
         self._reports: Final = reports
         self._tracks: dict[str, tuple[list[float], list[float], list[float]]] = {
             axis.name: ([], [], []) for axis in axes
@@ -181,6 +187,7 @@ class Stream:
         self._start = self._lead = self._first = self._reported = 0.0
         self._over = False
         self._heard: dict[int, float] = {}
+        self._places: dict[int, float] = {}
         self._cycles = self._skipped = self._lost = 0
 
     def lead(self, bus: BusFace) -> float:
@@ -191,7 +198,8 @@ class Stream:
         """Lead them along the course, which begins at `start` (s on the link's clock), and see them arrive.
 
         Goals leave `lead` s before their slot. Raises Stalled for an axis that does not follow or arrive, NoReply for
-        one that is silent, Interrupted when somebody else has told one of them something or another part has failed.
+        one that is silent, Interrupted when somebody else has told one of them something or another part has failed,
+        and what the watch over them raises: Faulted, Overloaded.
         """
         self._start = start
         self._lead = lead
@@ -237,6 +245,7 @@ class Stream:
             yield from self._read()
             for axis in self._axes.values():
                 self._check_following(axis)
+            yield from self._ask()
             yield from self._report(slot * self._grid.period)
             slot = yield from self._next(slot)
 
@@ -270,6 +279,14 @@ class Stream:
             self._lost += 1
             self._check_heard(node, now)
 
+    def _ask(self) -> Operation[None]:
+        """How one of them fares, when it is his turn and there is room before the next slot."""
+        now = yield from Pause(0)
+        since = now - self._start
+        slack = self._grid.period - (since + self._lead) % self._grid.period
+        goals = self._goals(min(since, self._course.duration))
+        yield from self._watch.asking(slack, goals, self._places)
+
     def _keep(self, found: Positions) -> set[int]:
         since = found.at - self._start
         should = self._course.positions(since)
@@ -282,6 +299,7 @@ class Stream:
             ):
                 row.append(value)
             self._heard[node] = found.at
+        self._places.update(found.values)
         return set(found.values)
 
     def _report(self, since: float) -> Operation[None]:
@@ -304,8 +322,9 @@ class Stream:
             exact = exact or all(self._off(axis) <= STILL for axis in self._axes.values())
             if exact and all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
-            if now - end > SETTLE:
+            if now - end > self._patience:
                 self._check_arrived()
+            yield from self._ask()
             self._fate.check()
             self._command.check()
             if not exact:
@@ -324,7 +343,7 @@ class Stream:
             return False
         before = presents[-2] if len(presents) > 1 else presents[-1]
         still = abs(presents[-1] - before) * abs(axis.spec.ratio) <= STILL
-        return still or since > SETTLE
+        return still or since > self._patience
 
     def _off(self, axis: AxisVerbs) -> float:
         """How far it was last seen from its goal, in rad of the device."""
@@ -340,41 +359,22 @@ class Stream:
             raise self._stalled(axis)
 
     def _stalled(self, axis: AxisVerbs) -> Stalled:
-        spec, (goal, present) = axis.spec, (row[-1] for row in self._tracks[axis.name][1:])
-        return Stalled(
-            f"{axis.name} does not follow: it is at {spec.show(present)}, and should be at {spec.show(goal)} by now",
-            expected=f"within {spec.show(self._allowed[axis.name])} of where it should be",
-            cause="something blocks it, the load is too heavy, or it is slower than max_velocity says",
-            advice="clear the way, move slower, or change the limits of the axis; all of the movement were stopped",
-            node=spec.node,
-        )
+        goal, present = (row[-1] for row in self._tracks[axis.name][1:])
+        return behind(axis, goal, present, self._allowed[axis.name])
 
     def _check_arrived(self) -> None:
         """Raise Stalled for those that are not in position."""
-        goals = self._course.positions(self._course.duration)
         short = [axis for axis in self._axes.values() if self._off(axis) > self._within[axis.name]]
-        for axis in short[:1]:
-            spec, near = axis.spec, self._within[axis.name] / abs(axis.spec.ratio)
-            raise Stalled(
-                "; ".join(_stands(one, goals[one.name], self._tracks[one.name][2]) for one in short),
-                expected=f"within {spec.show(near)} of it, {SETTLE:g} s after the end",
-                cause="something blocks it, the load is too heavy, or its torque is bounded",
-                advice="clear the way, or allow it more torque; all of the movement were stopped",
-                node=spec.node,
-            )
+        if short:
+            near = self._within[short[0].name] / abs(short[0].spec.ratio)
+            presents = {name: rows[2] for name, rows in self._tracks.items()}
+            goals = self._course.positions(self._course.duration)
+            raise not_there(short, goals, presents, near, self._patience)
 
     def _check_heard(self, node: int, now: float) -> None:
         """Raise NoReply for an axis that has been silent for too long."""
-        silent = now - self._heard[node]
-        if silent <= max(SILENCE, 5 * self._grid.period):
-            return
-        axis = self._axes[node]
-        raise NoReply(
-            f"{axis.name} ({axis.spec.device}) has not answered for {silent:.2f} s while it was led",
-            cause="its cable, its supply, or another device in between",
-            advice="look at the cable and the supply; all of the movement were told to stop",
-            node=node,
-        )
+        if now - self._heard[node] > max(SILENCE, 5 * self._grid.period):
+            raise silent(self._axes[node], now - self._heard[node])
 
 
 def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:
@@ -385,8 +385,3 @@ def _allowed(axis: AxisVerbs, speed: float) -> float:
     """How far an axis may be from where it should be (rad, m); `max_step` bounds that too."""
     most = max(FAR / abs(axis.spec.ratio), LAG * speed)
     return most if axis.spec.max_step is None else min(most, axis.spec.max_step)
-
-
-def _stands(axis: AxisVerbs, goal: float, presents: Sequence[float]) -> str:
-    where = axis.spec.show(presents[-1]) if presents else "a place that is not known"
-    return f"{axis.name} is not in position: its goal is {axis.spec.show(goal)}, and it stands at {where}"

@@ -141,18 +141,24 @@ def move(
     duration: float | None = None,
     kind: Kind = "trapezoid",
     speed: float = 1.0,
+    tolerance: float | None = None,
+    timeout: float | None = None,
 ) -> Abreast[Moved]:
     """Move axes to these goals (rad, m, by their names): all begin together and all end together.
 
     It is as quick as the slowest axis can, or takes `duration` (s). `speed` (above 0, at most 1) makes all of it so
     much slower: with 0.5 it takes twice the time. `kind` is `trapezoid`, or `minimum_jerk`, which is gentler; an axis
-    whose device has a profile of its own moves by that.
+    whose device has a profile of its own moves by that. Each that measures where it is must be within `tolerance` (rad, m)
+    of its goal `timeout` s after the end; without these within 0.02 rad of its device, or nearer on a tiny way, and 1 s.
 
     Raises before anything moves: RequestError for a name that is no axis and for a duration that is too short,
     LimitExceeded for a goal, NotHomed for an axis of which nobody knows where it is, NoReply. When anything goes wrong
-    on the way, all axes are stopped and that is raised: Stalled, NoReply, Interrupted by a stop or another order.
+    on the way, all axes are stopped and that is raised: Stalled, NoReply, Interrupted by a stop or another order,
+    Faulted for a device that has restarted or let go, Overloaded for one that pushes too hard for too long or is too hot.
     """
-    return Journey(*_moving(body, goals, duration, kind, speed)).abreast()
+    _check_end(tolerance, timeout)
+    made = _moving(body, goals, duration, kind, speed)
+    return Journey(*made, tolerance=tolerance, timeout=timeout).abreast()
 
 
 def pose(
@@ -272,15 +278,19 @@ def move_axis(
     velocity: float | None = None,
     acceleration: float | None = None,
     duration: float | None = None,
+    tolerance: float | None = None,
+    timeout: float | None = None,
 ) -> Operation[Moved]:
     """Move to a position (rad, m) within a velocity and an acceleration (rad/s, m/s and per s²), and those of the axis.
 
-    As quick as these allow, or in `duration` (s). Returns when it is there. Raises as `Robot.move`, and LimitExceeded
+    As quick as these allow, or in `duration` (s). Returns when it is there, by `tolerance` and `timeout` as `Robot.move`
+    has them. Raises as `Robot.move`, and LimitExceeded
     for a velocity or an acceleration above that of the axis.
     """
     limits.check_goal(axis.name, axis.spec, to)
     own = limits.limits_for(axis.name, axis.spec, velocity=velocity, acceleration=acceleration)
-    return (yield from _alone(axis, _to(to), own, duration))
+    _check_end(tolerance, timeout)
+    return (yield from _alone(axis, _to(to), own, duration, tolerance=tolerance, timeout=timeout))
 
 
 def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Operation[float]:
@@ -296,35 +306,17 @@ def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Op
     return _gone((yield from _alone(axis, _by(way), own)).axes[axis.name])
 
 
-def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
-    """Move at a velocity (rad/s, m/s, with its sign) for so long (s), starting and stopping within it.
-
-    Returns the way that was gone, as `move_by`. Raises LimitExceeded, and nothing is sent, when the way would lead out
-    of the limits; else as `move`.
-    """
-    if "train" not in axis.able:
-        return (yield from reckoning.jog(axis, velocity, seconds))
-    limits.check_velocity(axis.name, axis.spec, velocity)
-    limits.check_number(f"{axis.name}: its seconds", seconds)
-    if not (isfinite(seconds) and seconds > 0) or not velocity:
-        raise RequestError(
-            f"{axis.name}: {velocity} for {seconds} s is no jog",
-            expected="a velocity that is not 0, and a finite time above 0",
-            advice=NOTHING,
-        )
-    own = limits.limits_for(axis.name, axis.spec, velocity=abs(velocity))
-    ramp = min(own.velocity / own.acceleration, seconds / 2)
-    way = copysign(own.acceleration * ramp * (seconds - ramp), velocity)
-    return _gone((yield from _alone(axis, _by(way), own)).axes[axis.name])
-
-
 def _alone(
-    axis: AxisVerbs, goal: Callable[[float], float], own: Limits, duration: float | None = None
+    axis: AxisVerbs,
+    goal: Callable[[float], float],
+    own: Limits,
+    duration: float | None = None,
+    **end: float | None,
 ) -> Operation[Moved]:
     _check("trapezoid", duration)
     axes = {axis.name: axis}
     plan = PointToPoint(axes, {axis.name: goal}, {axis.name: own}, "trapezoid", duration)
-    journey = Journey(axes, plan, {axis.spec.bus: 0.0})
+    journey = Journey(axes, plan, {axis.spec.bus: 0.0}, **end)
     told = yield from outcome(journey.on(axis.spec.bus))
     return journey.combine({axis.spec.bus: told})
 
@@ -340,6 +332,15 @@ def _to(goal: float) -> Callable[[float], float]:
 
 def _by(way: float) -> Callable[[float], float]:
     return lambda start: start + way
+
+
+def _check_end(tolerance: float | None, timeout: float | None) -> None:
+    for name, value in (("tolerance", tolerance), ("timeout", timeout)):
+        if value is None:
+            continue
+        limits.check_number(name, value)
+        if not (isfinite(value) and value > 0):
+            raise RequestError(f"{name} is {value}", expected="a finite number above 0", advice=NOTHING)
 
 
 def _check(kind: Kind, duration: float | None) -> None:

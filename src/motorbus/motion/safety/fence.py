@@ -12,6 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from motorbus.core.operation import Runnable
+from motorbus.motion.reckoning import UNDER_WAY, Reckoning
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
 
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
 
 
 def fence(body: Body) -> None:
-    """Set a guard over every axis of this machine, by what is known of it by now."""
-    for bus in body.buses.values():
+    """Set a guard over every axis of this machine, by what is known of it by now; endless motion is to be attended."""
+    for name, bus in body.buses.items():
         if isinstance(bus.admit, Gate):
             _watched(bus, bus.admit)
+            bus.admit.attended, bus.admit.origin = True, body.origins[name]
     for axis in body.axes.values():
         gate = body.buses[axis.spec.bus].admit
         if isinstance(gate, Gate):
@@ -49,23 +51,40 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
 
 
 def _watched(bus: BusFace, gate: Gate) -> None:
-    gate.watch(bus.turns.known.seen, bus.link.now)
+    gate.watch(bus.turns.known.seen, bus.link.now, bus.turns.known.stops)
     bus.turns.look = gate.look
 
 
 def guard(axis: AxisVerbs) -> Guard:
     """The guard over one axis."""
     position = axis.able.get("position")
+    if position is None and axis.reckoning is not None:
+        return _reckoned(axis, axis.reckoning)
     return _guard(axis.name, axis.spec, None if position is None else partial(position, axis.device))
+
+
+def _reckoned(axis: AxisVerbs, reckoning: Reckoning) -> Guard:
+    """Of an axis whose device does not tell where it is: what is reckoned counts, until somebody else moves it."""
+
+    def here() -> float | None:
+        return None if reckoning.position is None else axis.spec.to_device(reckoning.position)
+
+    def leaves() -> None:
+        if reckoning.why != UNDER_WAY:
+            reckoning.forget("its device was ordered to move by itself, and not as an axis")
+
+    return Guard(
+        axis.name, bounds(axis.spec), measures=False, reckons=here, leaves=leaves, show=_shown(axis.spec)
+    )
 
 
 def _guard(name: str, spec: AxisSpec, ask: Callable[[], Runnable[Any]] | None) -> Guard:
     """A guard over a device that tells where it is when it is asked so; None: it cannot be asked."""
+    return Guard(name, bounds(spec), measures=ask is not None, ask=ask, show=_shown(spec))
 
-    def show(angle: float) -> str:
-        return spec.show(spec.from_device(angle))
 
-    return Guard(name, bounds(spec), measures=ask is not None, ask=ask, show=show)
+def _shown(spec: AxisSpec) -> Callable[[float], str]:
+    return lambda angle: spec.show(spec.from_device(angle))
 
 
 def bounds(spec: AxisSpec) -> Bounds:

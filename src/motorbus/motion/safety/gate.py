@@ -11,12 +11,12 @@ bus has heard lately is what it knows. A stop passes whatever happens, and so do
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import inf, isfinite
 from typing import Any, Final
 
-from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable
-from motorbus.errors import LimitExceeded, Refused
+from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused
 from motorbus.motion.safety.guard import Guard
 from motorbus.motion.safety.lease import Lease
 
@@ -30,8 +30,9 @@ class Gate:
     """Called with an exchange before it is sent; raises Refused, as a rule LimitExceeded, else does nothing.
 
     `guards` by node are what bounds it beyond the limits of its device. `faults` by node are reasons for which nothing
-    of it may move or get torque. With a `lease`, only its holder moves anything. `attended`: endless motion, which only
-    its stop ends, needs a lease whose holder attends.
+    of it may move or get torque. With a `lease`, only its holder moves anything; the time of that was 0 when the clock
+    of the link showed `origin` (s). `attended`: endless motion, which only its stop ends, needs a lease whose holder
+    attends.
     """
 
     def __init__(self) -> None:
@@ -39,14 +40,26 @@ class Gate:
         self.faults: Final[dict[int, str]] = {}
         self.lease: Lease | None = None
         self.attended = False
+        self.origin = 0.0
+        self._turning: dict[int, int] = {}
+        self._stops: Stops = _none
         self._seen: Seen = {}
         self._now: Callable[[], float] = _never
         self._answer: Answer | None = None
         self._places: Mapping[int, float] = {}
 
-    def watch(self, seen: Seen, now: Callable[[], float]) -> None:
-        """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s)."""
-        self._seen, self._now = seen, now
+    def watch(self, seen: Seen, now: Callable[[], float], stops: Stops | None = None) -> None:
+        """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s), `stops`
+        how many stops have left for a node."""
+        self._seen, self._now, self._stops = seen, now, stops or self._stops
+
+    def goes_on(self, node: int) -> bool:
+        """Whether it was told to go on without an end, as far as this gate knows, and nothing else since."""
+        return self._turning.get(node) == self._stops(node)
+
+    def loss(self) -> Refused | None:
+        """The error for a lease that is lost; None where it is not, or there is none."""
+        return None if self.lease is None else self.lease.loss(self._now() - self.origin)
 
     def look(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
         """What must be asked before this order can be judged: where those are whose position is not known well enough.
@@ -94,6 +107,10 @@ class Gate:
                         continue
                 if not _stays(goal):
                     self._check_guarded(guard, goal, now)
+                    if guard is not None:
+                        guard.leaves()
+                elif self._turning:
+                    self._turning.pop(goal.node, None)
 
     # -- whether anything may move -----------------------------------------------------------------------------------
 
@@ -110,12 +127,13 @@ class Gate:
                     node=node,
                 )
         if self.lease is not None:
-            self.lease.check(self._now())
+            self.lease.check(self._now() - self.origin)
 
     # -- guards --------------------------------------------------------------------------------------------------------
 
     def _check_guarded(self, guard: Guard | None, goal: Goal, now: float) -> None:
-        if goal.quantity in ENDLESS and goal.value:
+        endless = goal.quantity in ENDLESS
+        if endless and goal.value:
             self._check_attended(goal, now)
         if guard is None:
             return
@@ -124,6 +142,10 @@ class Gate:
         elif goal.quantity in PLACES:
             guard.check_known(goal.node, now)
             guard.check_goal(goal)
+        if endless:
+            self._turning.pop(goal.node, None)
+            if goal.value:
+                self._turning[goal.node] = self._stops(goal.node)
 
     def _of_everyone(self, goals: tuple[Goal, ...]) -> tuple[Goal, ...]:
         """What an order for everyone says to those with a guard as well whom it does not name: it moves them too."""
@@ -132,12 +154,12 @@ class Gate:
         return (*goals, *more)
 
     def _check_attended(self, goal: Goal, now: float) -> None:
-        if self.attended and (self.lease is None or not self.lease.is_attended(now)):
+        if self.attended and (self.lease is None or not self.lease.is_attended(now - self.origin)):
             raise Refused(
                 f"node {goal.node}: goal {goal.quantity} has no end of its own, and nobody attends",
                 reason="unattended",
                 cause="a host that dies, or a cable that breaks, leaves the motor turning",
-                advice="take an attended lease, or order a move, which ends by itself; nothing was sent",
+                advice="order it inside `robot.attended()`, or order a move, which ends by itself; nothing was sent",
                 node=goal.node,
             )
 
@@ -171,6 +193,27 @@ def _stays(goal: Goal) -> bool:
 def _goes(goal: Goal) -> bool:
     """It is told to go to a place."""
     return goal.quantity in PLACES and not _stays(goal)
+
+
+def blamed(error: MotorbusError, buses: Iterable[Any]) -> MotorbusError:
+    """The error that says why: a movement that was ended because the lease was lost says so, and so do its notes.
+
+    `buses` are those that it was on.
+    """
+    ended = isinstance(error, Interrupted) or (isinstance(error, Refused) and error.reason == "lease")
+    gates = (bus.admit for bus in buses if isinstance(bus.admit, Gate)) if ended else ()
+    loss = next((loss for gate in gates if (loss := gate.loss()) is not None), None)
+    if loss is None:
+        return error
+    for note in getattr(error, "__notes__", ()):
+        loss.add_note(note)
+    loss.node = error.node
+    return loss
+
+
+def _none(_: int) -> int:
+    """The stops of a gate that was not told where they are counted."""
+    return 0
 
 
 def _never() -> float:

@@ -21,6 +21,15 @@ UNIT: Final = 0.08
 """rad/s by which a speed may be beyond: it was rounded up to the next unit, 0.732 RPM at the coarsest."""
 
 
+def _unknown() -> float | None:
+    """Where a device is of which nobody keeps account."""
+    return None
+
+
+def _nobody() -> None:
+    """What it means for an account that nobody keeps."""
+
+
 class Bounds(NamedTuple):
     """`low` and `high` position (rad of the device), the farthest `step` from where it is measured to be (rad) and the
     greatest `speed` (rad/s); infinite where nobody bounds it."""
@@ -36,7 +45,8 @@ class Guard:
 
     `ask` reads its position, so that a bus can look before it gives an order; `show` words an angle of the device;
     `answer` is the last one of the bus that was taken in here.
-    `track` is None where the device does not tell where it is: then nothing can be asked of its position.
+    `track` is None where the device does not tell where it is. Then `reckons` gives where it is by dead reckoning (rad
+    of the device; None: nobody knows), and `leaves` is called when it was ordered to move, whoever did that.
     """
 
     def __init__(
@@ -46,12 +56,16 @@ class Guard:
         *,
         measures: bool = True,
         ask: Callable[[], Runnable[Any]] | None = None,
+        reckons: Callable[[], float | None] = _unknown,
+        leaves: Callable[[], None] = _nobody,
         show: Callable[[float], str] = "{:.4g} rad".format,
     ) -> None:
         self.name: Final = name
         self.bounds: Final = bounds
         self.ask: Final = ask
+        self.leaves: Final = leaves
         self.show: Final = show
+        self._reckons: Final = reckons
         self.track: Final = Track() if measures else None
         self.answer: Answer | None = None
         self._low: Final = bounds.low - ROUNDED
@@ -77,8 +91,7 @@ class Guard:
     def check_goal(self, goal: Goal) -> None:
         """Raise LimitExceeded for a position, or a way, that leads out of the bounds or is too far for one step."""
         low, high, step, _ = self.bounds
-        sample = self.track.sample if self.track is not None else None
-        here = None if sample is None else sample.value
+        here = self._here()
         relative = goal.quantity == "relative"
         to = goal.value if not relative else None if here is None else here + goal.value
         if to is not None and not self._allows(to, here):
@@ -95,6 +108,13 @@ class Guard:
                 "go there in smaller steps, or by a move of the axis",
                 "step",
             )
+
+    def _here(self) -> float | None:
+        """Where it is, as far as that is known (rad of the device)."""
+        if self.track is None:
+            return self._reckons()
+        sample = self.track.sample
+        return None if sample is None else sample.value
 
     def _allows(self, to: float, here: float | None) -> bool:
         """Whether this place is within the bounds, or no farther out than it stands: it may always come back.

@@ -11,7 +11,7 @@ Endless motion, which only its stop ends, needs one who *attends*: he sees the m
 from __future__ import annotations
 
 from enum import Enum
-from math import isfinite
+from math import inf, isfinite
 from typing import Final
 
 from motorbus.errors import Refused, RequestError
@@ -29,12 +29,17 @@ class Standing(Enum):
 
 
 class Lease:
-    """The right to move, which one holder has at a time. It `lasts` so long (s) after each heartbeat."""
+    """The right to move, which one holder has at a time. It `lasts` so long (s) after each heartbeat.
 
-    def __init__(self, lasts: float = LASTS) -> None:
-        if not (isfinite(lasts) and lasts > 0):
+    With None it does not run out: that is for a holder who is this very program, for when that is gone it sends
+    nothing. One that is `needed` lets nothing move while nobody holds it.
+    """
+
+    def __init__(self, lasts: float | None = LASTS, *, needed: bool = True) -> None:
+        if lasts is not None and not (isfinite(lasts) and lasts > 0):
             raise RequestError(f"a lease cannot last {lasts} s", expected="a finite number above 0")
         self.lasts: Final = lasts
+        self.needed: Final = needed
         self.holder = ""
         self._attended = False
         self._until = 0.0
@@ -52,16 +57,30 @@ class Lease:
             return Standing.LOST
         return Standing.HELD if self.holder else Standing.FREE
 
+    @property
+    def until(self) -> float:
+        """The moment (s) at which it runs out unless its holder says that he is there; infinite while nobody has it."""
+        return self._until if self.holder else inf
+
+    def loss(self, now: float) -> Refused | None:
+        """The error for whom it was lost under, None while it is not lost. Something may have moved by then."""
+        if self.standing(now) is not Standing.LOST:
+            return None
+        error = self._is_lost()
+        error.unmoved = False
+        error.advice = "see that the machine is clear, reset the lease, and take it again; what moved was told to stop"
+        return error
+
     def is_attended(self, now: float) -> bool:
         """Whether it is held, and its holder attends."""
         return self.standing(now) is Standing.HELD and self._attended
 
     def check(self, now: float) -> None:
-        """Raise Refused when nobody holds it, or it is lost: nothing may move then but to a stop."""
+        """Raise Refused when it is lost, or is needed and nobody holds it: nothing may move then but to a stop."""
         standing = self.standing(now)
         if standing is Standing.LOST:
             raise self._is_lost()
-        if standing is Standing.FREE:
+        if standing is Standing.FREE and self.needed:
             raise Refused(
                 "nobody holds the lease of this machine, so nothing may move",
                 reason="lease",
@@ -81,18 +100,18 @@ class Lease:
             raise Refused(
                 f"{self.holder} holds the lease of this machine",
                 reason="lease",
-                expected=f"a lease that is free; this one is held for {self._until - self._now:.2g} s at least",
+                expected=f"a lease that is free; this one is held {self._for}",
                 advice="ask for it to be released; nothing was sent",
             )
         self.holder, self._attended = holder, attended
-        self._until = self._now + self.lasts
+        self._prolong()
 
     def beat(self, holder: str, now: float) -> None:
         """The holder is still there. Raises Refused when it is not, or no longer, the holder."""
         if self.standing(now) is Standing.LOST:
             raise self._is_lost()
         self._check_holder(holder)
-        self._until = self._now + self.lasts
+        self._prolong()
 
     def attend(self, holder: str, now: float, attended: bool = True) -> None:
         """The holder attends from now on, or no longer. Raises as `beat`; it counts as one."""
@@ -111,6 +130,14 @@ class Lease:
         self.standing(now)
         self._lost = ""
 
+    def _prolong(self) -> None:
+        self._until = inf if self.lasts is None else self._now + self.lasts
+
+    @property
+    def _for(self) -> str:
+        left = self._until - self._now
+        return f"for {left:.2g} s at least" if isfinite(left) else "until its holder gives it back"
+
     def _check_holder(self, holder: str) -> None:
         if holder != self.holder or not holder:
             whose = f"{self.holder} holds it" if self.holder else "nobody holds it"
@@ -122,7 +149,7 @@ class Lease:
 
     def _is_lost(self) -> Refused:
         return Refused(
-            f"the lease of this machine was lost: {self._lost} was silent for more than {self.lasts:g} s",
+            f"the lease of this machine was lost: {self._lost} was silent for more than {self.lasts or 0.0:g} s",
             reason="lease",
             cause="its program ended or hung, or the connection to it is broken",
             advice="see that the machine is clear, reset the lease, and take it again; nothing was sent",

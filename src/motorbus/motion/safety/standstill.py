@@ -7,11 +7,12 @@ seen to rest, and of it nobody says so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation, Pause, outcome
+from motorbus.core.operation import Operation, Pause, Runnable, outcome
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError
 from motorbus.motion.capabilities import stop
 from motorbus.motion.safety.track import Sample, Track
@@ -97,31 +98,44 @@ class Standstill:
 
 
 def stopped(axis: AxisVerbs, *, patience: float = PATIENCE) -> Operation[Stopped]:
-    """Stop an axis, then look whether it rests, for at most `patience` s; gives what was promised and what was seen.
+    """Decelerate and stay, then look whether it rests, for at most `patience` s; gives what was promised and seen.
 
-    Raises as `stop` when the device did not accept it; that it was not seen to rest is no error.
+    Raises as `stop` when the device did not accept it; that it was not seen to rest is no error: see `Stopped.rest`.
     """
     promise: Enum = yield from stop(axis)
-    if "position" not in axis.able:
-        return Stopped(promise, Rest.UNSEEN)
     return (yield from seen(axis, promise, patience))
 
 
 def seen(axis: AxisVerbs, promise: Enum, patience: float = PATIENCE) -> Operation[Stopped]:
     """Look at an axis that was stopped, until it is seen to rest or for `patience` s; its silence is no error."""
+    if "position" not in axis.able:
+        return Stopped(promise, Rest.UNSEEN)
+    rest, place = yield from watched(lambda: axis.able["position"](axis.device), patience)
+    return Stopped(promise, rest, None if place is None else axis.spec.from_device(place))
+
+
+def watched(
+    ask: Callable[[], Runnable[float]], patience: float = PATIENCE
+) -> Operation[tuple[Rest, float | None]]:
+    """Ask a device where it is (rad) until it is seen to rest, for at most `patience` s; what was seen, and where last.
+
+    It is asked three times at least, whatever the patience. Its silence is no error.
+    """
     judge, track = Standstill(), Track()
-    now = begun = yield from Pause(0)
+    begun = yield from Pause(0)
+    asked = 0
     while True:
-        told = yield from outcome(axis.able["position"](axis.device))
+        told = yield from outcome(ask())
         now = yield from Pause(0)
+        asked += 1
         if isinstance(told, LOST):
             judge.lost()
         elif isinstance(told, MotorbusError):
             raise told
         elif judge.take(track.take(told, now)):
             break
-        if now - begun >= patience:
+        if now - begun >= patience and asked >= READS:
             break
         yield from Pause(PAUSE)
     sample = track.sample
-    return Stopped(promise, judge.rest, None if sample is None else axis.spec.from_device(sample.value))
+    return judge.rest, None if sample is None else sample.value

@@ -26,6 +26,8 @@ OFF: Final = 0.1
 """rad of the device off its goal: twice what a servo stands off its goal under the greatest load it may carry."""
 SECONDS: Final = 1.0
 """s for which all of that must last."""
+TURNING: Final = 0.5
+"""rad/s of the device. What turns faster is not blocked, and is at a high duty for its speed and not for its load."""
 HOT: Final = 65.0
 """°C."""
 COOL: Final = 60.0
@@ -69,13 +71,17 @@ class Verdict(Enum):
 class Strain:
     """Watches one motor, sample by sample; see `Bearable` for what is too much.
 
+    `sample` is the last one, `since` when (s) the strain began that lasts still. Load is the duty of the motor, which is
+    high at a high speed too, so of what turns it does not count; current does.
+
     OVERLOADED stays until `reset`, HOT until it has cooled down: whoever makes it easy for a moment must not find the
     motor pushing again at once.
     """
 
     def __init__(self, bearable: Bearable = USUAL) -> None:
         self.bearable: Final = bearable.checked()
-        self._since: float | None = None
+        self.since: float | None = None
+        self.sample: State | None = None
         self._overloaded = False
         self._hot = False
 
@@ -84,12 +90,13 @@ class Strain:
 
         Without a goal, or a position, nobody knows whether it comes to its goal, and the load alone is no strain.
         """
+        self.sample = state
         self._take_heat(state.temperature)
         if not self._strains(state, goal):
-            self._since = None
-        elif self._since is None or state.at < self._since:
-            self._since = state.at
-        elif state.at - self._since >= self.bearable.seconds:
+            self.since = None
+        elif self.since is None or state.at < self.since:
+            self.since = state.at
+        elif state.at - self.since >= self.bearable.seconds:
             self._overloaded = True
         return self.verdict
 
@@ -100,11 +107,11 @@ class Strain:
             return Verdict.OVERLOADED
         if self._hot:
             return Verdict.HOT
-        return Verdict.EASY if self._since is None else Verdict.STRAINED
+        return Verdict.EASY if self.since is None else Verdict.STRAINED
 
     def reset(self) -> None:
         """Somebody has seen to it: an overload is forgotten. Heat is not, for it is still there."""
-        self._overloaded, self._since = False, None
+        self._overloaded, self.since = False, None
 
     def _take_heat(self, temperature: float | None) -> None:
         if temperature is None:
@@ -117,5 +124,6 @@ class Strain:
     def _strains(self, state: State, goal: float | None) -> bool:
         if goal is None or state.position is None or not abs(goal - state.position) > self.bearable.off:
             return False
-        hard = state.load is not None and abs(state.load) >= self.bearable.load
+        turns = state.velocity is not None and abs(state.velocity) > TURNING
+        hard = state.load is not None and abs(state.load) >= self.bearable.load and not turns
         return hard or (state.current is not None and abs(state.current) >= self.bearable.current)

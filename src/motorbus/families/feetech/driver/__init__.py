@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from motorbus.core.family import Positions
 from motorbus.families.feetech.driver.alarm import alarms
+from motorbus.families.feetech.driver.at_once import reg_write_all
 from motorbus.families.feetech.driver.blocked import blockers
 from motorbus.families.feetech.driver.bound import Powerless
 from motorbus.families.feetech.driver.calibration import Calibration, Zero, calibrate, zero
@@ -25,6 +26,7 @@ from motorbus.families.feetech.driver.feedback import (
     voltage,
 )
 from motorbus.families.feetech.driver.group import GroupResult, prepare_all, sync_read, sync_write
+from motorbus.families.feetech.driver.health import health
 from motorbus.families.feetech.driver.identity import identify, ping, prepare
 from motorbus.families.feetech.driver.loop import (
     position_reads,
@@ -98,6 +100,7 @@ __all__ = [
     "enable_torque",
     "factory_restore",
     "gains",
+    "health",
     "identify",
     "limits",
     "load",
@@ -116,6 +119,7 @@ __all__ = [
     "recover",
     "recover_overload",
     "reg_write",
+    "reg_write_all",
     "scan",
     "second_id",
     "set_baud",

@@ -5,12 +5,13 @@ All figures come with their source; none is measured by this project.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from motorbus.core.family import Stop
 from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Timeout
 from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.holding import PROMISE, holds
 from motorbus.families.feetech.driver.motion import Promise
 from motorbus.families.feetech.driver.torque import LIMP
 
@@ -88,16 +89,37 @@ def probe(node: int, attempt: int) -> Exchange[bool]:
     )
 
 
-def stop(nodes: Iterable[int]) -> Stop:
-    """Torque off for everyone at once, then for each node until it acknowledges. An arm goes limp."""
-    everyone: Exchange[Answer] = Exchange(
+def stop(nodes: Mapping[int, Answer | None], hold: Collection[int] = ()) -> Stop:
+    """Torque off for everyone at once, then for each node until it acknowledges: an arm goes limp.
+
+    Those of `hold` keep their torque and are held where they are, known or not: see `holding`.
+    """
+    others = sorted(set(nodes) - set(hold))
+    if not hold:
+        return Stop((_everyone(), *map(_limp, others)), Promise.TORQUE_OFF_ACCEPTED.value)
+    rest = [node for node in range(wire.MAX_ID + 1) if node not in hold and node not in nodes]
+    frames = (*_at_once(others), *map(_limp, others), *holds(nodes, hold), *_at_once(rest))
+    return Stop(frames, f"{Promise.TORQUE_OFF_ACCEPTED.value}; {PROMISE}")
+
+
+def _everyone() -> Exchange[Answer]:
+    return Exchange(
         wire.write(wire.BROADCAST, LIMP.address, LIMP.data),
         (),
         rank=Rank.STOP,
         effect=LIMP.effect,
         repeatable=True,
     )
-    return Stop((everyone, *(_limp(node) for node in sorted(nodes))), Promise.TORQUE_OFF_ACCEPTED.value)
+
+
+def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Answer]]:
+    """Torque off to these and to nobody else, as many frames as that takes; nobody answers."""
+    capacity = wire.sync_write_capacity(len(LIMP.data))
+    for start in range(0, len(nodes), capacity):
+        items = [(node, LIMP.data) for node in nodes[start : start + capacity]]
+        yield Exchange(
+            wire.sync_write(LIMP.address, items), (), rank=Rank.STOP, effect=LIMP.effect, repeatable=True
+        )
 
 
 def _limp(node: int) -> Exchange[Answer]:

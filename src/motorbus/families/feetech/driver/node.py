@@ -86,11 +86,12 @@ class Settings(NamedTuple):
 
 class Pending(NamedTuple):
     """What a REG WRITE from here ordered and no ACTION has carried out yet: the goals, the settings by which they were
-    reckoned, and how many stops had left for the servo until then."""
+    reckoned, how many stops had left for the servo until then, and whether it was taken back since."""
 
     goals: tuple[Goal, ...]
     settings: Settings | None
     stops: int = 0
+    withdrawn: bool = False
 
 
 class Node:

@@ -6,7 +6,7 @@ guarded sequence of `eeprom.py`, and what `orders.py` refuses not at all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
@@ -38,8 +38,8 @@ from motorbus.families.feetech.driver.orders import (
 )
 from motorbus.families.feetech.driver.torque import disable_torque
 
-_IDLE: Final = b"\0"
-_WAITING: Final = b"\1"
+IDLE: Final = b"\0"
+WAITING: Final = b"\1"
 _GAP: Final = 8
 """Bytes between two rows that are cheaper to read than to leave out: a request has 8, a reply 6, and a pause."""
 
@@ -168,7 +168,16 @@ def reg_write(node: Node, /, **values: Value) -> Operation[None]:
     """
     check_values(values)
     table = yield from writable(node)
-    block = only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
+    yield from hand_over(node, table, to_hand_over(node, table, values))
+
+
+def to_hand_over(node: Node, table: Table, values: Mapping[str, Value]) -> Block:
+    """What a REG WRITE of these would bring: adjoining registers, not to be sent twice. Raises RequestError."""
+    return only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
+
+
+def hand_over(node: Node, table: Table, block: Block) -> Operation[None]:
+    """REG WRITE one block, and see that it was taken. Raises OutcomeUnknown when nobody knows."""
     request = wire.reg_write(node.node, block.address, block.data)
     exchange = acknowledged(node, request, block, refusal=_handed_over(node, block))
     yield from exchange
@@ -194,7 +203,7 @@ def _handed_over(node: Node, block: Block) -> Refusal:
 
 def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
-    if (yield from _waits(node, table)) != _WAITING:
+    if (yield from waits(node, table)) != WAITING:
         raise OutcomeUnknown(
             f"node {node.node} holds no REG WRITE after one was sent",
             sent=exchange.request,
@@ -204,10 +213,10 @@ def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[No
         )
 
 
-def _waits(node: Node, table: Table) -> Exchange[bytes]:
-    """`_WAITING` or `_IDLE`. It is held against what it ought to be, which a dry run takes for granted."""
+def waits(node: Node, table: Table) -> Exchange[bytes]:
+    """`WAITING` or `IDLE`. It is held against what it ought to be, which a dry run takes for granted."""
     return read_block(
-        node, table["reg_write_pending"].address, 1, lambda told: _IDLE if told == _IDLE else _WAITING
+        node, table["reg_write_pending"].address, 1, lambda told: IDLE if told == IDLE else WAITING
     )
 
 
@@ -240,7 +249,7 @@ def _met(node: Node) -> Operation[None]:
 def _seen(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
     yield from exchange
-    if (yield from _waits(node, table)) != _IDLE:
+    if (yield from waits(node, table)) != IDLE:
         raise OutcomeUnknown(
             f"node {node.node} still holds a REG WRITE after ACTION was sent",
             sent=exchange.request,
@@ -283,6 +292,8 @@ def _still_wanted(nodes: Sequence[Node]) -> Refusal:
 
     def refusal(stops: Stops) -> MotorbusError | None:
         for node in nodes:
+            if node.pending is not None and node.pending.withdrawn:
+                return _taken_back(node)
             if node.pending is not None and node.pending.settings != node.settings:
                 return outdated(node, "the REG WRITE that waits")
             if node.pending is not None and stops(node.node) > node.pending.stops:
@@ -299,6 +310,16 @@ def _let_go_since(node: Node) -> RequestError:
         f"node {node.node} was told to let go after its REG WRITE was handed over, and ACTION would move it",
         expected="no stop between the two",
         cause="disable_torque(), an emergency stop, or a write to EEPROM, which begins with torque off",
+        advice="reg_write() it again, which replaces what waits; nothing was sent",
+        node=node.node,
+    )
+
+
+def _taken_back(node: Node) -> RequestError:
+    return RequestError(
+        f"the REG WRITE for node {node.node} was taken back, for another servo had not acknowledged its own",
+        expected="a REG WRITE that is wanted still",
+        cause="reg_write_all() releases all or nothing",
         advice="reg_write() it again, which replaces what waits; nothing was sent",
         node=node.node,
     )

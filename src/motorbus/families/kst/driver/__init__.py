@@ -44,6 +44,7 @@ from motorbus.families.kst.driver.feedback import (
     telemetry,
     temperature,
 )
+from motorbus.families.kst.driver.health import health
 from motorbus.families.kst.driver.identity import (
     bit_rate,
     identify,
@@ -96,6 +97,7 @@ __all__ = [
     "broadcast_save",
     "current",
     "dialect_of",
+    "health",
     "identify",
     "limits",
     "move",

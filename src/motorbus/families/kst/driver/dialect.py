@@ -7,6 +7,7 @@ answers, who takes sized writes only, which alarms were heard). The plain family
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from math import inf
 from typing import Final
@@ -34,6 +35,7 @@ class Memory:
     `sized`     nodes that take only writes which state their length
     `frames`    frames heard that were no bus errors, and `errors` those that were
     `strangers` nodes that replied in an id format which is not spoken here
+    `boots`     how often each node has said that it starts
     """
 
     def __init__(self) -> None:
@@ -41,6 +43,7 @@ class Memory:
         self.sized: set[int] = set()
         self.strangers: set[int] = set()
         self.alarms: dict[int, tuple[tuple[str, ...], float | None]] = {}
+        self.boots: Counter[int] = Counter()
         self.frames = 0
         self.errors = 0
 
@@ -57,6 +60,8 @@ class Memory:
         self.frames += 1
         if isinstance(event, Notice) and event.kind == "alarm":
             self.alarms[event.node] = (alarm_names(event.data), None)
+        if isinstance(event, Notice) and event.kind == "heartbeat" and wire.says_boot(event.data):
+            self.boots[event.node] += 1
 
     def alarm(self, node: int, at: float) -> tuple[str, ...]:
         """The alarms of this node that were heard lately, `at` being now."""

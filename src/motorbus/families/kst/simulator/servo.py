@@ -277,6 +277,8 @@ class Servo:
             self.shaft.go(switches.default_position, at)
         self._interval = (switches.reports_ms or self._interval_as_shipped) / 1000
         self._report(bool(switches.reports_ms), at)
+        if switches.boot_notice and self.lives > 1:
+            self._say(self, at, wire.encode_boot(self.node, extended=self.extended))
         if self._is_low:
             self.alarm()
 

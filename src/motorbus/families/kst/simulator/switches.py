@@ -232,6 +232,11 @@ class Switches:
         "report from power-up on every so many milliseconds; 0: only when started, as 0x2200 says",
         source="made for tests of reports that collide with answers",
     )
+    boot_notice: bool = switch(
+        False,
+        "they say that they start, as CiA 301 has it, whenever their supply comes back",
+        source="CiA 301: a heartbeat of state 0; the manual has none, and neither has any public driver",
+    )
     voltage: float = switch(7.4, "their supply in V", source=_ASSUMED)
     low_voltage: float = switch(6.0, "the supply in V below which the alarm comes", source=_ASSUMED)
 

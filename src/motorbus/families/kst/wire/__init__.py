@@ -40,8 +40,10 @@ from motorbus.families.kst.wire.notices import (
     decode_report,
     decode_start,
     encode_alarm,
+    encode_boot,
     encode_report,
     encode_start,
+    says_boot,
 )
 from motorbus.families.kst.wire.receiver import FrameReceiver
 from motorbus.families.kst.wire.sdo import (
@@ -86,6 +88,7 @@ __all__ = [
     "encode_abort",
     "encode_abort_reply",
     "encode_alarm",
+    "encode_boot",
     "encode_download",
     "encode_download_reply",
     "encode_report",
@@ -95,6 +98,7 @@ __all__ = [
     "encode_upload",
     "encode_upload_reply",
     "encode_upload_start",
+    "says_boot",
     "segment_due",
     "upload_due",
 ]

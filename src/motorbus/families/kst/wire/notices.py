@@ -24,6 +24,7 @@ LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"
 FORMS: Final = ("vendor", "standard")
 STATES: Final = {0x00: "boot-up", 0x04: "stopped", 0x05: "operational", 0x7F: "pre-operational"}
 """What a heartbeat says (CiA 301)."""
+_BOOT: Final = 0x00
 _PAD: Final = b"\0\0"
 _START: Final = 1
 _STOP: Final = 2
@@ -86,6 +87,16 @@ def _kind(base: int, data: bytes) -> str:
     if base == HEARTBEAT:
         return "heartbeat" if len(data) == 1 and data[0] & 0x7F in STATES else ""
     return ""
+
+
+def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
+    """A node says that it starts (CiA 301: the heartbeat of state 0). Raises RequestError for an impossible node."""
+    return CanFrame(HEARTBEAT + one(node), bytes((_BOOT,)), extended)
+
+
+def says_boot(data: bytes) -> bool:
+    """Whether a heartbeat with this data says that its node has just started."""
+    return len(data) == 1 and data[0] & 0x7F == _BOOT
 
 
 def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> CanFrame:

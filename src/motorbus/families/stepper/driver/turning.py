@@ -13,7 +13,7 @@ every error the position is not known, but for those that are `unmoved`: the ord
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf
+from math import ceil, inf
 from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
@@ -180,7 +180,10 @@ def refuse_unless_idle(node: Node, what: str) -> Operation[None]:
         expected="its notice, or an accepted stop" if node.memory.owed else "its time, or an accepted stop",
         cause="a busy controller ignores such an order, a stop ends whatever turns, and a notice does not say whose "
         "end it tells",
-        advice="wait for it, or say stop() first; nothing was sent",
+        advice="say stop() first, or wait for the notice: a project that runs until it is stopped has none"
+        "; nothing was sent"
+        if node.memory.owed
+        else f"wait {ceil(10 * (node.memory.turning - now)) / 10:g} s more, or say stop() first; nothing was sent",
         node=node.node,
     )
 

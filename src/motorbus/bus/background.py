@@ -1,0 +1,46 @@
+"""An operation on a bus that nobody waits for: it goes on while others have the bus pumped, or in a thread of its own.
+
+A machine whose lease runs out is stopped, whatever its program does then. Where time is virtual nothing happens unless
+somebody pumps, so whoever pumps carries this along, between two of his own steps. Where time is real a program may
+sleep, or its event loop hang, so a thread pumps for it; it needs this process and its interpreter lock, and nothing
+else, as the thread of the emergency stop does.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+from motorbus.bus.crank import crank
+from motorbus.bus.face import BusFace
+from motorbus.bus.run import Run
+from motorbus.core.operation import Operation
+
+T = TypeVar("T")
+
+LOOK = 0.02
+"""s; a thread that waits for an answer looks at least so often whether another one has brought it."""
+
+
+class Background(Generic[T]):
+    """One operation on one bus, for which either `along` or `carried` is called, once. `run` tells how it stands."""
+
+    def __init__(self, bus: BusFace, operation: Operation[T]) -> None:
+        self.link = bus.link
+        self.turns = bus.turns
+        self.run: Run[T] = Run(bus.turns, operation, now=bus.link.now, report=bus.listener(None))
+
+    def along(self) -> None:
+        """From now on whoever pumps the bus carries it along."""
+        with self.turns.lock:
+            self.turns.chores.append(self._chore)
+
+    def carried(self) -> T:
+        """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises."""
+        while not self.run.advance():
+            crank(self.link, self.turns, self.link.now() + LOOK)
+        return self.run.result()
+
+    def _chore(self) -> None:
+        """One step further; the caller holds the lock of the turns."""
+        if self.run.advance():
+            self.turns.chores.remove(self._chore)

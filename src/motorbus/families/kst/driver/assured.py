@@ -1,0 +1,37 @@
+"""What a KST servo gives to whoever relies on it, and what not.
+
+Source: the makers' CAN protocol sheets, which have a goal position and neither a stop, a torque switch nor a heartbeat
+that a servo would listen to; the promise is that of the stop itself.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from motorbus.core.assurance import Assurance, Given, Point
+from motorbus.families.kst.driver.motion import Promise
+
+ASSURANCE: Final = Assurance(
+    measured=Point(Given.YES, "it tells it when it is asked"),
+    limits=Point(Given.PARTLY, "the range of its make, as the bus is configured: no servo tells its make"),
+    stop=Point(Given.PARTLY, Promise.HOLD_REQUESTED.value),
+    estops={"hold": Point(Given.PARTLY, Promise.HOLD_REQUESTED.value)},
+    alone=Point(
+        Given.PARTLY,
+        "led, it goes on to the last small goal, one cycle ahead of its course, makes up what it lags behind, and "
+        "holds; moved by itself, it goes on to its goal",
+    ),
+    ends=Point(Given.YES, "it knows nothing but positions to go to"),
+    torque=Point(Given.NO, "none: it holds with all its force as long as it has its supply"),
+    restart=Point(
+        Given.PARTLY,
+        "it says so once, in a frame of its own, and then it is a fault; a frame that is lost, or comes while no bus "
+        "is open, is not seen",
+    ),
+    strain=Point(
+        Given.PARTLY,
+        "current and temperature, where its make tells them; off its goal for too long counts as stalled in any case",
+    ),
+    watchdog=Point(Given.NO, "none: it goes on to the last position it was told, and holds"),
+    led=True,
+)

@@ -1,0 +1,66 @@
+"""What is said of an axis that is led and does not do as it was told: it does not follow, does not arrive, is silent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from motorbus.errors import NoReply, Stalled
+
+if TYPE_CHECKING:
+    from motorbus.motion.capabilities import AxisVerbs
+
+
+def behind(axis: AxisVerbs, goal: float, present: float, allowed: float) -> Stalled:
+    """The error for an axis that is farther from where it should be by now than is `allowed` (all rad, m)."""
+    spec = axis.spec
+    return Stalled(
+        f"{axis.name} does not follow: it is at {spec.show(present)}, and should be at {spec.show(goal)} by now",
+        expected=f"within {spec.show(allowed)} of where it should be",
+        cause="something blocks it, the load is too heavy, or it is slower than max_velocity says",
+        advice="clear the way, move slower, or change the limits of the axis; all of the movement were stopped",
+        node=spec.node,
+    )
+
+
+def not_there(
+    short: Sequence[AxisVerbs],
+    goals: Mapping[str, float],
+    presents: Mapping[str, Sequence[float]],
+    near: float,
+    patience: float,
+) -> Stalled:
+    """The error for axes that are not in position so long (s) after the end; the first must come so `near` (rad, m)."""
+    first = short[0]
+    return Stalled(
+        "; ".join(_stands(one, goals[one.name], presents[one.name]) for one in short),
+        expected=f"within {first.spec.show(near)} of it, {patience:g} s after the end",
+        cause="something blocks it, the load is too heavy, or its torque is bounded",
+        advice="clear the way, allow it more torque, or give a wider tolerance; all of the movement were stopped",
+        node=first.spec.node,
+    )
+
+
+def silent(axis: AxisVerbs, seconds: float) -> NoReply:
+    """The error for an axis that has been silent for too long while it was led."""
+    return NoReply(
+        f"{axis.name} ({axis.spec.device}) has not answered for {seconds:.2f} s while it was led",
+        cause="its cable, its supply, or another device in between",
+        advice="look at the cable and the supply; all of the movement were told to stop",
+        node=axis.spec.node,
+    )
+
+
+def does_not_begin(axis: AxisVerbs) -> NoReply:
+    """The error for an axis that is silent before anything has moved."""
+    return NoReply(
+        f"{axis.name} ({axis.spec.device}) does not answer, so this movement does not begin",
+        cause="its cable, its supply, or another device in between",
+        advice="look at the cable and the supply; nothing was sent that moves anything",
+        node=axis.spec.node,
+    )
+
+
+def _stands(axis: AxisVerbs, goal: float, presents: Sequence[float]) -> str:
+    where = axis.spec.show(presents[-1]) if presents else "a place that is not known"
+    return f"{axis.name} is not in position: its goal is {axis.spec.show(goal)}, and it stands at {where}"

@@ -1,0 +1,184 @@
+"""When an axis is at fault: its device let go, or has restarted, without having been told to.
+
+A servo whose supply dips starts anew and answers again at once, as if nothing had been. It is limp then, or follows the
+next goal at full speed, and everything it was told is gone. So an axis that was given torque from here is looked at
+again and again: is its torque still on, does it still know what it was told, has it said that it starts? What else it
+tells decides about the words. An axis at fault gets no torque by itself: where it is is forgotten, and every order to
+move it is refused until somebody has seen to it and says so. Stop and torque off are always allowed.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from motorbus.core.family import Health
+from motorbus.core.operation import Operation, Report, outcome
+from motorbus.errors import Faulted, Refused
+from motorbus.motion.safety.gate import Gate
+
+if TYPE_CHECKING:
+    from motorbus.motion.capabilities import AxisVerbs
+
+HEALTH: Final = 0.25
+"""s after which an axis is asked again how it fares."""
+RESTART: Final = "restart"
+LET_GO: Final = "let go"
+PROTECTIVE: Final = frozenset(("sensor", "temperature", "current", "overload"))
+"""Alarms for which a device lets go to protect itself; of one of its supply nobody knows what came first."""
+
+
+class FaultNoted(NamedTuple):
+    """An event: this axis is at fault, and `why`."""
+
+    axis: str
+    why: str
+
+
+class Canary:
+    """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s)."""
+
+    __slots__ = ("_blank", "_restarts", "_stops", "at")
+
+    def __init__(self) -> None:
+        self.at = -inf
+        self._stops: int | None = None
+        self._blank: bool | None = None
+        self._restarts: int | None = None
+
+    def arm(self, stops: int) -> None:
+        """It has been given torque, when so many stops had left for it: from here on torque that is gone is a fault."""
+        self._stops, self._blank = stops, None
+
+    def disarm(self) -> None:
+        """It was let go, or is at fault: what its torque does is no news."""
+        self._stops = self._blank = None
+
+    def is_armed(self, stops: int) -> bool:
+        """Whether it was given torque, and no stop has left for it since."""
+        return self._stops == stops
+
+    def take(self, health: Health, *, armed: bool, led: bool) -> str:
+        """Judge how a device fares: "" or the reason of a fault. Each sample once.
+
+        While it is `led` nobody but who leads it tells it how fast to be, so that may not be lost.
+        """
+        self.at = health.state.at
+        before, self._restarts = self._restarts, health.restarts
+        said = before is not None and health.restarts is not None and health.restarts > before
+        lost = led and self._blank is False and health.blank is True
+        if led and self._blank is None:
+            self._blank = health.blank
+        if said or lost:
+            return RESTART
+        if not armed or health.torque is not False:
+            return ""
+        protects = PROTECTIVE & frozenset(health.state.alarm)
+        return LET_GO if protects or health.blank is False else RESTART
+
+
+# -- at fault ----------------------------------------------------------------------------------------------------------
+
+
+def looked_at(axis: AxisVerbs, health: Health, *, led: bool = False) -> Faulted | None:
+    """Judge a sample of an axis; when that shows a fault the axis is at fault from here on, and this is the error."""
+    armed = axis.engaged and axis.canary.is_armed(_stops(axis))
+    reason = axis.canary.take(health, armed=armed, led=led)
+    if not reason or not (armed or axis.engaged or axis.under_way):
+        return None
+    error = _faulted(axis, health, reason)
+    fault(axis, error.summary.partition(": ")[2])
+    return error
+
+
+def looked_after(axis: AxisVerbs, now: float) -> Operation[None]:
+    """Of an axis that was given torque from here: ask how it fares, unless that was done lately.
+
+    A fault is noted and reported, and raises nothing; an answer that was lost tells nothing.
+    """
+    if not axis.engaged or "health" not in axis.able or now - axis.canary.at < HEALTH:
+        return
+    found = yield from outcome(axis.able["health"](axis.device))
+    if isinstance(found, Health) and looked_at(axis, found) is not None:
+        yield from Report(FaultNoted(axis.name, why(axis)))
+
+
+def armed(axis: AxisVerbs) -> None:
+    """It has been given torque from here."""
+    axis.canary.arm(_stops(axis))
+
+
+def fault(axis: AxisVerbs, why: str) -> None:
+    """It is at fault from here on: nothing of it moves or gets torque, and where it is is not known any more.
+
+    Nothing is sent. Who had the command over it has lost it, so no goal of it leaves that was made before.
+    """
+    gate = _gate(axis)
+    if gate is not None:
+        gate.faults[axis.spec.node] = why
+        guard = gate.guards.get(axis.spec.node)
+        if guard is not None and guard.track is not None:
+            guard.track.forget()
+    axis.track.forget()
+    if axis.reckoning is not None:
+        axis.reckoning.forget(why)
+    axis.canary.disarm()
+    axis.orders += 1
+    axis.engaged = axis.under_way = False
+
+
+def cleared(axis: AxisVerbs) -> None:
+    """Somebody has seen to it: it may be given torque and moved again. Nothing is sent."""
+    gate = _gate(axis)
+    if gate is not None:
+        gate.faults.pop(axis.spec.node, None)
+
+
+def why(axis: AxisVerbs) -> str:
+    """Why it is at fault; "" when it is not."""
+    gate = _gate(axis)
+    return "" if gate is None else gate.faults.get(axis.spec.node, "")
+
+
+def check(axis: AxisVerbs) -> None:
+    """Raise Refused while it is at fault: before anything is sent that would move it or give it torque."""
+    if text := why(axis):
+        raise Refused(
+            f"{axis.name} is at fault: {text}",
+            reason="fault",
+            advice=f'see to it, then robot.clear_fault("{axis.name}"), or open the machine anew; nothing was sent',
+            node=axis.spec.node,
+        )
+
+
+def _faulted(axis: AxisVerbs, health: Health, reason: str) -> Faulted:
+    supply = "" if health.state.voltage is None else f", and its supply is {health.state.voltage:.1f} V now"
+    alarms = f"; alarms: {', '.join(health.state.alarm)}" if health.state.alarm else ""
+    if reason == RESTART:
+        said = f"{axis.spec.device} has restarted{supply}{alarms}"
+        cause = "its supply dipped or was cut for a moment: too weak, a loose cable, or too much load at once"
+    elif PROTECTIVE & frozenset(health.state.alarm):
+        said = f"{axis.spec.device} has let go to protect itself{supply}{alarms}"
+        cause = "it pushed too hard for too long, or became too hot"
+    else:
+        said = f"{axis.spec.device} has let go, and was not told to from here{supply}{alarms}"
+        cause = "another program or another host switched its torque off"
+    return Faulted(
+        f"{axis.name} is at fault: {said}",
+        reason=reason,
+        expected="a device that keeps its torque until it is told to let go",
+        cause=cause,
+        advice=f"it gets no torque by itself, and is not moved: see to it, then robot.clear_fault({axis.name!r})",
+        node=axis.spec.node,
+    )
+
+
+def _gate(axis: AxisVerbs) -> Gate | None:
+    gate = getattr(axis.bus, "admit", None)
+    return gate if isinstance(gate, Gate) else None
+
+
+def _stops(axis: AxisVerbs) -> int:
+    """How many stops have left for it on its bus, whoever sent them."""
+    count: int = axis.bus.turns.known.stops(axis.spec.node)
+    return count

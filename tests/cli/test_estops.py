@@ -1,0 +1,48 @@
+"""A process that was given a bus by its address knows whom its emergency stop must not let fall."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.cli.estops import with_estops
+from tests.cli.conftest import Bench, Run
+from tests.cli.test_fenced import bounded
+
+HOLD = 'estop = "hold"'
+
+
+def torque(bench: Bench) -> list[int]:
+    return [bench.sims["arm"][node].memory["torque_enable"] for node in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("word", ["arm", "a2", "{address}", "{address}#1-3", ""])
+def test_who_is_to_hold_keeps_its_torque_by_every_name(word: str, run: Run, bench: Bench) -> None:
+    bounded(bench, HOLD)
+    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    said = word.format(address=bench.machine.buses["arm"].address)
+    ran = run("estop", *([said] if said else []), "--json")
+    assert "those that hold" in ran.out
+    assert torque(bench) == [1, 0, 0]
+
+
+def test_without_it_everyone_lets_go(run: Run, bench: Bench) -> None:
+    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    assert run("estop", "arm").code in (0, 6)
+    assert torque(bench) == [0, 0, 0]
+
+
+def test_what_the_command_line_says_comes_on_top(run: Run, bench: Bench) -> None:
+    bounded(bench, HOLD)
+    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    run("estop", "arm", "--estop-hold", "3")
+    assert torque(bench) == [1, 0, 1]
+
+
+def test_a_file_that_nobody_understands_says_nothing(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
+    bounded(bench, "speed = 3", HOLD)
+    address = bench.machine.buses["arm"].address
+    ran = run("estop", address)
+    assert ran.code in (0, 6), ran.err
+    assert with_estops(address, {"baud": "1"}) == {"baud": "1"}

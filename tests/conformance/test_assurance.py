@@ -1,0 +1,63 @@
+"""What a family declares of its devices is true of its devices, as far as a simulated one can show it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from motorbus.core.assurance import Assurance, Given
+from motorbus.core.family import Family
+from tests.conformance.subjects import FAMILIES
+from tests.conformance.world import abilities, world
+
+DECLARED = {name: family for name, family in FAMILIES.items() if family.devices.assures is not None}
+
+
+@pytest.fixture(params=DECLARED)
+def declared(request: pytest.FixtureRequest) -> Family:
+    """Each family that says what its devices give."""
+    return DECLARED[request.param]
+
+
+def assurance(family: Family) -> Assurance:
+    found = family.devices.assures
+    assert found is not None
+    return found
+
+
+def test_those_that_are_built_in_say_it() -> None:
+    assert len(DECLARED) >= 3
+
+
+def test_every_sentence_is_one_and_no_watchdog_is_claimed(declared: Family) -> None:
+    for about, point in assurance(declared).points():
+        assert point.text.strip(), about
+        assert not point.text.endswith("."), about
+    assert assurance(declared).watchdog.given is Given.NO
+
+
+def test_what_is_claimed_of_its_devices_is_what_an_axis_can_do(declared: Family) -> None:
+    said, able = assurance(declared), abilities(declared)
+    assert (said.measured.given is Given.YES) == ("position" in able)
+    assert (said.torque.given is Given.YES) == ("disable_torque" in able)
+    assert (said.limits.given is not Given.NO) == ("limits" in able)
+    assert (said.restart.given is not Given.NO) == ("health" in able)
+    assert (said.strain.given is not Given.NO) == ("health" in able)
+    assert said.led == ("train" in able)
+
+
+def test_each_emergency_stop_is_declared_and_promises_what_it_says(declared: Family) -> None:
+    said = assurance(declared)
+    policies = declared.link.stops or ("",)
+    assert tuple(said.estops) == policies
+    assert said.estops[policies[0]].text == declared.stop({1: None}).promise
+
+
+def test_the_stop_promises_what_it_says(declared: Family) -> None:
+    with world(declared) as there:
+        device = there.device(there.ids[0])
+        able: Mapping[str, object] = abilities(declared)
+        if "enable_torque" in able:
+            device.enable_torque()
+        assert device.stop().value == assurance(declared).stop.text

@@ -1,0 +1,93 @@
+"""What is said of a machine is what its file and its families say, axis by axis, and nothing is opened for it."""
+
+from __future__ import annotations
+
+from math import radians
+
+import pytest
+
+from motorbus.core.assurance import Given
+from motorbus.core.family import Devices, Family
+from motorbus.motion.machine import Machine
+from motorbus.motion.moving.stream import SHARE, USUAL
+from motorbus.motion.safety.assurance import MACHINE, NONE, SCOPE, WHOLE, assured, cycle, unbounded
+from motorbus.session import prepare
+from tests.motion.machines import machine
+
+
+def families(made: Machine) -> dict[str, Family]:
+    return {name: prepare(bus.address, {}).family for name, bus in made.buses.items()}
+
+
+def test_the_scope_names_the_standards_and_the_switch() -> None:
+    assert all(word in SCOPE for word in ("ISO 13849", "IEC 61508", "power cut", "not a safety function"))
+
+
+def test_each_axis_is_shown_with_the_bounds_of_the_file() -> None:
+    axes = {"a1": {"max_step": "10 deg", "exit": "torque_off"}, "c1": {"low": None, "high": None}}
+    axes["lift"] = {"low": None, "high": None}
+    with machine(arm="1-2", can="0x25", lift=True, axes=axes) as (made, _):
+        found = {one.name: one for one in assured(made, families(made)).axes}
+    first = found["a1"]
+    assert (first.device, first.limits, first.step) == ("arm#1", "-150 to 150 deg", "10.0 deg")
+    assert (first.velocity, first.exit, first.estop) == ("90 deg/s", "torque_off", "torque_off")
+    assert (found["a2"].step, found["a2"].exit) == (NONE, "hold")
+    assert (found["c1"].limits, found["c1"].estop) == ("its device's", "hold")
+    assert (found["lift"].limits, found["lift"].left, found["lift"].estop) == (NONE, WHOLE, "stop")
+
+
+@pytest.mark.parametrize("period", [0.01, 0.05])
+def test_how_far_a_led_axis_goes_on_is_one_cycle_of_its_bus(period: float) -> None:
+    with machine(arm="1") as (made, _):
+        (axis,) = assured(made, families(made), {"arm": period}).axes
+        spec = made.axes["a1"]
+    assert axis.left == spec.show(radians(90) * period)
+
+
+def test_a_cycle_is_as_long_as_axes_are_led() -> None:
+    assert cycle(1000.0) == 1 / USUAL
+    assert cycle(40.0) == pytest.approx(1 / (SHARE * 40))
+
+
+def test_each_bus_with_axes_tells_what_its_devices_give() -> None:
+    with machine(arm="1-2", lift=True) as (made, _):
+        arm, stage = assured(made, families(made)).buses
+    assert (arm.name, arm.family, arm.axes) == ("arm", "feetech", ("a1", "a2"))
+    assert arm.points["torque switch"].given is Given.YES
+    assert stage.points["measures its position"].given is Given.NO
+    assert {bus.points["watchdog in it"].given for bus in (arm, stage)} == {Given.NO}
+
+
+class Silent:
+    """A family that says nothing of what its devices give."""
+
+    def __init__(self, family: Family) -> None:
+        self.name, self.link = "silent", family.link
+        self.devices = Devices(*family.devices[:2])
+
+
+def test_of_a_family_that_says_nothing_nothing_is_claimed() -> None:
+    axes = {"a1": {"low": None, "high": None}}
+    with machine(arm="1", axes=axes) as (made, _):
+        silent: dict[str, Family] = {name: Silent(one) for name, one in families(made).items()}  # type: ignore[misc]
+        found = assured(made, silent)
+    assert found.buses[0].points == {}
+    assert (found.axes[0].limits, found.axes[0].left) == (NONE, WHOLE)
+
+
+def test_what_nobody_bounds_is_told() -> None:
+    axes = {"a1": {"max_step": "10 deg"}, "lift": {"low": None, "high": None}}
+    with machine(arm="1-2", lift=True, axes=axes) as (made, _):
+        limits, step = unbounded(assured(made, families(made)))
+    assert limits.startswith("lift: no limits of travel")
+    assert step.startswith("a2, lift: one order may lead from one end to the other")
+
+
+def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:
+    given = {about: point.given for about, point in MACHINE.items()}
+    assert {about for about, one in given.items() if one is Given.NO} == {
+        "the host dies",
+        "a cable breaks",
+        "several hosts",
+    }
+    assert given["one gate"] is Given.YES
