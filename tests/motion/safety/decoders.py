@@ -81,8 +81,9 @@ class FeetechWitness(Witness):
             length = data[3]
             node, values = data[2], data[5 : 3 + length]
             address, count = self._asked.get(node, (0, 0))
-            if count == len(values) and address == PRESENT and count > 1:
-                yield node, _signed(values[:2]) * COUNT
+            at = PRESENT - address
+            if count == len(values) and 0 <= at <= count - 2:
+                yield node, _signed(values[at : at + 2]) * COUNT
             data = data[4 + length :]
 
 
