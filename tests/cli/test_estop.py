@@ -214,7 +214,7 @@ def test_a_broken_machine_file_keeps_nobody_from_being_stopped(
     with program(HANGING, served.bus):
         ran = run("estop", "--json")
     assert ran.code == 6
-    assert ran.document["buses"][0]["acknowledged"] == [1, 2, 3]
+    assert set(ran.document["buses"][0]["acknowledged"]) == {1, 2, 3}
     assert "the file is no TOML" in ran.err
     assert torque(served.bus) == [0, 0, 0]
 

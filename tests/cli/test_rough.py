@@ -95,6 +95,13 @@ def test_where_there_is_no_bus_none_is_seen(text: str) -> None:
     assert not rough(text).machine.buses
 
 
+@pytest.mark.parametrize("after", ["", "oops ="], ids=["tables", "lines"])
+def test_whom_an_emergency_stop_must_not_let_fall_is_kept(after: str) -> None:
+    text = '[bus.arm]\naddress = "feetech:COM7"\n[axis.a1]\ndevice = "arm#1"\nestop = "hold"\n'
+    axes = rough(f'{text}[axis.a2]\ndevice = "arm#2"\nestop = "hol"\n{after}').machine.axes
+    assert [axis.estop for axis in axes.values()] == ["hold", None]
+
+
 def test_a_whole_file_is_seen_as_it_is_read(bench: Bench) -> None:
     for text in (bench.file.read_text(encoding="utf-8"), bench.file.read_text(encoding="utf-8") + "oops ="):
         found = rough(text)

@@ -82,7 +82,7 @@ def test_what_is_no_machine_file_is_one_error(bench: Bench, run: Run, words: lis
 
 
 def test_a_file_with_a_mistake_says_where(bench: Bench, run: Run) -> None:
-    bench.describe('[axis.more]\ndevice = "arm#9"\n')
+    bench.describe('[axis.more]\ndevice = "nowhere#9"\n')
     ran = run("safety")
     assert (ran.code, ran.out) == (2, "")
     assert "axis.more" in ran.err

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Family, State, Train
+from motorbus.core.family import Family, Health, State, Train
 from motorbus.core.operation import Effect, Exchange, Operation, Runnable, Together, outcome
 from motorbus.errors import LimitExceeded, NoReply, RequestError
 from tests.conformance.subjects import line_of
@@ -19,7 +19,7 @@ DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(
         ("state", "position", "velocity", "load", "current", "voltage", "temperature"), (("device",), ())
     ),
-    **dict.fromkeys(("enable_torque", "disable_torque", "stop", "limits"), (("device",), ())),
+    **dict.fromkeys(("health", "enable_torque", "disable_torque", "stop", "limits"), (("device",), ())),
     "move": (("device", "to"), ("wait",)),
     "move_by": (("device", "angle"), ("velocity", "wait")),
     "jog": (("device", "velocity", "seconds"), ()),
@@ -67,6 +67,41 @@ def test_what_it_tells_is_a_number_and_telling_writes_nothing(subject: Family) -
         if "state" in able:
             assert isinstance(ran(there, able["state"](there.device(there.ids[0]))), State)
         assert there.settings() == before
+
+
+def test_health_is_one_exchange_of_a_known_device_writes_nothing_and_agrees_with_what_it_tells(
+    leader: Family,
+) -> None:
+    able = abilities(leader)
+    assert "health" in able  # whoever is led is watched
+    with world(leader) as there:
+        before = there.settings()
+        device = there.device(NODE)
+        ran(there, able["health"](device))
+        wanted = able["health"](device)
+        assert isinstance(wanted, Exchange)
+        found, state = ran(there, wanted), ran(there, able["state"](device))
+        assert isinstance(found, Health)
+        assert found.torque in ((True, False) if "enable_torque" in able else (None,))
+        assert found.state.at <= state.at
+        for name in (*TOLD, "moving"):
+            told = getattr(found.state, name)
+            assert told is None or told == pytest.approx(getattr(state, name), abs=1e-6)
+        assert there.settings() == before
+
+
+def test_health_tells_whether_the_torque_is_on_and_that_it_went_with_the_supply(leader: Family) -> None:
+    able = abilities(leader)
+    if "enable_torque" not in able:
+        assert "disable_torque" not in able
+        return
+    with world(leader) as there:
+        device = there.device(NODE)
+        assert ran(there, able["health"](device)).torque is False
+        ran(there, able["enable_torque"](device), Effect.MOTION)
+        assert ran(there, able["health"](device)).torque is True
+        there.simulator.nodes[NODE].power_cycle()
+        assert ran(there, able["health"](device)).torque is False
 
 
 def test_limits_are_read_from_a_device_that_is_not_known_and_contain_where_it_stands(leader: Family) -> None:

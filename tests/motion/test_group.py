@@ -145,7 +145,8 @@ def test_holding_is_torque_or_a_stop() -> None:
 def test_homing_gives_where_each_is() -> None:
     with nine() as (robot, sims):
         sims["stage"].simulator.script("1.0 5 on")  # type: ignore[attr-defined]
-        assert robot.home(deadline=20.0) == {"lift": 0.0}
+        with robot.attended():
+            assert robot.home(deadline=20.0) == {"lift": 0.0}
         assert robot.positions("lift") == {"lift": 0.0}
 
 

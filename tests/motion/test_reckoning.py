@@ -103,7 +103,8 @@ def test_homing_makes_it_known() -> None:
     with machine(lift=True, axes={"lift": {"zero": "-1 turn", "low": "-200 mm"}}) as (made, sims):
         sims["stage"].simulator.script("1.0 5 on")  # type: ignore[attr-defined]
         with Robot.of(made) as robot:
-            place = robot["lift"].home(deadline=20.0)
+            with robot.attended():
+                place = robot["lift"].home(deadline=20.0)
             assert place == pytest.approx(0.005), "the device is at its 0, the axis a turn from there"
             assert robot["lift"].estimated == place
 
@@ -111,7 +112,7 @@ def test_homing_makes_it_known() -> None:
 def test_homing_that_found_no_switch_makes_it_unknown() -> None:
     with machine(lift=True) as (made, _), Robot.of(made) as robot:
         robot["lift"].declare(0.1)
-        with pytest.raises(NotHomed):
+        with pytest.raises(NotHomed), robot.attended():
             robot["lift"].home(deadline=2.0)
         assert robot["lift"].estimated is None
         assert "did not come to its end" in robot["lift"].reckoning.why  # type: ignore[union-attr]
@@ -234,7 +235,8 @@ def test_the_async_face_is_the_same() -> None:
         with machine(lift=True) as (made, sims):
             sims["stage"].simulator.script("1.0 5 on\n3.0 5 off")  # type: ignore[attr-defined]
             async with AsyncRobot.of(made) as robot:
-                await robot["lift"].home(deadline=10.0)
+                async with robot.attended():
+                    await robot["lift"].home(deadline=10.0)
                 await robot["lift"].move_by(0.005)
                 assert robot["lift"].estimated == pytest.approx(0.005, abs=1e-5)
                 assert await robot.positions() == {"lift": robot["lift"].estimated}

@@ -36,7 +36,8 @@ def told_at_once(
             async with AsyncRobot.of(made) as robot:
                 lift = robot["lift"]
                 lift.declare(begin)
-                told = await asyncio.gather(*orders(robot, lift), return_exceptions=True)
+                async with robot.attended():
+                    told = await asyncio.gather(*orders(robot, lift), return_exceptions=True)
                 return list(told), lift.estimated, begin + stands(sims), lift.under_way
 
     return asyncio.run(main())

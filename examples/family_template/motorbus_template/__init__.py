@@ -69,6 +69,7 @@ class AsyncServo(_Verbs, Awaiting):
 _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "state": driver.telemetry,
     "position": driver.position,
+    "health": driver.health,
     "move": driver.move,
     "stop": driver.stop,
     "enable_torque": driver.enable_torque,

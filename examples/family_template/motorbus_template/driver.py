@@ -13,7 +13,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from motorbus.core.entry import Entry, Storage, Value
-from motorbus.core.family import Identity, State, Stop
+from motorbus.core.family import Health, Identity, State, Stop
 from motorbus.core.operation import (
     Alone,
     Answer,
@@ -347,6 +347,16 @@ def telemetry(node: Node) -> Operation[State]:
         moving=bool(others["moving"]),
         alarm=node.alarm,
     )
+
+
+def health(node: Node) -> Exchange[Health]:
+    """Whether its torque is on, and its alarms: what is asked again and again while it is led, so one exchange."""
+    row = TABLE["torque_enable"]
+
+    def take(data: bytes) -> Health:
+        return Health(State(at=node.at, alarm=node.alarm), torque=row.decode(data[-row.size :]) == 1)
+
+    return exchange(node, wire.Command.READ, row.address, row.subindex or 0, take=take)
 
 
 def stop_all(nodes: tuple[int, ...]) -> Stop:

@@ -8,7 +8,7 @@ else, as the thread of the emergency stop does.
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace

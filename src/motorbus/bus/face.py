@@ -119,6 +119,12 @@ class BusFace:
         """
         self.stopper.trigger()
 
+    def latch(self) -> None:
+        """Refuse motion and torque until `reset`, as after an emergency stop that was given elsewhere; sends nothing."""
+        with self.turns.lock:
+            self.turns.latch(self.link.now())
+            self.turns.stopped()
+
     def reset(self) -> None:
         """Take the latch of an emergency stop off. Nothing is sent and nothing moves."""
         with self.turns.lock:

@@ -83,7 +83,7 @@ class DryBus:
         self.turns = bus.turns
         self.frames: list[bytes] = []
         self._bus = bus
-        self.admit = bus.admit or Gate()
+        self.admit = bus.admit.rehearsing() if isinstance(bus.admit, Gate) else bus.admit or Gate()
         self._written: set[int] = set()
         self._waited = 0.0
         self._read: dict[Data, Any] = {}

@@ -35,7 +35,7 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
     line = _line(address)
     there = {name for name, spec in machine.buses.items() if _line(spec.address) == line}
     for name, spec in machine.axes.items():
-        with suppress(RequestError):  # an id that no device can have bounds nobody, and keeps no other from being stopped
+        with suppress(RequestError):  # an id that cannot be bounds nobody, and stops no stop
             if spec.bus in there:
                 enclose(bus, {name: spec})
 

@@ -92,7 +92,7 @@ def follow(
             return _plan(hand, pairs, present)
         goals = {one: present[other] for other, one in pairs.items() if other in present and one in present}
         _judge(hand, pairs, rate)
-        _consent(hand, present, goals, yes=yes)
+        _consent(hand, present, goals, clamp=clamp, yes=yes)
         _warn(hand, pairs)
         with hand.working("following"), asked_to_end() as ended:
             until = counted(hand, "following", ended, rate, span)
@@ -133,10 +133,17 @@ def _warn(hand: InHand, pairs: Mapping[str, str]) -> None:
         hand.output.note(f"note: {', '.join(stiff)} cannot be let go: only what else moves it leads")
 
 
-def _consent(hand: InHand, present: Mapping[str, float], goals: Mapping[str, float], *, yes: bool) -> None:
-    """Ask before a follower goes far; one whose leader stands beyond its limits stays, so nobody is asked."""
+def _consent(
+    hand: InHand, present: Mapping[str, float], goals: Mapping[str, float], *, clamp: bool, yes: bool
+) -> None:
+    """Ask before a follower goes far; one whose leader stands beyond its limits stays, or goes as far as they allow."""
+    from motorbus.motion.clamping import kept
+
     axes = hand.robot.machine.axes
-    consent_to_far(hand, present, {name: at for name, at in goals.items() if axes[name].allows(at)}, yes=yes)
+    wanted = {
+        name: kept(name, axes[name], at, policy="clamp")[0] if clamp else at for name, at in goals.items()
+    }
+    consent_to_far(hand, present, {name: at for name, at in wanted.items() if axes[name].allows(at)}, yes=yes)
 
 
 def _plan(hand: InHand, pairs: Mapping[str, str], present: Mapping[str, float]) -> Exit:

@@ -139,7 +139,7 @@ def _axes(
         if not yes:
             rehearse(hand, names, lambda axis: axis.home(deadline=seconds), show=False)
         output.consent(what, yes=yes)
-        with hand.working("homing"):
+        with hand.working("homing"), hand.robot.attended():
             found = hand.robot.home(names, deadline=seconds)
         rows = [(name, place(hand.robot, name, at)) for name, at in found.items()]
     output.document(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import App, Parameter
 
@@ -22,6 +22,7 @@ from motorbus.motion.machine.model import VELOCITY
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
+    from motorbus.motion.clamping import Policy
 
 app = App(
     name="jog",
@@ -37,7 +38,8 @@ when this program was killed meanwhile.
 
 An axis of a machine file goes in its own unit (a linear one in m/s, or 5mm/s),
 inside its limits, and stays where it was stopped. A way of more than 100 mm
-needs --yes, too.
+needs --yes, too. A way that leads out of the limits is refused; with --clamp
+it ends there, which is told.
 
 Examples:
 
@@ -54,6 +56,7 @@ def jog(
     /,
     *,
     seconds: str,
+    clamp: Flag = False,
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -67,6 +70,8 @@ def jog(
         The device or axis, and how fast it shall turn, as stepper:/dev/ttyUSB0#1=60rpm
     seconds
         How long, in s or as 500ms.
+    clamp
+        An axis of a machine file that would leave its limits goes as far as they allow; else that is refused.
     yes
         Do not ask before a way of more than 180 degrees.
     options
@@ -78,7 +83,15 @@ def jog(
             f"{device_}: how fast?", expected="BUS#ID=VELOCITY, as stepper:/dev/ttyUSB0#1=60rpm"
         )
     if is_name(where):
-        return _axis(where, speed, units.parse(seconds, "time"), options, output, yes=yes, dry_run=dry_run)
+        how = _How(units.parse(seconds, "time"), "clamp" if clamp else "reject")
+        return _axis(where, speed, how, options, output, yes=yes, dry_run=dry_run)
+    if clamp:
+        raise RequestError(
+            "--clamp is for axes of a machine file",
+            expected="AXIS=VELOCITY with --clamp",
+            cause="a device by its address has no limits that anybody wrote down",
+            advice="leave it out; nothing was sent",
+        )
     bus, family, (node,) = device(where)
     offers(family, "jog")
     velocity, span = units.parse(speed, "velocity"), units.parse(seconds, "time")
@@ -94,14 +107,21 @@ def jog(
     return Exit.OK
 
 
+class _How(NamedTuple):
+    """For so long (s), and what becomes of a way that leads out of the limits."""
+
+    span: float
+    policy: Policy
+
+
 def _axis(
-    word: str, speed: str, span: float, options: dict[str, str], output: Output, *, yes: bool, dry_run: bool
+    word: str, speed: str, how: _How, options: dict[str, str], output: Output, *, yes: bool, dry_run: bool
 ) -> Exit:
     """The same for an axis of the machine file."""
     name, *more = axes_named((word,))
     if more:
         raise RequestError(f"{word} is several axes", expected="one axis", advice="nothing was sent")
-    spec = machine().axes[name]
+    spec, span = machine().axes[name], how.span
     velocity = units.parse(speed, VELOCITY.of(spec.linear))
     if not span > 0:
         raise RequestError(f"--seconds {span:g}: not above 0", advice="nothing was sent")
@@ -109,13 +129,13 @@ def _axis(
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")
         if dry_run:
-            _rehearse(hand, name, velocity, span, show=True)
+            _rehearse(hand, name, velocity, how, show=True)
             return Exit.OK
         if way > (FAR_LINEAR if spec.linear else FAR) and not yes:
-            _rehearse(hand, name, velocity, span, show=False)
+            _rehearse(hand, name, velocity, how, show=False)
             output.consent(f"move {name} by {spec.show(way)}", yes=False)
         with hand.working("jogging"):
-            told = verb(velocity, span)
+            told = verb(velocity, span, policy=how.policy)
         present = hand.robot.positions([name])[name]
         stands = place(hand.robot, name, present)
     facts = {"axis": name, "velocity": velocity, "seconds": span, "present": present}
@@ -124,22 +144,40 @@ def _axis(
     return Exit.OK
 
 
-def _rehearse(hand: InHand, name: str, velocity: float, span: float, *, show: bool) -> None:
+def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool) -> None:
     """What it would be refused for, and what would be sent. Of an axis that is led, that is made on the way only."""
     from motorbus.motion.moving.jogging import way_of_jog
 
     axis = hand.robot[name]
     if "train" not in axis.able:
-        rehearse(hand, [name], lambda one: one.jog(velocity, span), show=show)
+        rehearse(hand, [name], lambda one: one.jog(velocity, how.span, policy=how.policy), show=show)
         return
-    goes, _ = way_of_jog(axis, velocity, span)
+    goes, _ = way_of_jog(axis, velocity, how.span)
     present, goals = absolute(hand, {name: Goal(goes, way=True)})
-    inside(hand, present, goals)
+    most = velocity * how.span
+    if how.policy == "reject":
+        inside(hand, present, goals)
+    else:
+        most = _clamped(hand, name, present[name], goals[name], most)
     if show:
-        way = axis.spec.show(velocity * span)
-        facts = {"axis": name, "velocity": velocity, "seconds": span, "at_most": velocity * span}
+        facts = {"axis": name, "velocity": velocity, "seconds": how.span, "at_most": most}
         hand.output.document("motorbus.jog.plan/1", facts)
         hand.output.text(
-            f"{name} would go by {way} at most; nothing was sent. "
+            f"{name} would go by {axis.spec.show(most)} at most; nothing was sent. "
             "Its frames are made on the way, from what is read then, so none can be shown."
         )
+
+
+def _clamped(hand: InHand, name: str, present: float, goal: float, most: float) -> float:
+    """How far it would go at most where its limits hold it back (rad, m); that it does is told."""
+    from motorbus.motion import limits
+    from motorbus.motion.clamping import kept
+
+    axis = hand.robot[name]
+    device = axis.bus.run(limits.of_device(axis))
+    to, told = kept(name, axis.spec, goal, policy="clamp", device=device)
+    if told is None:
+        return most
+    hand.heard(told)
+    way = to - present
+    return way if way * most > 0 else 0.0

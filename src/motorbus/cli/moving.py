@@ -138,7 +138,7 @@ def settle(hand: InHand, names: Iterable[str], known: Known, *, yes: bool, dry_r
         hand.output.note(f"note: {', '.join(lost)} would home first; what is shown begins at the switch")
         return
     consent_to(f"home {', '.join(lost)}: each moves until its switch is met", hand.output, yes=yes)
-    with hand.working("homing"):
+    with hand.working("homing"), hand.robot.attended():
         hand.robot.home(lost)
 
 

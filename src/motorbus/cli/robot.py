@@ -20,13 +20,13 @@ from motorbus.cli.target import face, said, traced
 from motorbus.cli.wording import in_words_of_the_shell, shell_words
 from motorbus.core.operation import Progress
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.clamping import Clamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
+    from motorbus.motion.clamping import Clamped
     from motorbus.motion.machine import Machine
     from motorbus.session.robot import Robot
 
@@ -53,6 +53,8 @@ class InHand:
         if isinstance(event, Progress):
             self._bar.advance(event.done, event.total, event.what)
             return
+        from motorbus.motion.clamping import Clamped
+
         if isinstance(event, Clamped):
             self.output.note(_clamped(event))
             return
@@ -69,7 +71,9 @@ def _clamped(event: Clamped) -> str:
     """That an axis does not go where it was to go, and why."""
     spec = machine().axes[event.axis]
     why = {"limits": "its limits", "step": "max_step", "velocity": "max_velocity"}[event.reason]
-    return f"note: {event.axis} goes to {spec.show(event.given)} instead of {spec.show(event.asked)}, for {why}"
+    return (
+        f"note: {event.axis} goes to {spec.show(event.given)} instead of {spec.show(event.asked)}, for {why}"
+    )
 
 
 def place(robot: Robot, name: str, at: float | None) -> str:

@@ -17,7 +17,7 @@ from motorbus.cli.machine import is_address, is_name, machine_file
 from motorbus.cli.target import targets
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine
-from motorbus.motion.machine.model import ADDRESS
+from motorbus.motion.machine.model import ADDRESS, Estop
 from motorbus.motion.machine.reading import LONGEST
 from motorbus.motion.machine.refusal import listed, nearest
 from motorbus.motion.several import named
@@ -194,7 +194,7 @@ def _seen(path: Path) -> Rough | None:
 def rough(text: str) -> Rough:
     """The buses, devices and groups that can be seen in a text, whatever else is in it.
 
-    An axis is there when its bus is.
+    An axis is there when its bus is. Whether an emergency stop lets it go is kept, for it must not fall.
     """
     text = text.removeprefix("\ufeff")
     data = _toml(text)
@@ -206,13 +206,18 @@ def rough(text: str) -> Rough:
     machine = Machine(
         buses={name: BusSpec(address=place) for name, place in places.items() if place},
         axes={
-            name: AxisSpec(device=device, unit="rad", max_velocity=1.0, max_acceleration=1.0)
+            name: _axis(device, said["axis"][name])
             for name, device in devices.items()
             if places.get(device.partition("#")[0])
         },
         groups={name: GroupSpec(axes=axes) for name, axes in members.items() if axes},
     )
     return Rough(machine, _lost(machine, places, devices, members))
+
+
+def _axis(device: str, table: Mapping[str, Any]) -> AxisSpec:
+    estop: Estop | None = "hold" if table.get("estop") == "hold" else None
+    return AxisSpec(device=device, unit="rad", max_velocity=1.0, max_acceleration=1.0, estop=estop)
 
 
 def _lost(

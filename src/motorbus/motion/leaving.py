@@ -41,7 +41,7 @@ class Leaving:
         self._axes = {
             name: axis
             for name, axis in body.axes.items()
-            if (axis.engaged or goes_on(axis)) and axis.spec.exit != "leave"
+            if (axis.engaged or goes_on(axis) or _fell(axis)) and axis.spec.exit != "leave"
         }
         self._visited: set[tuple[str, str]] = set()
         self._tries: dict[str, int] = {}
@@ -171,7 +171,12 @@ class Leaving:
         return True
 
 
-# -- without its holder --------------------------------------------------------------------------------------------------
+def _fell(axis: AxisVerbs) -> bool:
+    """It had torque from here when it came to be at fault, and may have some again: letting go is all that is done."""
+    return axis.canary.fell and axis.spec.exit == "torque_off"
+
+
+# -- without its holder ------------------------------------------------------------------------------------------------
 
 
 def given_up(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:

@@ -85,7 +85,7 @@ class Sentry:
         while not self._over.is_set():
             if self.busy(bus):
                 yield from self._giving_up(bus)
-            yield from outcome(Pause(self._left))
+            yield from outcome(iter(Pause(self._left)))
 
     def _giving_up(self, bus: str) -> Operation[None]:
         axes = [axis for axis in self._body.axes.values() if axis.spec.bus == bus]
@@ -107,7 +107,9 @@ class Sentry:
     def _carry_out(self, bus: str) -> None:
         try:
             Background(self._body.buses[bus], self._giving_up(bus)).carried()
-        except Exception as error:  # the port is gone: the other buses are stopped all the same, and this one is told
+        except (
+            Exception
+        ) as error:  # the port is gone: the other buses are stopped all the same, and this one is told
             self._given_up.add(bus)
             LOG.warning("%s: the lease was lost, and nothing could be stopped: %s", bus, error)
 
@@ -197,11 +199,13 @@ class Attending:
         def on(bus: str) -> Operation[dict[str, MotorbusError]]:
             sentry = self._robot._sentry
             while sentry is not None and sentry.busy(bus):
-                yield from outcome(Pause(LOOK))
+                yield from outcome(iter(Pause(LOOK)))
             return (yield from stopped_going_on(parts[bus]))
 
         def combine(results: Mapping[str, Any]) -> dict[str, MotorbusError]:
-            found = {name: one for told in results.values() if isinstance(told, dict) for name, one in told.items()}
+            found = {
+                name: one for told in results.values() if isinstance(told, dict) for name, one in told.items()
+            }
             return {**errors_of(results), **found}
 
         return Abreast({bus: on(bus) for bus in parts}, combine)

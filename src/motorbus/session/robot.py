@@ -43,7 +43,7 @@ from motorbus.session.buses import LOG
 from motorbus.session.faults import clear, distrust, faults
 from motorbus.session.plan import Plan, loaded
 from motorbus.session.signals import Cancelling, Signals, ended
-from motorbus.session.stopping import estop, reset
+from motorbus.session.stopping import estop, latch, reset, trigger
 
 Notify = Callable[[object], None]
 Left = Callable[[Leaving, BaseException | None], None]
@@ -77,6 +77,7 @@ class RobotVerbs(Leased):
     with what ended the machine, None where nothing did. To tell how things stand; it should raise nothing."""
     _said: tuple[str, ...] = ()
     _shut = ""
+    _latched = False
 
     def chosen(self, names: Names = None) -> dict[str, Any]:
         """See `Body.chosen`. Raises RequestError also while the machine is not open."""
@@ -123,15 +124,26 @@ class RobotVerbs(Leased):
         """Emergency stop on every bus at the same time; see `motorbus.bus.face.BusFace.estop`. From any thread.
 
         Never waits for a movement, and tells for each bus, by its name, what it achieved: a bus that is gone
-        acknowledges nothing. Motion and torque are refused afterwards until `reset`. A plain call on both kinds. Raises
-        RequestError while the machine is not open, for then it stops nothing.
+        acknowledges nothing. Motion and torque are refused afterwards until `reset`, also when the machine is closed
+        and opened again meanwhile. A plain call on both kinds. Raises RequestError while the machine is not open, for
+        then it stops nothing.
         """
         self._refuse_shut()
+        self._latched = True
         return estop(self)
+
+    def trigger_estop(self) -> None:
+        """Ask the stop thread of every bus for an emergency stop, and return at once: made for signal handlers.
+
+        Raises nothing. On a simulated bus it does nothing before the first motion or torque command.
+        """
+        self._latched = True
+        trigger(self)
 
     def reset(self) -> None:
         """Take the latch of an emergency stop off every bus. Nothing is sent and nothing moves. A plain call too."""
         self._refuse_shut()
+        self._latched = False
         reset(self)
 
     def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
@@ -308,6 +320,8 @@ class AsyncRobot(RobotVerbs, LedAsync):
             distrust(body)
             Body.__init__(self, body.machine, buses, body.axes, body.origins)
             self.conductor = conductor
+            if self._latched:
+                latch(self)
             self._exits = stack.pop_all()
         self._shut = ""
         self.lease = self._lease

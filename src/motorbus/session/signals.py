@@ -57,7 +57,7 @@ def ended(number: int) -> None:
 
 
 class Cancelling:
-    """For an event loop: the task that is in the `async with` is cancelled, and SystemExit is raised when it is left."""
+    """On an event loop the task that is in the `async with` is cancelled; SystemExit is raised when that is left."""
 
     def __init__(self) -> None:
         self._task = asyncio.current_task()

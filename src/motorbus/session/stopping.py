@@ -19,12 +19,32 @@ def estop(body: Body) -> dict[str, StopOutcome]:
     def one(name: str) -> None:
         found[name] = _stopped(body, name)
 
-    threads = [Thread(target=one, args=(name,), name=f"motorbus estop {name}") for name in body.buses]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    threads = {
+        name: Thread(target=one, args=(name,), name=f"motorbus estop {name}", daemon=True)
+        for name in body.buses
+    }
+    left = [name for name, thread in threads.items() if not _started(thread)]
+    for name in left:  # one after the other, while the others are at it
+        one(name)
+    for name, thread in threads.items():
+        if name not in left:
+            thread.join()
     return {name: found[name] for name in body.buses}
+
+
+def _started(thread: Thread) -> bool:
+    """Whether there was a thread to be had: a process that has too many still has this one."""
+    try:
+        thread.start()
+    except RuntimeError:
+        return False
+    return True
+
+
+def trigger(body: Body) -> None:
+    """Ask the stop thread of every bus for a stop, and return at once."""
+    for bus in body.buses.values():
+        bus.trigger_estop()
 
 
 def _stopped(body: Body, name: str) -> StopOutcome:
@@ -34,6 +54,12 @@ def _stopped(body: Body, name: str) -> StopOutcome:
         nodes = tuple(axis.spec.node for axis in body.axes.values() if axis.spec.bus == name)
         why = error.summary if isinstance(error, MotorbusError) else f"{type(error).__name__}: {error}"
         return StopOutcome((), nodes, 0, f"nothing: {why}")
+
+
+def latch(body: Body) -> None:
+    """Buses that are opened while an emergency stop is in force are under it too; nothing is sent."""
+    for bus in body.buses.values():
+        bus.latch()
 
 
 def reset(body: Body) -> None:

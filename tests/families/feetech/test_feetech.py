@@ -22,7 +22,7 @@ def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
     assert families.load("feetech") is family
     assert motorbus.feetech is feetech
     assert (family.name, family.link.window, family.lane(0), family.lane(253)) == ("feetech", 1, 0, 0)
-    assert family.devices == (Servo, AsyncServo)
+    assert family.devices[:2] == (Servo, AsyncServo)
     assert list(family.tables) == ["sts", "smbl", "smcl", "scs", "scs2", "hls"]
 
 

@@ -23,7 +23,7 @@ def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
     assert families.load("kst") is family
     assert motorbus.kst is kst
     assert (family.name, family.link.window, family.lane(1), family.lane(127)) == ("kst", 16, 1, 127)
-    assert family.devices == (Servo, AsyncServo)
+    assert family.devices[:2] == (Servo, AsyncServo)
     assert list(family.tables) == ["kst", "kst-ext", "kingmax", "xqpower"]
     assert family.echo_test() is None
 

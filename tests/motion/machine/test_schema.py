@@ -85,6 +85,6 @@ def test_defaults_are_those_of_reading() -> None:
     )
     assert turning == {
         "zero": 0.0, "sign": 1, "gear": 1.0, "unit": "deg", "max_velocity": "90 deg/s",
-        "max_acceleration": "360 deg/s2", "exit": "hold",
+        "max_acceleration": "360 deg/s2", "exit": "hold", "guard": True,
     }  # fmt: skip
     assert linear == turning | {"unit": "mm", "max_velocity": "50 mm/s", "max_acceleration": "200 mm/s2"}

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
 
 
-def jog(
-    axis: AxisVerbs, velocity: float, seconds: float, *, policy: Policy = "reject"
-) -> Operation[float]:
+def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Policy = "reject") -> Operation[float]:
     """Move at a velocity (rad/s, m/s, with its sign) for so long (s), starting and stopping within it.
 
     Returns the way that was gone, as `move_by`. Raises LimitExceeded, and nothing is sent, when the way would lead out

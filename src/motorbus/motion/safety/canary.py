@@ -36,19 +36,21 @@ class FaultNoted(NamedTuple):
 
 
 class Canary:
-    """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s)."""
+    """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s); `fell` is
+    true where it had torque from here when it came to be at fault, until it is given some again."""
 
-    __slots__ = ("_blank", "_restarts", "_stops", "at")
+    __slots__ = ("_blank", "_restarts", "_stops", "at", "fell")
 
     def __init__(self) -> None:
         self.at = -inf
+        self.fell = False
         self._stops: int | None = None
         self._blank: bool | None = None
         self._restarts: int | None = None
 
     def arm(self, stops: int) -> None:
         """It has been given torque, when so many stops had left for it: from here on torque that is gone is a fault."""
-        self._stops, self._blank = stops, None
+        self._stops, self._blank, self.fell = stops, None, False
 
     def disarm(self) -> None:
         """It was let go, or is at fault: what its torque does is no news."""
@@ -123,6 +125,7 @@ def fault(axis: AxisVerbs, why: str) -> None:
     if axis.reckoning is not None:
         axis.reckoning.forget(why)
     axis.canary.disarm()
+    axis.canary.fell = axis.canary.fell or axis.engaged
     axis.orders += 1
     axis.engaged = axis.under_way = False
 

@@ -12,6 +12,7 @@ bus has heard lately is what it knows. A stop passes whatever happens, and so do
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from math import inf, isfinite
 from typing import Any, Final
 
@@ -52,6 +53,12 @@ class Gate:
         """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s), `stops`
         how many stops have left for a node."""
         self._seen, self._now, self._stops = seen, now, stops or self._stops
+
+    def rehearsing(self) -> Gate:
+        """A gate that judges as this one, for orders that nobody is going to send: nobody has to attend those."""
+        found = copy(self)
+        found.attended, found._turning = False, {}
+        return found
 
     def goes_on(self, node: int) -> bool:
         """Whether it was told to go on without an end, as far as this gate knows, and nothing else since."""

@@ -68,7 +68,9 @@ class Lease:
             return None
         error = self._is_lost()
         error.unmoved = False
-        error.advice = "see that the machine is clear, reset the lease, and take it again; what moved was told to stop"
+        error.advice = (
+            "see that the machine is clear, reset the lease, and take it again; what moved was told to stop"
+        )
         return error
 
     def is_attended(self, now: float) -> bool:

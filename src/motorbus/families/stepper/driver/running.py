@@ -26,10 +26,10 @@ from motorbus.core.operation import (
 )
 from motorbus.errors import (
     Interrupted,
-    LimitExceeded,
     MotorbusError,
     NoReply,
     OutcomeUnknown,
+    Refused,
     RequestError,
     WireError,
 )
@@ -238,7 +238,7 @@ def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
     outputs.forget(node)
     try:
         return (yield from timed(said))
-    except (LimitExceeded, RequestError, Interrupted) as error:
+    except (Refused, RequestError, Interrupted) as error:
         if not (isinstance(error, Interrupted) and left):
             yield from settled(node, "not started")
         raise

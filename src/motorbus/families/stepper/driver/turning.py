@@ -18,7 +18,7 @@ from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.operation import Operation, Pause, Progress, Report, Runnable, Stops
-from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, OutcomeUnknown, RequestError
+from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, Refused, RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.execution import USUAL, Behaviour
@@ -112,7 +112,7 @@ def honest(watch: Watch, runnable: Runnable[T]) -> Operation[T]:
     try:
         return (yield from runnable)
     except MotorbusError as error:
-        ordered = watch.ordered and not isinstance(error, LimitExceeded)  # of the gate, which is asked last
+        ordered = watch.ordered and not isinstance(error, Refused)  # of the gate, which is asked last
         error.unmoved = not (ordered or watch.ended)
         if ordered and isinstance(error, RequestError):
             raise _afterwards(error) from error
