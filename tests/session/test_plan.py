@@ -99,7 +99,9 @@ def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:
 
 
 def test_whom_the_address_names_is_held_too() -> None:
-    text = described({"arm": "feetech:sim,ids=1-3,estop_hold=3"}, "1", "", False, {"a1": {"estop": "hold"}}, {})
+    text = described(
+        {"arm": "feetech:sim,ids=1-3,estop_hold=3"}, "1", "", False, {"a1": {"estop": "hold"}}, {}
+    )
     assert estop_options(Machine.parse(text), "arm") == {"estop_hold": "3+1"}
 
 

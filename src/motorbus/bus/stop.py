@@ -47,6 +47,14 @@ class StopOutcome(NamedTuple):
     promise: str
 
 
+class Wish:
+    """Somebody who waits for a stop: several may at the same time, and each is told what came of one."""
+
+    def __init__(self) -> None:
+        self.outcome: StopOutcome | None = None
+        self.fulfilled = Event()
+
+
 class Stopper:
     """The emergency stop of one bus."""
 
@@ -56,7 +64,7 @@ class Stopper:
         self.socket_path = socket_path
         self.outcome: StopOutcome | None = None
         self._pair: tuple[socket.socket, socket.socket] | None = None
-        self._done = Event()
+        self._wishes: list[Wish] = []
         self._ready = Event()
         self._starting = Lock()
         self._thread: Thread | None = None
@@ -87,12 +95,12 @@ class Stopper:
             raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
         if self.link.virtual:
             return self.stop()
-        self.outcome = None
         self.start()
-        self._done.clear()
+        wish = Wish()
+        self._wishes.append(wish)
         self.trigger()
-        self._done.wait(PATIENCE)
-        return self.outcome or StopOutcome(
+        wish.fulfilled.wait(PATIENCE)
+        return wish.outcome or StopOutcome(
             (), tuple(self.turns.known), 0, "nothing: the stop thread gave no sign"
         )
 
@@ -229,9 +237,12 @@ class Stopper:
         return END in words
 
     def _stop_and_tell(self) -> StopOutcome:
-        self.outcome = self.stop()
-        self._done.set()
-        return self.outcome
+        wishes, self._wishes = self._wishes, []
+        self.outcome = outcome = self.stop()
+        for wish in wishes:  # who asked after that has woken the thread once more
+            wish.outcome = outcome
+            wish.fulfilled.set()
+        return outcome
 
     def _asked(self, client: socket.socket) -> None:
         with contextlib.suppress(OSError), client:

@@ -99,7 +99,7 @@ def test_a_dead_servo_keeps_everyone_where_he_is(dead: int, known: bool) -> None
     with four() as (sim, bus, servos, wire):
         sim[dead].unplug()
         with pytest.raises(OutcomeUnknown if known else NoReply) as caught:
-            bus.run(reg_write_all(orders(servos) if known else dict.fromkeys(IDS, GOAL)))
+            bus.run(reg_write_all(orders(servos)) if known else reg_write_all(dict.fromkeys(IDS, GOAL)))
         assert caught.value.node == dead
         assert wire.said(ACTION) == []
         sim[dead].plug()
@@ -218,8 +218,9 @@ def test_whoever_knows_that_a_second_one_is_dropped_can_say_so() -> None:
 def test_servos_that_acknowledge_nothing_say_that_it_waits(model: str) -> None:
     with (
         motorbus.simulate("feetech", ids="1-2", model=model, servo_baud=1_000_000) as sim,
-        motorbus.open(sim.url, baud=1_000_000) as bus,
+        motorbus.open(sim.url, baud=1_000_000) as opened,
     ):
+        bus: Any = opened
         servos = [Servo(bus, node) for node in (1, 2)]
         for servo in servos:
             servo.write(status_return_level=0)

@@ -14,7 +14,7 @@ STATUS = "605#4005600000000000"
 
 
 def test_by_the_manual_it_tells_where_it_is_and_no_more() -> None:
-    exchange = driver.health(node())
+    exchange = driver.health(Node(5))
     assert isinstance(exchange, Exchange)
     assert exchange.tells_position
     found = play(exchange, (POSITION, "4b02600084030000"))
@@ -51,5 +51,5 @@ def test_a_simulated_servo_says_it_where_the_switch_says_so() -> None:
         with bench(boot_notice=says) as there:
             servo = there.servo()
             assert servo.bus.run(driver.health(servo)).restarts == 0
-            there.sim[servo.node].power_cycle()
+            there.sim().power_cycle()
             assert servo.bus.run(driver.health(servo)).restarts == int(says)

@@ -57,7 +57,7 @@ def test_of_many_only_the_first_and_one_in_half_a_second_is_told() -> None:
 @pytest.mark.parametrize("goal", [nan, inf, -inf])
 @pytest.mark.parametrize("direct", [False, True])
 def test_what_is_no_number_is_refused_all_the_same(goal: float, direct: bool) -> None:
-    with clamping(arm="1", direct=direct) as (loop, told, sims):
+    with clamping(arm="1", direct=direct) as (loop, told, _sims):
         loop.goal["a1"] = 0.0
         cycles(loop, 3)
         loop.goal["a1"] = goal
@@ -81,7 +81,7 @@ def test_a_direct_goal_goes_as_far_as_its_axis_can_in_that_time() -> None:
 
 
 def test_a_direct_goal_keeps_to_the_step_from_where_it_is_measured() -> None:
-    with clamping(arm="1", direct=True, axes={"a1": {"max_step": "0.5 deg"}}) as (loop, told, sims):
+    with clamping(arm="1", direct=True, axes={"a1": {"max_step": "0.5 deg"}}) as (loop, told, _sims):
         loop.goal["a1"] = 0.0
         cycles(loop, 3)
         loop.goal["a1"] = 0.1
@@ -103,10 +103,12 @@ def test_it_is_told_on_an_event_loop_too() -> None:
     async def main() -> list[object]:
         told: list[object] = []
         with machine(arm="1") as (made, _):
-            async with AsyncRobot.of(made, report=told.append) as robot:
-                async with robot.loop(RATE, policy="clamp") as loop:
-                    loop.goal["a1"] = -9.0
-                    await anext(loop)
+            async with (
+                AsyncRobot.of(made, report=told.append) as robot,
+                robot.loop(RATE, policy="clamp") as loop,
+            ):
+                loop.goal["a1"] = -9.0
+                await anext(loop)
         return told
 
     assert asyncio.run(main()) == [Clamped("a1", -9.0, -HIGH, "limits")]
@@ -114,9 +116,10 @@ def test_it_is_told_on_an_event_loop_too() -> None:
 
 def test_as_a_rule_a_goal_is_refused() -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot:
-        with robot.loop(RATE) as loop, pytest.raises(LimitExceeded):
+        with robot.loop(RATE) as loop:
             loop.goal["a1"] = 9.0
-            next(loop)
+            with pytest.raises(LimitExceeded):
+                next(loop)
         with pytest.raises(RequestError, match="'bend' is no policy"):
             robot.loop(RATE, policy="bend")  # type: ignore[arg-type]
         with pytest.raises(RequestError, match="'bend' is no policy"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import radians
+from typing import Any
 
 import pytest
 
@@ -24,8 +25,8 @@ def test_the_scope_names_the_standards_and_the_switch() -> None:
 
 
 def test_each_axis_is_shown_with_the_bounds_of_the_file() -> None:
-    axes = {"a1": {"max_step": "10 deg", "exit": "torque_off"}, "c1": {"low": None, "high": None}}
-    axes["lift"] = {"low": None, "high": None}
+    axes: dict[str, dict[str, Any]] = {name: {"low": None, "high": None} for name in ("c1", "lift")}
+    axes["a1"] = {"max_step": "10 deg", "exit": "torque_off"}
     with machine(arm="1-2", can="0x25", lift=True, axes=axes) as (made, _):
         found = {one.name: one for one in assured(made, families(made)).axes}
     first = found["a1"]
@@ -76,7 +77,7 @@ def test_of_a_family_that_says_nothing_nothing_is_claimed() -> None:
 
 
 def test_what_nobody_bounds_is_told() -> None:
-    axes = {"a1": {"max_step": "10 deg"}, "lift": {"low": None, "high": None}}
+    axes: dict[str, dict[str, Any]] = {"a1": {"max_step": "10 deg"}, "lift": {"low": None, "high": None}}
     with machine(arm="1-2", lift=True, axes=axes) as (made, _):
         limits, step = unbounded(assured(made, families(made)))
     assert limits.startswith("lift: no limits of travel")

@@ -43,7 +43,7 @@ with Robot.load(sys.argv[1]) as robot:
     lift = robot["lift"]
     lift.declare(0.0)
     while True:
-        way = chance.uniform(0.002, 0.008) * chance.choice((-1, 1))
+        way = chance.uniform(0.02, 0.04) * chance.choice((-1, 1))
         print(way, flush=True)
         lift.move_by(way)
 """

@@ -162,9 +162,9 @@ def test_05_a_holder_who_falls_silent_loses_the_machine_until_somebody_resets_it
             with robot.attended(lasts=0.5) as hand:
                 device.set_velocity(0.5)
                 hand.beat()
-                robot.buses["arm"].run(iter(Pause(0.4)))
+                robot.buses["arm"].run(iter(Pause(0.4)))  # type: ignore[attr-defined]
                 assert sims["arm"][1].status()["moving"]
-                robot.buses["arm"].run(iter(Pause(2.0)))
+                robot.buses["arm"].run(iter(Pause(2.0)))  # type: ignore[attr-defined]
                 assert not sims["arm"][1].status()["moving"]
 
         with pytest.raises(Refused) as caught:

@@ -28,7 +28,7 @@ def test_09_a_change_of_settings_is_all_or_nothing_and_the_lock_is_closed_again(
         assert servo.read("max_temperature", "lock") == before
         servo.write(max_temperature=55)
         sim[3].power_cycle()
-        bus.link.advance(1.0)
+        bus.link.advance(1.0)  # type: ignore[attr-defined]
         assert servo.read("max_temperature", "lock") == {**before, "max_temperature": 55}
 
 
