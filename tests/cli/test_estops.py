@@ -12,7 +12,7 @@ HOLD = 'estop = "hold"'
 
 
 def torque(bench: Bench) -> list[int]:
-    return [bench.sims["arm"][node].memory["torque_enable"] for node in (1, 2, 3)]
+    return [bench.simulations["arm"][node].memory["torque_enable"] for node in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("word", ["arm", "a2", "{address}", "{address}#1-3", ""])

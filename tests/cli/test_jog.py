@@ -115,3 +115,30 @@ def test_a_dry_run_of_an_axis_moves_nothing(run: Run, bench: Bench) -> None:
     assert "would go by 10.0 deg at most" in run("jog", "a1=10deg/s", "--seconds", "1", "--dry-run").out
     assert "would send FF AA" in run("jog", "lift=2mm/s", "--seconds", "1", "--dry-run").out
     assert abs(run("hold", "a1", "--json").document["axes"][0]["present"]) < 0.01
+
+
+def test_with_clamp_an_axis_goes_as_far_as_it_may_and_that_is_told(run: Run, bench: Bench) -> None:
+    assert run("move", "a1=140deg").code == 0
+    ran = run("jog", "a1=30deg/s", "--seconds", "2", "--clamp", "--dry-run")
+    assert ran.code == 0, ran.err
+    assert "a1 would go by 10" in ran.out or "a1 would go by 9.9" in ran.out
+    assert "a1 goes to 150.0 deg instead of" in ran.err
+    ran = run("jog", "a1=30deg/s", "--seconds", "2", "--clamp", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.document["present"] == pytest.approx(2.618, abs=0.01)
+    assert ran.document["result"] == pytest.approx(0.1745, abs=0.01)
+    assert "a1 goes to 150.0 deg instead of" in ran.err
+    assert run("jog", "a1=30deg/s", "--seconds", "2").code == 8
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["lift=2mm/s"], "lift: its jog cannot be clamped"),
+        (["stepper:sim#1=10rpm"], "--clamp is for axes of a machine file"),
+    ],
+)
+def test_what_cannot_be_clamped_says_so(words: list[str], told: str, run: Run, bench: Bench) -> None:
+    ran = run("jog", *words, "--seconds", "1", "--clamp")
+    assert (ran.code, ran.out) == (2, "")
+    assert told in ran.err

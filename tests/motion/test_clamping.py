@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion import limits
-from motorbus.motion.clamping import Clamped, kept
+from motorbus.motion.clamping import SPAN, Clamped, Tidings, check_policy, kept
 from motorbus.motion.machine import AxisSpec
 
 SPEC = AxisSpec(
@@ -76,3 +76,20 @@ def test_what_is_given_is_allowed_and_no_other_allowed_place_is_nearer(
     assert (told is None) == (given_ == goal)
     low, high = (-1.0, 2.0) if measured is None else (max(-1.0, measured - 0.5), min(2.0, measured + 0.5))
     assert abs(given_ - goal) <= max(low - goal, goal - high, 0.0) + 1e-6
+
+
+def test_of_many_clamps_of_an_axis_the_first_is_told_and_one_in_a_while() -> None:
+    tidings = Tidings()
+    one, other = (Clamped(name, 9.0, 2.0, "limits") for name in ("elbow", "wrist"))
+    told = [number for number in range(1000) if tidings.worth(one, 3.0 + number * SPAN / 100)]
+    assert told == [0, 100, 200, 300, 400, 500, 600, 700, 800, 900]
+    assert tidings.worth(other, 3.0)
+    assert not tidings.worth(other, 3.0 + 0.9 * SPAN)
+
+
+def test_there_are_two_policies() -> None:
+    check_policy("reject")
+    check_policy("clamp")
+    for policy in ("", None, "Clamp"):
+        with pytest.raises(RequestError, match="is no policy"):
+            check_policy(policy)

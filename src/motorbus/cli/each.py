@@ -13,10 +13,12 @@ from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.errors import LinkError, MotorbusError, NoReply, PortBusy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
+
+    Look = Callable[[Sequence[dict[str, Any]], Mapping[str, str], Output], list[MotorbusError]]
 
 
 def each(
@@ -28,12 +30,14 @@ def each(
     *,
     dry_run: bool = False,
     unknown: Sequence[MotorbusError] = (),
+    look: Look | None = None,
 ) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
 
     Where a family has no such verb nothing is opened: RequestError. A bus that fails keeps nobody on another waiting. A
     bus that is called by its name means the devices of its axes, be they silent, and whoever else answers. A dry run
-    shows what would be sent, and sends none of it. `unknown` are errors of words that meant nobody.
+    shows what would be sent, and sends none of it. `unknown` are errors of words that meant nobody. `look` is asked
+    when everyone was visited: what it finds wrong with what was achieved is raised before anything else.
     """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
@@ -57,10 +61,13 @@ def each(
                 raise
             there += _unvisited(name, expected[len(there) :] or (None,), error, errors)
         results += [{**one, **_named(called, name, one["id"])} for one in there]
+    doubts = look(results, options, output) if look is not None and not dry_run else []
     if not dry_run:
         output.document(f"motorbus.{verb}/1", {"devices": results})
-        shown = [(_shown(one), one.get("error") or one.get("promise") or what) for one in results]
+        shown = [(_shown(one), _came_of(one) or what) for one in results]
         output.table("", ["device", "result"], shown)
+    if doubts:
+        raise _with_notes(doubts[0], [*doubts[1:], *errors, *unknown])
     return _verdict([*errors, *unknown], len(results) + len(unknown))
 
 
@@ -108,6 +115,11 @@ def _shown(one: Mapping[str, Any]) -> str:
     return f"{one['axis']} ({device})" if "axis" in one else device
 
 
+def _came_of(one: Mapping[str, Any]) -> str:
+    said: str = one.get("error") or one.get("promise") or ""
+    return f"{said}; {one['evidence']}" if "evidence" in one else said
+
+
 def _tried(bus: Bus | DryBus, node: int, verb: str, errors: list[MotorbusError]) -> dict[str, Any]:
     try:
         promise = able(face(bus, node), verb)()
@@ -126,8 +138,13 @@ def _verdict(errors: Sequence[MotorbusError], visited: int) -> Exit:
         return Exit.OK
     summaries = list(dict.fromkeys(error.summary for error in errors))
     if len(errors) == visited:
-        for other in summaries[1:]:
-            errors[0].add_note(f"also: {other}")
-        raise errors[0]
+        raise _with_notes(errors[0], errors[1:])
     advice = "; ".join(dict.fromkeys(error.advice for error in errors if error.advice))
     raise Partial("; ".join(summaries), advice=advice)
+
+
+def _with_notes(first: MotorbusError, others: Sequence[MotorbusError]) -> MotorbusError:
+    for other in dict.fromkeys(error.summary for error in others):
+        if other != first.summary:
+            first.add_note(f"also: {other}")
+    return first

@@ -82,10 +82,8 @@ def follow(
         Any option of the buses, as a flag.
     """
     pairs = _pairs(leader, follower)
-    span = units.parse(seconds, "time") if seconds else None
+    span = _span(seconds)
     check_rate(rate)
-    if span is not None and not span > 0:
-        raise RequestError("--seconds must be above 0", advice="nothing was sent")
     with robot([*pairs, *pairs.values()], options, output) as hand:
         present = {name: at for name, at in hand.robot.positions().items() if at is not None}
         if dry_run:
@@ -100,6 +98,14 @@ def follow(
             followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until, policy=policy)
     _tell(followed, output)
     return Exit.OK
+
+
+def _span(seconds: str) -> float | None:
+    """How long (s), None without an end. Raises RequestError for no time above 0."""
+    span = units.parse(seconds, "time") if seconds else None
+    if span is not None and not span > 0:
+        raise RequestError("--seconds must be above 0", advice="nothing was sent")
+    return span
 
 
 def _pairs(leader: str, follower: str) -> dict[str, str]:

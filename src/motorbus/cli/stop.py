@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from motorbus.cli import resting
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
@@ -24,13 +25,18 @@ axes and whoever else answers on it; with no name at all, every axis of the
 machine. Everyone is visited, whatever happens to another: who is silent, and a
 name that nobody knows, are told of with exit code 6.
 
+A device that accepts a stop has heard it, and no more. With --verify each is
+looked at afterwards, and what was seen is told beside its promise. One that
+still moves, or did not answer, ends the command with exit code 9. Of a stepper
+controller nobody can see that it rests.
+
 It cannot stop what another process moves, for a bus has one owner: Ctrl-C
 there, or SIGTERM to it, does; `motorbus estop` reaches it from any shell.
 
 Examples:
 
     motorbus stop
-    motorbus stop shoulder elbow
+    motorbus stop shoulder elbow --verify
     motorbus stop feetech:/dev/ttyACM0#3
     motorbus stop feetech:/dev/ttyACM0
     motorbus stop stepper:/dev/ttyUSB0""",
@@ -40,6 +46,7 @@ Examples:
 @app.default
 def stop(
     *devices: Annotated[str, Parameter(name="BUS#ID")],
+    verify: Annotated[bool, Parameter(negative="")] = False,
     dry_run: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
@@ -50,6 +57,9 @@ def stop(
     ----------
     devices
         FAMILY:PORT for every device that answers, FAMILY:PORT#ID for some, or axes; all axes when left out.
+    verify
+        When everyone has been told to stop, look whether each rests: three fresh readings at one place, over
+        a tenth of a second, for 1 s at most.
     dry_run
         Read as usual; show the frames that would change something, and send none of those.
     options
@@ -60,4 +70,5 @@ def stop(
         if unknown and not meant.known:
             raise together(unknown)
         others = beside_others(unknown)
-        return each("stop", "stop", meant.known, options, output, dry_run=dry_run, unknown=others)
+        look = resting.look if verify else None
+        return each("stop", "stop", meant.known, options, output, dry_run=dry_run, unknown=others, look=look)

@@ -160,42 +160,6 @@ class Train(Protocol):
         """
 
 
-class Timing(Protocol):
-    """How a device that moves by a profile of its own keeps time with others, which may be on other buses."""
-
-    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
-        """How long (s) all take, once each has said how long it takes at least: never less than `shortest`.
-
-        `fitted` gives, for a duration that others need, the nearest one, not shorter, that this device can have.
-        Raises Interrupted when somebody cannot take part.
-        """
-
-    def start(self, lead: float) -> Operation[float]:
-        """It is ready. Comes back `lead` s before the common start, and gives that moment (s on this link's clock).
-
-        Raises Interrupted when somebody cannot take part.
-        """
-
-    def fails(self, error: BaseException) -> None:
-        """It does not begin, or has not come to its end, for this error: to be said at once, before cleaning up, so
-        that the others do not go on meanwhile.
-        """
-
-
-class Turned(NamedTuple):
-    """A movement that a device made by its own profile: all *estimated*, for nothing told of it.
-
-    `angle` (rad, with its sign) is the whole way, which began at the moment `start` (s on the link's clock) and took
-    `duration` (s). `way` says how much of it was done so many s after the start (rad, with its sign).
-    """
-
-    node: int
-    angle: float
-    start: float
-    duration: float
-    way: Callable[[float], float]
-
-
 class Stop(NamedTuple):
     """Frames that stop the nodes, in order, and what an acknowledgement of them promises."""
 
@@ -322,8 +286,8 @@ class Device(Protocol):
 
 
 class Devices(NamedTuple):
-    """The verb classes of a family: each is called with a bus and a node id. `assures`: what they give to whoever relies
-    on them; None where the family does not say."""
+    """The verb classes of a family, each called with a bus and a node id; `assures` is what these devices give to
+    whoever relies on them, None where the family does not say."""
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]

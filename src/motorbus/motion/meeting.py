@@ -71,7 +71,7 @@ class Beat:
         self.ready: Final = Meeting[float](names)
 
     def of(self, party: str, origin: float) -> Seat:
-        """Its part in it: a `core.family.Timing`."""
+        """Its part in it: a `core.timing.Timing`."""
         return Seat(self, party, origin)
 
     def fail(self, error: MotorbusError) -> None:
@@ -89,14 +89,14 @@ class Seat:
         self._origin = origin
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
-        """See `core.family.Timing`."""
+        """See `core.timing.Timing`."""
         needed = yield from self._beat.shortest.meet(self._party, shortest)
         longest = max(needed.values())
         offered = yield from self._beat.fitted.meet(self._party, fitted(longest))
         return max(longest, *offered.values())
 
     def start(self, lead: float, meanwhile: Operation[object] | None = None) -> Operation[float]:
-        """See `core.family.Timing`. Once all are ready there is `NOTICE` left; `meanwhile` is done in that time."""
+        """See `core.timing.Timing`. Once all are ready there is `NOTICE` left; `meanwhile` is done in that time."""
         now = (yield from Pause(0)) - self._origin
         ready = yield from self._beat.ready.meet(self._party, now + lead)
         moment = max(ready.values()) + NOTICE + self._origin
@@ -106,7 +106,7 @@ class Seat:
         return moment
 
     def fails(self, error: BaseException) -> None:
-        """See `core.family.Timing`. Those who have begun already see to that themselves."""
+        """See `core.timing.Timing`. Those who have begun already see to that themselves."""
         self._beat.fail(
             error if isinstance(error, MotorbusError) else Interrupted(str(error) or type(error).__name__)
         )

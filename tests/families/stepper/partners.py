@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from motorbus.bus.pump import Bus
-from motorbus.core.family import Turned
 from motorbus.core.operation import Operation, Pause, Progress
+from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper import Controller, driver
 from motorbus.families.stepper.execution import Motion, Phase
@@ -15,7 +15,7 @@ from tests.families.stepper.loans import Cut, Line1
 
 
 class Partner:
-    """A `core.family.Timing` whose others need so long (s), after having made one wait for `thinks` s each time.
+    """A `core.timing.Timing` whose others need so long (s), after having made one wait for `thinks` s each time.
 
     `fails` is where they call off: "agreed" or "start". What was said here is `shortest`, `fit`, `agreed_on`, `lead`
     and `moment` (s); `failures` are the errors that the others were told.

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Turned
 from motorbus.core.operation import INTENT, OUTCOME, Operation, Pause, Together, outcome
+from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, LinkLost, MotorbusError, NotHomed, OutcomeUnknown, RequestError
 from motorbus.families.stepper import FAMILY, Controller, driver
 from motorbus.families.stepper.driver.borrowing import LOST, NOTE

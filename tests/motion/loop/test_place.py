@@ -11,6 +11,7 @@ import pytest
 
 from motorbus.errors import LimitExceeded
 from motorbus.motion.loop.place import CATCH_UP, Place
+from motorbus.motion.safety.track import FRESH
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
 
@@ -175,3 +176,61 @@ def test_a_direct_goal_is_never_braked(axis: Any) -> None:
     one.rest()
     assert one.arrived
     assert one.sent == pytest.approx(STEP)
+
+
+# -- who may be ordered --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rate", "endures"), [(800.0, 2), (100.0, 2), (6.1, 2), (5.0, 1), (3.9, 0), (1.0, 0)]
+)
+def test_nobody_is_ordered_by_a_position_that_is_old(axis: Any, rate: float, endures: int) -> None:
+    one = Place(axis, None, 1 / rate, False, None)
+    assert one.endures == endures
+    assert (endures + 1) / rate <= FRESH or endures == 0
+    one.silent = endures
+    assert not one.unsure
+    one.silent += 1
+    assert one.unsure
+    one.hear(pi, 1.0)
+    assert not one.unsure
+
+
+def test_who_is_doubted_is_not_ordered_until_it_is_heard(axis: Any) -> None:
+    one = place(axis)
+    one.doubt()
+    assert (one.unsure, one.silent) == (True, 1)
+    one.hear(pi + 0.1, 1.0)
+    assert (one.unsure, one.silent, one.position) == (False, 0, pytest.approx(0.1))
+
+
+def test_who_resumes_goes_on_at_rest_from_where_it_is(axis: Any) -> None:
+    one = place(axis)
+    for _ in range(60):
+        led(one, 2.0)
+    one.position = 0.1
+    one.resume()
+    assert one.sent == 0.1
+    assert 0.1 < led(one, 2.0) < 0.1 + 0.1 * STEP
+
+
+def test_with_clamp_a_goal_becomes_the_nearest_that_is_allowed(axis: Any) -> None:
+    axis.departs()
+    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False, None, "clamp")
+    one.begin(0.0)
+    one.asked = 9.0
+    one.judge(1)
+    assert one.asked == pytest.approx(0.5)
+    one.judge(1)
+    assert [(told.asked, told.reason) for told in one.clamps] == [(9.0, "limits")]
+
+
+def test_a_direct_goal_that_no_place_is_near_to_is_refused_with_clamp_too(axis: Any) -> None:
+    axis.departs()
+    one = Place(axis, None, PERIOD, True, None, "clamp")
+    one.begin(1.0)
+    one.position = 0.0  # somebody has turned it away, and max_step is 20 degrees
+    one.asked = 1.0
+    with pytest.raises(LimitExceeded, match="one command may be"):
+        one.judge(1)
+    assert one.clamps == []

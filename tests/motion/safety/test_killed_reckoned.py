@@ -34,7 +34,7 @@ chance, left, write = Random(int(sys.argv[2])), [int(sys.argv[3])], SerialLink.w
 
 def doomed(link, data):
     write(link, data)
-    left[0] -= 1
+    left[0] -= sys.argv[4] == "request" or data[2:4] == b"\\x03\\x0c"
     if left[0] < 0:
         os.kill(os.getpid(), signal.SIGKILL)
 
@@ -49,8 +49,6 @@ with Robot.load(sys.argv[1]) as robot:
 """
 PULSE = 0.005 / 1600
 """m."""
-ORDERS = (9, 11)
-"""Requests behind which the motor turns, as a rule."""
 ASKS = (0x3E, 0x00)
 """The third bytes of requests that only ask."""
 
@@ -72,9 +70,10 @@ def at_rest(control: Path) -> float:
             return found
 
 
-def killed(file: Path, seed: int, requests: int) -> list[float]:
-    """A program that moves the axis, killed when so many requests have left; the ways that it was about to go (m)."""
-    words = [sys.executable, "-c", PROGRAM, str(file), str(seed), str(requests)]
+def killed(file: Path, seed: int, chance: Random) -> list[float]:
+    """A program that moves the axis, killed behind an order or anywhere; the ways that it was about to go (m)."""
+    doom = [str(chance.randrange(3)), "order"] if seed % 2 == 0 else [str(chance.randrange(2, 60)), "request"]
+    words = [sys.executable, "-c", PROGRAM, str(file), str(seed), *doom]
     ended = subprocess.run(words, capture_output=True, timeout=120, check=False)
     assert ended.returncode == -signal.SIGKILL, ended.stderr
     return [float(word) for word in ended.stdout.split()]
@@ -91,7 +90,7 @@ def test_the_one_move_that_was_ordered_comes_to_its_end_and_no_other_begins(
         file.write_text(described({"stage": stage.bus}, "", "", True, axes, {}), encoding="utf-8")
         for seed in range(rounds(100_000) // 2_500):
             before = at_rest(control)
-            ways = killed(file, seed, ORDERS[seed] if seed < len(ORDERS) else chance.randrange(2, 60))
+            ways = killed(file, seed, chance)
             caught += place(control)[1]
             after = at_rest(control)
             ends = sum(ways[:-1]), sum(ways)

@@ -27,7 +27,7 @@ from motorbus.errors import (
 from motorbus.motion import capabilities as single
 from motorbus.motion.capabilities import AxisVerbs, cap
 from motorbus.motion.command import Command
-from motorbus.motion.loop.place import STALE, Place
+from motorbus.motion.loop.place import Place
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.track import FASTEST, MARGIN, TREMBLING
 
@@ -234,7 +234,7 @@ class Part:
             place.doubt()
             self.unsure = True
         else:
-            anew = place.silent > STALE or quality is Quality.CONFIRMED
+            anew = place.silent > place.endures or quality is Quality.CONFIRMED
             place.hear(angle, at - self.origin)
             if anew and place.begun:
                 place.resume()
@@ -255,7 +255,7 @@ class Part:
         missing = [place for node, place in self.places.items() if node not in heard]
         for place in missing:
             place.silent += 1
-            if place.silent > STALE:
+            if place.silent > place.endures:
                 self.unsure = True
                 if isfinite(place.angle):
                     place.axis.track.take(place.angle, place.heard + self.origin)
@@ -308,7 +308,9 @@ class Part:
 
     def release_silent(self) -> None:
         """Who has not been heard for too long to be ordered is left at the last goal that he was told."""
-        self._release([place for place in self.places.values() if place.begun and place.silent > STALE])
+        self._release(
+            [place for place in self.places.values() if place.begun and place.silent > place.endures]
+        )
 
     def _release(self, places: Iterable[Place]) -> list[str]:
         names = []

@@ -19,6 +19,7 @@ from motorbus.motion.clamping import Clamped, Policy, kept
 from motorbus.motion.limits import Device, shown_rate
 from motorbus.motion.machine.model import ROUNDING, VELOCITY
 from motorbus.motion.profile import Follower, Limits, follower
+from motorbus.motion.safety.track import FRESH
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
@@ -28,7 +29,8 @@ CATCH_UP: Final = 3
 """Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal
 by then, and begins anew from there."""
 STALE: Final = 2
-"""Cycles in a row in which an axis may be silent and is ordered all the same."""
+"""Cycles in a row in which an axis may be silent and is ordered all the same, where a cycle is short enough: no order
+is given by a position that is older than `safety.track.FRESH`."""
 
 
 class Place:
@@ -38,8 +40,9 @@ class Place:
     row it has not been heard, or not so that it can be believed. `angle` is what its device told last (rad); it is no
     number where the next reading must be looked at closely, and `doubted` while the last one cannot be believed.
     `asked` is the goal that was set and `sent` the position that was ordered last; None: none. `begun` is true once it
-    has got torque here, and until then `claim` is the command over it from when its goal was set. `left` is in how many
-    cycles in a row it was not ordered. What is brought within its limits is put into `clamps`.
+    has got torque here, and until then `claim` is the command over it from when its goal was set. `endures` is in how
+    many cycles in a row it may be silent and is ordered all the same, `left` in how many it was not ordered. What is
+    brought within its limits is put into `clamps`.
     """
 
     __slots__ = (
@@ -60,6 +63,7 @@ class Place:
         "claim",
         "clamps",
         "doubted",
+        "endures",
         "heard",
         "left",
         "name",
@@ -98,6 +102,7 @@ class Place:
         self._direct: Final = direct
         self._jerk: Final = jerk
         self._policy: Final = policy
+        self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1))
         self._follower: Follower | None = None
         self._passed: float | None = None
         self.position = 0.0
@@ -155,7 +160,7 @@ class Place:
     @property
     def unsure(self) -> bool:
         """Nobody knows where it is by now, so nobody may order it anywhere."""
-        return self.doubted or self.silent > STALE
+        return self.doubted or self.silent > self.endures
 
     def resume(self) -> None:
         """It is known again where it is: what it is told from now on begins there."""

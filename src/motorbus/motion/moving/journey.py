@@ -22,6 +22,7 @@ from motorbus.motion.moving.plan import Fact, Gone, Plan, Planned
 from motorbus.motion.moving.stream import Fate
 from motorbus.motion.profile import Limiting
 from motorbus.motion.profile.shapes import NOTHING
+from motorbus.motion.safety import canary
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
@@ -34,7 +35,7 @@ class Journey:
     """A movement of these `axes`, by their names; `origins` as in a `Body`. `rate` (Hz) is that of what is led.
 
     `tolerance` (rad, m) is how near to its goal each that is led must come, `timeout` (s) within how long after the end;
-    None: as usual.
+    None: as usual. Raises Refused for an axis that is at fault.
     """
 
     def __init__(
@@ -60,6 +61,8 @@ class Journey:
         self._axes: Final = axes
         self._origins: Final = origins
         self._parties: Final = _parties(axes)
+        for axis in axes.values():
+            canary.check(axis)
         self._facts: Final = Meeting[Mapping[str, Fact]](self._parties)
         self._beat: Final = Beat(self._parties)
 

@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from inspect import GEN_CLOSED, getgeneratorstate
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.core.family import Positions, Turned
+from motorbus.core.family import Positions
 from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
+from motorbus.core.timing import Turned
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import capabilities as single
 from motorbus.motion import limits
@@ -21,7 +22,6 @@ from motorbus.motion.moving.moved import STILL, Arrived, Track
 from motorbus.motion.moving.plan import Fact, Gone, Planned
 from motorbus.motion.moving.stream import SETTLE, SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 from motorbus.motion.reckoning import Movement, cut_short
-from motorbus.motion.safety import canary
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named, names
 
@@ -47,12 +47,7 @@ NEAR: Final = 3
 
 
 def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
-    """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop.
-
-    Raises Refused for an axis that is at fault, before anything is sent.
-    """
-    for axis in axes:
-        canary.check(axis)
+    """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     journey.commands.append(work.command)
@@ -309,7 +304,7 @@ class OwnPart:
 
 
 class Kept:
-    """How such an axis keeps time with the rest of its journey: a `core.family.Timing` that remembers what it said."""
+    """How such an axis keeps time with the rest of its journey: a `core.timing.Timing` that remembers what it said."""
 
     planned: Planned
 
@@ -328,7 +323,7 @@ class Kept:
         self.planned = self._journey.outlined(self._facts)
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
-        """See `core.family.Timing`."""
+        """See `core.timing.Timing`."""
         self._journey.check_asked(self._axis.name, shortest)
         least = max(shortest, self.planned.course.duration)
         self.duration = yield from self._seat.agreed(least, lambda others: max(others, fitted(others)))
@@ -337,14 +332,14 @@ class Kept:
         return self.duration
 
     def start(self, lead: float) -> Operation[float]:
-        """See `core.family.Timing`."""
+        """See `core.timing.Timing`."""
         moment = yield from self._seat.start(lead)
         self._journey.check()  # all were ready, and one of them may have been stopped since
         self.moment = moment
         return moment
 
     def fails(self, error: BaseException) -> None:
-        """See `core.family.Timing`."""
+        """See `core.timing.Timing`."""
         told = _told(self._journey, [self._axis], error) if isinstance(error, MotorbusError) else error
         self._journey.fail(told)
 

@@ -14,8 +14,8 @@ from fractions import Fraction
 from math import tau
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.family import Timing, Turned
 from motorbus.core.operation import Operation, Pause, Tune, outcome
+from motorbus.core.timing import Timing, Turned
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import commands, goals

@@ -1,0 +1,82 @@
+"""What nobody waits for goes on all the same: along with whoever pumps, or in a thread of its own."""
+
+from __future__ import annotations
+
+from threading import Thread
+from typing import Any
+
+import pytest
+
+import motorbus
+from motorbus.bus.background import Background
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import Interrupted, NoReply
+from motorbus.families.feetech import Servo
+
+
+def twice(bus: Any, node: int, found: list[object]) -> Operation[str]:
+    """Two questions with a pause between them; what came is kept as well."""
+    for _ in range(2):
+        found.append((yield from Servo.position.function(Servo(bus, node))))
+        yield from Pause(1.0)
+    return "done"
+
+
+def test_whoever_pumps_carries_it_along_and_no_further_than_time_goes() -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+        one = Background(bus, twice(bus, 1, found))
+        one.along()
+        assert found == []
+        bus.run(iter(Pause(0.5)))
+        assert len(found) == 1
+        Servo(bus, 2).position()
+        bus.run(iter(Pause(2.0)))
+        assert len(found) == 2
+        assert one.run.result() == "done"
+        assert not bus.turns.chores
+
+
+def test_an_error_of_it_is_nobody_elses() -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+        sim[1].unplug()
+        one = Background(bus, twice(bus, 1, []))
+        one.along()
+        for _ in range(3):
+            Servo(bus, 2).position()
+            bus.run(iter(Pause(0.5)))
+        with pytest.raises(NoReply):
+            one.run.result()
+        assert not bus.turns.chores
+
+
+def test_a_thread_carries_it_out_by_itself() -> None:
+    with motorbus.simulate("feetech", ids="1", clock="real") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+        told: list[str] = []
+        thread = Thread(target=lambda: told.append(Background(bus, twice(bus, 1, found)).carried()))
+        thread.start()
+        Servo(bus, 1).position()
+        thread.join(60)
+        assert (told, len(found)) == (["done"], 2)
+
+
+def test_an_emergency_stop_does_not_end_it() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+
+        def goes_on() -> Operation[None]:
+            while len(found) < 3:
+                try:
+                    yield from Pause(0.2)
+                except Interrupted as error:
+                    found.append(error)
+                found.append(None)
+
+        one = Background(bus, goes_on())
+        one.along()
+        bus.run(iter(Pause(0.1)))
+        bus.estop()
+        bus.run(iter(Pause(1.0)))
+        assert one.run.root.finished
+        assert len(found) == 3
