@@ -14,7 +14,7 @@ from typing import Any, Final
 from motorbus.core import units
 from motorbus.motion.machine import keys, schema
 from motorbus.motion.machine.keys import Key, word
-from motorbus.motion.machine.model import EXITS
+from motorbus.motion.machine.model import ESTOPS, EXITS
 from scripts.pages import kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -147,7 +147,7 @@ device moves one axis.
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *_file(), *_tables(), *_exits(), *_units(), CONVERSION, EDITS]).rstrip() + "\n"
+    return "\n".join([HEAD, *_file(), *_tables(), *_exits(), "", *_estops(), *_units(), CONVERSION, EDITS]).rstrip() + "\n"
 
 
 def text_of_schema() -> str:
@@ -202,6 +202,15 @@ def _default(key: Key, linear: bool) -> str:
 def _exits() -> Iterator[str]:
     yield "## `exit`\n\nWhat an axis does when the program ends: by its end, an error, a signal, or a lost lease.\n"
     yield from listed(("exit", "means"), [[f"`{name}`", means] for name, means in EXITS.items()])
+
+
+def _estops() -> Iterator[str]:
+    yield (
+        "## `estop`\n\nWhat an emergency stop does to an axis. What a device cannot do is refused before a port is opened: "
+        "`torque_off` and `hold` are for FEETECH servos, which let go if nothing is said; KST servos always hold; a stepper "
+        "controller has one kind of stop, and no such key. See [Stop](../how-to/stop.md).\n"
+    )
+    yield from listed(("estop", "means"), [[f"`{name}`", means] for name, means in ESTOPS.items()])
 
 
 def _units() -> Iterator[str]:

@@ -177,7 +177,7 @@ class Faulted(MotionError):
 
 
 class Overloaded(MotionError):
-    """Its motor pushed too hard for too long without coming to its goal, or is too hot: `reason` is "load" or "heat"."""
+    """Its motor pushed too hard for too long without coming to its goal, or is too hot: `reason`, "load" or "heat"."""
 
     def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:
         super().__init__(summary, **parts)  # type: ignore[arg-type]

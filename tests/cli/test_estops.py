@@ -18,7 +18,7 @@ def torque(bench: Bench) -> list[int]:
 @pytest.mark.parametrize("word", ["arm", "a2", "{address}", "{address}#1-3", ""])
 def test_who_is_to_hold_keeps_its_torque_by_every_name(word: str, run: Run, bench: Bench) -> None:
     bounded(bench, HOLD)
-    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    assert run("torque", "on", "arm#1-3").code == 0
     said = word.format(address=bench.machine.buses["arm"].address)
     ran = run("estop", *([said] if said else []), "--json")
     assert "those that hold" in ran.out
@@ -26,14 +26,14 @@ def test_who_is_to_hold_keeps_its_torque_by_every_name(word: str, run: Run, benc
 
 
 def test_without_it_everyone_lets_go(run: Run, bench: Bench) -> None:
-    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    assert run("torque", "on", "arm#1-3").code == 0
     assert run("estop", "arm").code in (0, 6)
     assert torque(bench) == [0, 0, 0]
 
 
 def test_what_the_command_line_says_comes_on_top(run: Run, bench: Bench) -> None:
     bounded(bench, HOLD)
-    assert run("torque", "on", "arm#1-3", "--yes").code == 0
+    assert run("torque", "on", "arm#1-3").code == 0
     run("estop", "arm", "--estop-hold", "3")
     assert torque(bench) == [1, 0, 1]
 
@@ -46,3 +46,11 @@ def test_a_file_that_nobody_understands_says_nothing(
     ran = run("estop", address)
     assert ran.code in (0, 6), ran.err
     assert with_estops(address, {"baud": "1"}) == {"baud": "1"}
+
+
+def test_what_can_be_seen_in_a_broken_file_is_enough_for_an_emergency_stop(run: Run, bench: Bench) -> None:
+    assert run("torque", "on", "arm#1-3").code == 0
+    bounded(bench, "speed = 3", HOLD)
+    for words in (["estop"], ["estop", "arm"]):
+        assert run(*words).code == 6
+        assert torque(bench) == [1, 0, 0]

@@ -247,6 +247,8 @@ def test_a_verb_shows_what_it_is_called_and_what_it_takes() -> None:
             "velocity",
             "acceleration",
             "duration",
+            "tolerance",
+            "timeout",
         ]
         assert list(inspect.signature(robot.positions).parameters) == ["names"]
         assert robot.positions.__name__ == "positions"

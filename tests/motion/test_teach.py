@@ -13,6 +13,7 @@ from motorbus.errors import LinkLost, MotionError, MotorbusError, NoReply, Reque
 from motorbus.motion.machine import Machine
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import AsyncRobot, Robot
+from tests.motion.loop.lines import Doubtful
 from tests.motion.machines import described, machine
 from tests.motion.test_follow import move
 
@@ -43,6 +44,21 @@ def test_where_it_is_guided_is_what_is_written_down() -> None:
         assert places[0] == pytest.approx(0.0, abs=0.05)
         assert places[-1] == pytest.approx(1.0, abs=0.02)
         assert list(places) == sorted(places)
+
+
+def test_a_cycle_in_which_somebody_cannot_be_believed_has_no_sample() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        sims["arm"].line = line = Doubtful()
+        count = [0]
+
+        def over() -> bool:
+            count[0] += 1
+            line.lying = {2: lambda raw: raw + 1500} if count[0] == 5 else {}
+            return count[0] > 40
+
+        found = robot.teach(until=over)
+        assert len(found.times) == 40
+        assert max(abs(place) for place in found.axes["a2"]) < 0.01
 
 
 def test_a_cycle_in_which_somebody_was_silent_has_no_sample() -> None:

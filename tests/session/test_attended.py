@@ -178,6 +178,16 @@ def test_the_verb_of_one_axis_raises_it_too() -> None:
         robot["lift"].home(deadline=20.0)
 
 
+@pytest.mark.parametrize("direct", [False, True])
+def test_a_loop_that_nobody_attends_any_more_raises_it_in_each_cycle(direct: bool) -> None:
+    with machine(arm="1-2", can="0x25") as (made, _), Robot.of(made) as robot:
+        with refused(), robot.attended(lasts=0.5), robot.loop(rate=50, direct=direct) as loop:
+            for state in loop:
+                for name in robot.axes:
+                    loop.goal[name] = 0.2 * state.at if direct else 1.0 if name != "c1" else 0.5
+        assert not any(axis.under_way for axis in robot.axes.values())
+
+
 def test_every_axis_is_stopped_whatever_happens_to_some_and_the_error_tells() -> None:
     with wheels("1-4", exit="torque_off", axes={"a3": {"exit": "leave"}}) as (robot, sims):
         for name in ("a3", "a4"):

@@ -162,7 +162,8 @@ class Stopper:
                 limit = self._submit(self._following(flight), flights, limit)
         missing = [flight for flight in flights if not self._settled(flight)]
         acknowledged += _obeyed(flights, missing, acknowledged)
-        while _answered(flight.exchange for flight in missing) and self.link.now() < begun + BREATH:
+        again = [flight.exchange for flight in missing if not isinstance(flight.error, LinkLost)]
+        while _answered(again) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
 
     def _submit(self, exchanges: Iterable[Exchange[Answer]], flights: list[Flight], limit: float) -> float:

@@ -1,7 +1,7 @@
 """What went over the wire, for whoever wants to watch, at no cost to the bus.
 
 A subscriber has a bounded queue: when it does not keep up, the oldest records are dropped and counted, so a slow
-reader can never hold up a motor.
+reader can never hold up a motor. One that fails, as it writes to a disk that is full, gets no more records.
 """
 
 from __future__ import annotations
@@ -24,11 +24,15 @@ class TraceRecord(NamedTuple):
 
 
 class Subscription(Generic[R]):
-    """A bounded queue of records; iterating takes out what is there. `dropped` counts what did not fit."""
+    """A bounded queue of records; iterating takes out what is there.
+
+    `dropped` counts what did not fit. `failure` is why it gets no more, where a subclass has failed.
+    """
 
     def __init__(self, limit: int) -> None:
         self._records: deque[R] = deque(maxlen=limit)
         self.dropped = 0
+        self.failure: Exception | None = None
 
     def put(self, record: R) -> None:
         if len(self._records) == self._records.maxlen:
@@ -64,6 +68,10 @@ class Feed(Generic[R]):
         self.subscriptions = tuple(s for s in self.subscriptions if s is not subscription)
 
     def put(self, record: R) -> None:
-        """Hand one record to every subscription."""
+        """Hand one record to every subscription; one that fails has failed for itself, and not for the bus."""
         for subscription in self.subscriptions:
-            subscription.put(record)
+            try:
+                subscription.put(record)
+            except Exception as error:
+                subscription.failure = error
+                self.unsubscribe(subscription)

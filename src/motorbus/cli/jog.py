@@ -86,12 +86,7 @@ def jog(
         how = _How(units.parse(seconds, "time"), "clamp" if clamp else "reject")
         return _axis(where, speed, how, options, output, yes=yes, dry_run=dry_run)
     if clamp:
-        raise RequestError(
-            "--clamp is for axes of a machine file",
-            expected="AXIS=VELOCITY with --clamp",
-            cause="a device by its address has no limits that anybody wrote down",
-            advice="leave it out; nothing was sent",
-        )
+        raise _nothing_to_clamp()
     bus, family, (node,) = device(where)
     offers(family, "jog")
     velocity, span = units.parse(speed, "velocity"), units.parse(seconds, "time")
@@ -105,6 +100,15 @@ def jog(
     output.document("motorbus.jog/1", facts)
     output.text(f"#{node}: {told}")
     return Exit.OK
+
+
+def _nothing_to_clamp() -> RequestError:
+    return RequestError(
+        "--clamp is for axes of a machine file",
+        expected="AXIS=VELOCITY with --clamp",
+        cause="a device by its address has no limits that anybody wrote down",
+        advice="leave it out; nothing was sent",
+    )
 
 
 class _How(NamedTuple):

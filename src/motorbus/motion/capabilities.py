@@ -260,8 +260,8 @@ def _is_moving(name: str) -> RequestError:
 def state(axis: AxisVerbs) -> Operation[State]:
     """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C.
 
-    One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that. An axis
-    that has torque from here is looked at for a restart of its device, at most every `HEALTH`: see `Robot.faults`.
+    One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that. An
+    axis that has torque from here is looked at for a restart of its device, not too often: see `Robot.faults`.
     """
     found, quality = yield from _judged(axis)
     if quality is Quality.SUSPECT:
@@ -374,9 +374,13 @@ def stop(axis: AxisVerbs) -> Operation[Enum]:
 
 
 def hold(axis: AxisVerbs) -> Operation[None]:
-    """Stay here, with torque: torque on without a jump where there is a switch for it, else a stop."""
+    """Stay here, with torque: torque on without a jump where there is a switch for it, else a stop.
+
+    Raises Faulted where its device does not keep that torque; else as `enable_torque` and `stop`.
+    """
     if "enable_torque" in axis.able:
         yield from enable_torque(axis)
         axis.under_way = False
+        yield from canary.kept(axis)
     else:
         yield from stop(axis)

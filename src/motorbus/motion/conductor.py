@@ -5,17 +5,16 @@ Work on one bus goes straight to it, for a control loop does so thousands of tim
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TypeVar
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.concert import Concert
 from motorbus.bus.concert_loop import LoopConcert
-from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.safety.gate import blamed
+from motorbus.motion.safety.gate import raise_blamed
 
 T = TypeVar("T")
 
@@ -37,7 +36,7 @@ class Conductor:
         try:
             return self._run(work)
         except MotorbusError as error:
-            _raise_blamed(error, self._buses.values())
+            raise_blamed(error, self._buses.values())
             raise
 
     def _run(self, work: Abreast[T]) -> T:
@@ -64,7 +63,7 @@ class LoopConductor:
         try:
             return await self._run(work)
         except MotorbusError as error:
-            _raise_blamed(error, self._buses.values())
+            raise_blamed(error, self._buses.values())
             raise
 
     async def _run(self, work: Abreast[T]) -> T:
@@ -77,10 +76,3 @@ class LoopConductor:
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
-
-
-def _raise_blamed(error: MotorbusError, buses: Iterable[BusFace]) -> None:
-    """Raise what it was ended by, where that is the loss of the lease."""
-    why = blamed(error, buses)
-    if why is not error:
-        raise why from error

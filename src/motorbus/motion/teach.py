@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 
+from motorbus.core.family import Quality
 from motorbus.errors import MotionError, MotorbusError, RequestError
 from motorbus.motion import group
 from motorbus.motion.body import Body
@@ -30,8 +31,8 @@ def teach(
     """Let these axes go and write down where they are guided, `rate` times a second (Hz); None: all that can be taught.
 
     The trajectory has the times of the readings, from 0 on: those of a loop that was held up are late, and stand where
-    they were taken. A cycle in which an axis was not heard has no sample; nothing is smoothed, see
-    `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
+    they were taken. A cycle in which an axis was not heard, or cannot be believed, has no sample; nothing is
+    smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
     moves.
 
     It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it
@@ -80,7 +81,7 @@ class _Teaching:
 
     def step(self, loop: LoopFace, state: LoopState) -> bool:
         """See `loop.Course`."""
-        if not state.missing:
+        if not (state.missing or Quality.SUSPECT in state.doubts.values()):
             self._axes = loop.axes
             self._times.append(state.at)
             self._rows.append(tuple(state.position.values()))

@@ -35,6 +35,7 @@ from motorbus.motion.leaving import Leaving
 from motorbus.motion.loop.faces import awaiting_loop, blocking_loop, looped
 from motorbus.motion.machine import NAME, Machine
 from motorbus.motion.moving import verbs as moving
+from motorbus.motion.quanta import awaiting_jogging, blocking_jogging
 from motorbus.motion.recognition import recognise
 from motorbus.motion.safety.fence import fence
 from motorbus.motion.teach import teach
@@ -175,6 +176,7 @@ class Robot(RobotVerbs, Led):
     axes: Mapping[str, Axis]
     loop = blocking_loop
     attended = blocking_attended
+    jogging = blocking_jogging
 
     def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
         super().__init__(machine, buses, axes)
@@ -284,6 +286,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
     axes: Mapping[str, AsyncAxis]
     loop = awaiting_loop
     attended = awaiting_attended
+    jogging = awaiting_jogging
     _shut = NOT_OPEN
 
     def __init__(self, plan: Plan, report: Notify | None = None) -> None:

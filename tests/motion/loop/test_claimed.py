@@ -108,7 +108,7 @@ def test_who_waits_for_its_torque_on_an_event_loop_can_be_stopped() -> None:
             async with AsyncRobot.of(made) as robot, robot.loop(RATE) as loop:
                 await anext(loop)
                 loop.goal["a1"] = 0.5
-                cycle = asyncio.ensure_future(anext(loop))  # type: ignore[arg-type]
+                cycle = asyncio.ensure_future(anext(loop))
                 for _ in range(turns):
                     await asyncio.sleep(0)
                 await robot["a1"].disable_torque()

@@ -74,7 +74,10 @@ def test_a_direct_goal_goes_as_far_as_its_axis_can_in_that_time() -> None:
         loop.goal["a1"] = 0.5
         next(loop)
         assert loop.goal["a1"] == pytest.approx(STEP)
-        assert told == [Clamped("a1", 0.5, pytest.approx(STEP), "velocity")]
+        (event,) = told
+        assert isinstance(event, Clamped)
+        assert (event.asked, event.reason) == (0.5, "velocity")
+        assert event.given == pytest.approx(STEP)
         loop.goal["a1"] = STEP + 0.001
         cycles(loop, 40)
         assert loop.statistics.clamped == {"a1": 1}

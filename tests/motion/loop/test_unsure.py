@@ -59,9 +59,9 @@ def test_who_is_silent_for_too_long_is_left_out_and_the_others_go_on() -> None:
         ordered(line)
         cycles(loop, STALE + 1)
         assert ordered(line) == [{1, 2, 3}] * (STALE + 1)
-        place = loop._rounds.places["a2"]
+        place: Any = loop._rounds.places["a2"]
         before = place.sent
-        others = loop._rounds.places["a1"].sent
+        others: Any = loop._rounds.places["a1"].sent
         cycles(loop, 2)
         assert ordered(line) == [{1, 3}] * 2
         assert place.sent == before
@@ -81,7 +81,7 @@ def test_who_comes_back_goes_on_from_where_it_is_measured_to_be() -> None:
         while (state := cycles(loop, 1)).missing:
             sims["arm"][2].raw_position = 2048 + 100  # and somebody turns it by hand
         assert state.quality["a2"] is Quality.FRESH
-        place = loop._rounds.places["a2"]
+        place: Any = loop._rounds.places["a2"]
         assert place.sent == place.position == pytest.approx(100 / 4096 * tau, abs=0.02)
         line.sent.clear()
         cycles(loop, 1)
@@ -192,7 +192,7 @@ def test_two_that_agree_are_believed_and_it_goes_on_from_there() -> None:
         line.lying = {2: lambda raw: raw - FAR // 2}
         seen = [next(loop).quality["a2"] for _ in range(3)]
         assert seen == [Quality.SUSPECT, Quality.CONFIRMED, Quality.FRESH]
-        place = loop._rounds.places["a2"]
+        place: Any = loop._rounds.places["a2"]
         there = -FAR // 2 / 4096 * tau
         assert place.position == pytest.approx(there, abs=0.01)
         assert there <= place.sent < there + STEP

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from motorbus.errors import Faulted, MotorbusError, Overloaded, Refused
-from motorbus.motion.safety.watch import HEALTH, OVERDUE
+from motorbus.motion.safety.canary import HEALTH
+from motorbus.motion.safety.watch import OVERDUE
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.motion.machines import Heard, machine

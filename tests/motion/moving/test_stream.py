@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from math import pi
+from math import nan, pi
 from typing import Any
 
 import pytest
@@ -53,7 +53,7 @@ def test_axes_are_led_at_100_hz_or_half_of_what_the_wire_carries() -> None:
         arm, angles = train(robot, "arm"), dict.fromkeys(range(1, 7), pi)
         assert rate_for(robot.buses["arm"], arm, angles) == 100.0
         assert rate_for(robot.buses["arm"], arm, angles, 333.0) == 333.0
-        for rate in (0.0, -1.0, 5000.0):
+        for rate in (0.0, -1.0, 3.9, 5000.0, nan):
             with pytest.raises(RequestError, match="Hz is not possible") as told:
                 rate_for(robot.buses["arm"], arm, angles, rate)
             assert "at most" in str(told.value)
@@ -64,7 +64,13 @@ def test_a_slow_wire_leads_slower() -> None:
         arm, bus = train(robot, "arm"), robot.buses["arm"]
         bus.turns.rate = 9600
         # 26 bytes of goals, 8 + 6 that ask, 6 * 8 that answer, 10 bits each, and half of that rate
-        assert rate_for(bus, arm, dict.fromkeys(range(1, 7), pi)) == pytest.approx(0.5 * 9600 / 10 / 88)
+        angles = dict.fromkeys(range(1, 7), pi)
+        assert rate_for(bus, arm, angles) == pytest.approx(0.5 * 9600 / 10 / 88)
+        bus.turns.rate = 4800  # a goal must not be farther ahead than 0.25 s
+        assert rate_for(bus, arm, angles) == 4.0
+        bus.turns.rate = 2400
+        with pytest.raises(RequestError, match="4 Hz is not possible"):
+            rate_for(bus, arm, angles)
         bus.turns.rate = 1_000_000
 
 

@@ -26,13 +26,13 @@ def test_the_scope_names_the_standards_and_the_switch() -> None:
 
 def test_each_axis_is_shown_with_the_bounds_of_the_file() -> None:
     axes: dict[str, dict[str, Any]] = {name: {"low": None, "high": None} for name in ("c1", "lift")}
-    axes["a1"] = {"max_step": "10 deg", "exit": "torque_off"}
+    axes["a1"] = {"max_step": "10 deg", "exit": "torque_off", "estop": "hold"}
     with machine(arm="1-2", can="0x25", lift=True, axes=axes) as (made, _):
         found = {one.name: one for one in assured(made, families(made)).axes}
     first = found["a1"]
     assert (first.device, first.limits, first.step) == ("arm#1", "-150 to 150 deg", "10.0 deg")
-    assert (first.velocity, first.exit, first.estop) == ("90 deg/s", "torque_off", "torque_off")
-    assert (found["a2"].step, found["a2"].exit) == (NONE, "hold")
+    assert (first.velocity, first.exit, first.estop) == ("90 deg/s", "torque_off", "hold")
+    assert (found["a2"].step, found["a2"].exit, found["a2"].estop) == (NONE, "hold", "torque_off")
     assert (found["c1"].limits, found["c1"].estop) == ("its device's", "hold")
     assert (found["lift"].limits, found["lift"].left, found["lift"].estop) == (NONE, WHOLE, "stop")
 
@@ -78,10 +78,12 @@ def test_of_a_family_that_says_nothing_nothing_is_claimed() -> None:
 
 def test_what_nobody_bounds_is_told() -> None:
     axes: dict[str, dict[str, Any]] = {"a1": {"max_step": "10 deg"}, "lift": {"low": None, "high": None}}
+    axes["a2"] = {"guard": False}
     with machine(arm="1-2", lift=True, axes=axes) as (made, _):
-        limits, step = unbounded(assured(made, families(made)))
+        limits, step, guard = unbounded(assured(made, families(made)))
     assert limits.startswith("lift: no limits of travel")
     assert step.startswith("a2, lift: one order may lead from one end to the other")
+    assert guard == "a2, lift: neither load nor heat ends a movement"
 
 
 def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:

@@ -13,11 +13,10 @@ from motorbus.core.operation import Data
 from motorbus.errors import Faulted, Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import canary
-from motorbus.motion.safety.canary import LET_GO, RESTART, Canary, FaultNoted
-from motorbus.motion.safety.watch import HEALTH
+from motorbus.motion.safety.canary import HEALTH, LET_GO, RESTART, Canary, FaultNoted
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import machine
-from tests.motion.safety.decoders import REG_WRITE, SYNC_WRITE, WRITE
+from tests.motion.safety.decoders import READ, REG_WRITE, SYNC_WRITE, WRITE
 
 GOALS = {"a1": 0.6, "a2": -0.6, "a3": 0.6}
 
@@ -33,9 +32,22 @@ class At(PerfectLine):
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         if sender is Side.HOST:
             self.sent.append((at, data))
-            if self._happens is not None and at >= self.moment:
-                self._happens, happens = None, self._happens
+            happens = self._happens
+            if happens is not None and at >= self.moment:
+                self._happens = None
                 happens()
+        return super().carry(sender, data, at)
+
+
+class Drops(PerfectLine):
+    """A wire on which something happens just before a servo is asked how it fares: a READ of 31 bytes from 40 on."""
+
+    def __init__(self, happens: Callable[[], object]) -> None:
+        self._happens = happens
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST and isinstance(data, bytes) and data[4:7] == bytes((READ, 40, 31)):
+            self._happens()
         return super().carry(sender, data, at)
 
 
@@ -118,7 +130,7 @@ def test_a_servo_that_restarts_in_mid_motion_is_at_fault_within_two_looks_and_ge
     noted: list[object] = []
     with machine(arm="1-3") as (made, sims), Robot.of(made, report=noted.append) as robot:
         sim, bus = sims["arm"], robot.buses["arm"]
-        line = sim.line = At(bus.link.now() + 0.7, lambda: sim[2].power_cycle())
+        line = sim.line = At(bus.link.now() + 0.7, sim[2].power_cycle)
         with pytest.raises(Faulted, match="a2 is at fault: arm#2 has restarted, and its supply is") as told:
             robot.move(GOALS, duration=2.0)
         seen = bus.link.now()
@@ -162,7 +174,7 @@ def test_nothing_that_moves_it_or_gives_it_torque_leaves_after_the_fault_was_see
                 noted.append(robot.buses["arm"].link.now())
 
         with Robot.of(made, report=report) as robot:
-            line = sim.line = At(robot.buses["arm"].link.now() + 0.9, lambda: sim[1].power_cycle())
+            line = sim.line = At(robot.buses["arm"].link.now() + 0.9, sim[1].power_cycle)
             with pytest.raises(Faulted):
                 robot.move(GOALS, duration=2.0)
             bus = robot.buses["arm"]
@@ -173,11 +185,25 @@ def test_nothing_that_moves_it_or_gives_it_torque_leaves_after_the_fault_was_see
 
 
 @pytest.mark.parametrize("comes_back", ["yes", "no"])
+def test_in_a_quick_movement_the_fault_is_seen_before_it_is_taken_for_a_stall(comes_back: str) -> None:
+    options = {"arm": {"goal_enables_torque": comes_back}}
+    for moment in (0.30, 0.34, 0.38, 0.42, 0.46):
+        with (
+            machine(arm="1-2", options=options, max_velocity="240 deg/s") as (made, sims),
+            Robot.of(made) as robot,
+        ):
+            sim = sims["arm"]
+            sim.line = At(robot.buses["arm"].link.now() + moment, sim[1].power_cycle)
+            with pytest.raises(Faulted, match="a1 is at fault"):
+                robot.move({"a1": 2.0, "a2": 2.0})
+
+
+@pytest.mark.parametrize("comes_back", ["yes", "no"])
 def test_torque_that_comes_back_with_the_next_goal_hides_no_restart(comes_back: str) -> None:
     options = {"arm": {"goal_enables_torque": comes_back}}
     with machine(arm="1-2", options=options) as (made, sims), Robot.of(made) as robot:
         sim, bus = sims["arm"], robot.buses["arm"]
-        line = sim.line = At(bus.link.now() + 0.7, lambda: sim[1].power_cycle())
+        line = sim.line = At(bus.link.now() + 0.7, sim[1].power_cycle)
         with pytest.raises(Faulted, match="a1 is at fault") as told:
             robot.move({"a1": 0.6, "a2": 0.6}, duration=2.0)
         assert told.value.reason == "restart"
@@ -192,7 +218,7 @@ def test_a_kst_servo_that_says_that_it_starts_is_at_fault_and_one_that_says_noth
         options = {"can": {"boot_notice": says}}
         with machine(can="0x25,0x26", options=options) as (made, sims), Robot.of(made) as robot:
             sim, bus = sims["can"], robot.buses["can"]
-            line = sim.line = At(bus.link.now() + 0.5, lambda sim=sim: sim[0x26].power_cycle())
+            line = sim.line = At(bus.link.now() + 0.5, sim[0x26].power_cycle)
             if not says:
                 robot.move(
                     {"c1": 0.4, "c2": 0.4}, duration=2.0
@@ -215,6 +241,16 @@ def test_torque_that_goes_while_nothing_moves_is_noted_when_somebody_looks() -> 
         assert set(robot.faults) == {"a1"}
         with pytest.raises(Refused, match="at fault"):
             robot.move({"a1": 0.1})
+
+
+def test_who_is_told_to_hold_and_does_not_keep_his_torque_is_at_fault() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.hold("a2")
+        sim = sims["arm"]
+        sim.line = Drops(sim[1].power_cycle)
+        with pytest.raises(Faulted, match="a1 is at fault"):
+            robot.hold("a1")
+        assert set(robot.faults) == {"a1"}
 
 
 def test_whoever_lets_it_go_from_here_is_no_fault() -> None:
@@ -240,7 +276,7 @@ def test_the_fault_of_an_async_robot_is_the_same() -> None:
         with machine(arm="1-2") as (made, sims):
             async with AsyncRobot.of(made) as robot:
                 sim = sims["arm"]
-                sim.line = At(robot.buses["arm"].link.now() + 0.5, lambda: sim[1].power_cycle())
+                sim.line = At(robot.buses["arm"].link.now() + 0.5, sim[1].power_cycle)
                 with pytest.raises(Faulted, match="a1 is at fault"):
                     await robot.move({"a1": 0.6, "a2": 0.6}, duration=2.0)
                 return robot.faults

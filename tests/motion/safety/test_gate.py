@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import EVERY_LANE, Answer, Due, Effect, Exchange, Goal, Rank
-from motorbus.errors import LimitExceeded, Refused
-from motorbus.motion.safety import Gate
+from motorbus.errors import Interrupted, LimitExceeded, NoReply, Refused
+from motorbus.motion.safety.gate import Gate, blamed
 from motorbus.motion.safety.guard import Bounds, Guard
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.motion.safety.track import FRESH
@@ -232,3 +232,62 @@ def test_whatever_passes_is_inside_near_and_was_read_lately(
         assert age <= FRESH
         assert min(-1.0, here) - 0.004 <= to <= max(2.0, here) + 0.004
         assert abs(to - here) <= 0.504
+
+
+# -- what goes on without an end, and why something ended ----------------------------------------------------------
+
+
+def test_it_knows_what_goes_on_until_it_is_told_something_else_or_stopped() -> None:
+    line, stops = Line(), {1: 0}
+    line.gate.watch(line.seen, lambda: line.now, stops.__getitem__)
+    turn = Goal(1, "velocity", 0.5, -9.0, 9.0)
+    for ended in ("stay", "zero", "stop"):
+        assert not line.gate.goes_on(1)
+        assert line.passes(turn)
+        assert line.gate.goes_on(1)
+        if ended == "stay":
+            assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0))
+        elif ended == "zero":
+            assert line.passes(turn._replace(value=0.0))
+        else:
+            stops[1] += 1
+    assert not line.gate.goes_on(1)
+
+
+def test_what_is_refused_does_not_go_on_and_a_rehearsal_notes_nothing() -> None:
+    line = Line()
+    line.gate.attended = True
+    turn = Goal(1, "velocity", 0.5, -9.0, 9.0)
+    assert line.reason(turn) == "unattended"
+    assert not line.gate.goes_on(1)
+    rehearsal = line.gate.rehearsing()
+    rehearsal(Exchange(b"", effect=Effect.MOTION, goals=(turn,)))
+    assert not line.gate.goes_on(1)
+    with pytest.raises(LimitExceeded):
+        rehearsal(Exchange(b"", effect=Effect.MOTION, goals=(turn._replace(value=8.0),)))
+
+
+def test_a_lease_has_the_time_of_the_robot() -> None:
+    line = Line()
+    line.gate.lease = lease = Lease()
+    line.now, line.gate.origin = 100.0, 99.0
+    lease.take("page", 1.0)
+    assert line.reason(effect=Effect.TORQUE) == ""
+    assert line.gate.loss() is None
+    line.now = 101.0
+    assert line.gate.loss() is not None
+
+
+def test_who_was_ended_by_the_loss_of_the_lease_is_told_so() -> None:
+    class Bus:
+        admit = Gate()
+
+    error, other = Interrupted("ended by another order", node=3), NoReply("silent")
+    error.add_note("also: this")
+    assert blamed(error, [Bus]) is error
+    Bus.admit.lease = lease = Lease()
+    lease.take("page", 0.0)  # of a gate that was told of no clock, whose time is over
+    assert blamed(other, [Bus]) is other
+    why = blamed(error, [Bus])
+    assert isinstance(why, Refused)
+    assert (why.reason, why.node, why.__notes__) == ("lease", 3, ["also: this"])

@@ -105,6 +105,39 @@ def test_a_lease_that_never_ends_or_never_was_is_none(lasts: float) -> None:
         Lease(lasts)
 
 
+def test_one_without_a_time_lasts_until_it_is_given_back() -> None:
+    lease = Lease(None)
+    lease.take("program", 0.0, attended=True)
+    assert lease.is_attended(1e9)
+    assert lease.until == inf
+    with pytest.raises(Refused, match="held until its holder gives it back"):
+        lease.take("page", 1e9)
+    lease.release("program", 1e9)
+    with pytest.raises(Refused, match="nobody holds the lease"):
+        lease.check(1e9)
+
+
+def test_one_that_is_not_needed_keeps_nobody_from_moving_but_once_it_is_lost() -> None:
+    lease = Lease(needed=False)
+    lease.check(0.0)
+    assert not lease.is_attended(0.0)
+    lease.take("program", 0.0)
+    assert lease.until == LASTS
+    with pytest.raises(Refused, match="program was silent"):
+        lease.check(1.0)
+    lease.reset(1.0)
+    lease.check(1.0)
+
+
+def test_a_loss_says_that_something_may_have_moved() -> None:
+    lease = held()
+    assert lease.loss(10.1) is None
+    error = lease.loss(11.0)
+    assert error is not None
+    assert (error.reason, error.unmoved) == ("lease", False)
+    assert "nothing was sent" not in str(error)
+
+
 def test_a_holder_has_a_name() -> None:
     with pytest.raises(RequestError, match="name of its holder"):
         Lease().take("", 0.0)

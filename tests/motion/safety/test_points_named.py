@@ -24,7 +24,7 @@ def rows() -> dict[int, str]:
     }
 
 
-def tests_of(path: str) -> set[str]:
+def named_in(path: str) -> set[str]:
     return set(re.findall(r"^def (test_\w+)", (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE))
 
 
@@ -34,7 +34,7 @@ def test_every_point_has_its_row() -> None:
 
 @pytest.mark.parametrize("number", range(1, 16))
 def test_every_point_has_a_test_that_bears_its_number_and_is_named(number: int) -> None:
-    bearing = {name for path in POINTS for name in tests_of(path) if name.startswith(f"test_{number:02}_")}
+    bearing = {name for path in POINTS for name in named_in(path) if name.startswith(f"test_{number:02}_")}
     assert bearing
     assert set(SHORT.findall(rows()[number])) == bearing
 
@@ -42,4 +42,4 @@ def test_every_point_has_a_test_that_bears_its_number_and_is_named(number: int) 
 @pytest.mark.parametrize(("path", "name"), sorted(set(NAMED.findall(PAGE.read_text(encoding="utf-8")))))
 def test_what_the_page_names_exists(path: str, name: str) -> None:
     assert (ROOT / path).is_file()
-    assert not name or name in tests_of(path)
+    assert not name or name in named_in(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from math import inf, nan, radians
+from typing import Any
 
 import pytest
 
@@ -24,7 +25,9 @@ def test_a_stall_is_judged_by_the_tolerance_and_the_timeout_that_were_asked_for(
         for timeout in (0.3, None, 2.5):
             robot.move({"a1": 0.0, "a2": 0.0})
             begun = clock()
-            with pytest.raises(Stalled, match="a1 is not in position: its goal is 23.0 deg.*21.1 deg") as told:
+            with pytest.raises(
+                Stalled, match="a1 is not in position: its goal is 23.0 deg.*21.1 deg"
+            ) as told:
                 robot.move({"a1": GOAL, "a2": 0.2}, duration=1.0, tolerance=radians(1), timeout=timeout)
             patience = SETTLE if timeout is None else timeout
             assert f"within 1.0 deg of it, {patience:g} s after the end" in told.value.expected
@@ -68,7 +71,9 @@ def test_the_tolerance_of_a_linear_axis_is_in_metres_of_the_axis() -> None:
 def test_what_is_none_of_either_is_refused_and_nothing_is_sent(what: str, value: object) -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
         listened(sims)
-        for move in (lambda **how: robot.move({"a1": 0.1}, **how), lambda **how: robot["a1"].move(0.1, **how)):
-            with pytest.raises(RequestError, match=what):
-                move(**{what: value})
+        how: dict[str, Any] = {what: value}
+        with pytest.raises(RequestError, match=what):
+            robot.move({"a1": 0.1}, **how)
+        with pytest.raises(RequestError, match=what):
+            robot["a1"].move(0.1, **how)
         assert said(sims) == []

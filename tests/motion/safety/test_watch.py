@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import pairwise
 from random import Random
 from typing import Any
 
 import pytest
 
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Data
+from motorbus.core.operation import Data, Exchange
 from motorbus.errors import DeviceError, Faulted, MotorbusError, NoReply, Overloaded, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.canary import HEALTH
@@ -42,12 +43,17 @@ def watched(arm: str = "1-3", **every: Any) -> Iterator[tuple[Watch, Robot]]:
     with machine(arm=arm, **every) as (made, _), Robot.of(made) as robot:
         robot.enable_torque()
         watch = Watch(robot.buses["arm"], robot.axes.values())
-        robot.buses["arm"].run(watch.begin(robot.axes.values()))
+        robot["a1"].bus.run(watch.begin(robot.axes.values()))
         yield watch, robot
 
 
 def now(robot: Robot) -> float:
     return robot.buses["arm"].link.now()
+
+
+def whom(exchange: Exchange[Health]) -> int:
+    assert isinstance(exchange.replies, tuple)
+    return exchange.replies[0].node
 
 
 # -- turns -------------------------------------------------------------------------------------------------------------
@@ -61,13 +67,13 @@ def test_each_is_asked_once_in_a_quarter_of_a_second_one_at_a_time() -> None:
             at = start + cycle * 0.01
             wanted = watch.due(at)
             if wanted is not None:
-                asked.append((wanted.replies[0].node, at - start))  # type: ignore[union-attr]
+                asked.append((whom(wanted), at - start))
                 watch.take(EASY, {}, at)
         assert {node for node, _ in asked} == {1, 2, 3}
         for node in (1, 2, 3):
             moments = [at for who, at in asked if who == node]
             assert len(moments) >= 6
-            apart = [later - at for at, later in zip(moments, moments[1:], strict=False)]
+            apart = [later - at for at, later in pairwise(moments)]
             assert all(HEALTH - 1e-9 <= one < HEALTH + 0.05 for one in apart)
 
 
@@ -106,14 +112,14 @@ def test_on_a_slow_line_it_takes_a_tenth_of_the_wire_and_no_more() -> None:
 def test_who_does_not_tell_is_left_out_and_who_is_dismissed_is_not_asked() -> None:
     with machine(lift=True) as (made, _), Robot.of(made) as robot:
         watch = Watch(robot.buses["stage"], robot.axes.values())
-        robot.buses["stage"].run(watch.begin(robot.axes.values()))
+        robot["lift"].bus.run(watch.begin(robot.axes.values()))
         assert watch.due(1e9) is None
     with watched("1-2") as (watch, robot):
         watch.dismiss(1)
         watch.dismiss(1)
         wanted = watch.due(now(robot) + HEALTH)
         assert wanted is not None
-        assert wanted.replies[0].node == 2  # type: ignore[union-attr]
+        assert whom(wanted) == 2
         watch.dismiss(2)
         assert watch.due(now(robot) + 100.0) is None
 
@@ -135,19 +141,21 @@ def test_an_answer_that_is_lost_is_forgiven_and_who_cannot_tell_is_left_out(
 # -- what an answer means ----------------------------------------------------------------------------------------------
 
 
-def pushing(at: float, **rest: Any) -> Health:
-    return Health(State(at, load=0.95, **rest), True, False)
+def push(
+    watch: Watch, start: float, times: int, places: Mapping[int, float] | None = None, **felt: Any
+) -> None:
+    """So often, a quarter of a second apart, servo 1 tells that it pushes hard; its goal is at 3.5 rad."""
+    for number in range(1, times + 1):
+        at = start + number * HEALTH
+        watch.take(Health(State(at, load=0.95, **felt), True, False), {1: 3.5}, at, places or {})
 
 
 def test_who_pushes_for_too_long_off_his_goal_is_overloaded_and_the_words_say_all() -> None:
     with watched("1") as (watch, robot):
-        at = now(robot) + HEALTH
-        with pytest.raises(Overloaded, match=r"a1 \(arm#1\) has pushed too hard for 1\.[0-9] s.*load 95%") as told:
-            for step in range(20):
-                at += HEALTH
-                assert watch.due(at) is not None
-                watch.take(pushing(at, position=3.0, temperature=40.0), {1: 3.5}, at)
-        assert step == 4
+        with pytest.raises(
+            Overloaded, match=r"a1 \(arm#1\) has pushed too hard for 1\.0 s.*load 95%"
+        ) as told:
+            push(watch, now(robot), 20, position=3.0, temperature=40.0)
         assert told.value.reason == "load"
         assert told.value.node == 1
         assert f"less than {SECONDS:g} s of load 80% or 2.5 A" in told.value.expected
@@ -157,24 +165,18 @@ def test_who_pushes_for_too_long_off_his_goal_is_overloaded_and_the_words_say_al
 
 def test_a_place_that_was_heard_elsewhere_serves_a_device_whose_health_brings_none() -> None:
     with watched("1") as (watch, robot):
-        at = now(robot)
-        for _ in range(20):
-            at += HEALTH
-            watch.take(pushing(at), {1: 3.5}, at)  # nobody knows where it is
+        push(watch, now(robot), 20)  # nobody knows where it is
+        push(watch, now(robot) + 10.0, 4, {1: 3.0})
         with pytest.raises(Overloaded):
-            for _ in range(20):
-                at += HEALTH
-                watch.take(pushing(at), {1: 3.5}, at, {1: 3.0})
+            push(watch, now(robot) + 11.0, 1, {1: 3.0})
 
 
 def test_who_is_not_guarded_pushes_as_he_likes_and_is_at_fault_all_the_same() -> None:
     with watched("1", guard=False) as (watch, robot):
-        at = now(robot)
-        for _ in range(20):
-            at += HEALTH
-            watch.take(pushing(at, position=3.0, temperature=90.0), {1: 3.5}, at)
+        at = now(robot) + 10.0
+        push(watch, now(robot), 20, position=3.0, temperature=90.0)
         with pytest.raises(Faulted):
-            watch.take(Health(State(at), False, True), {}, at + HEALTH)
+            watch.take(Health(State(at), False, True), {}, at)
         assert set(robot.faults) == {"a1"}
         assert watch.due(at + 100.0) is None
 
@@ -251,7 +253,7 @@ def test_a_healthy_servo_that_moves_at_its_limits_never_trips(
     options = {"arm": {"model": model}}
     wide = {"low": "-40 deg", "high": "40 deg", "zero": "110 deg"} if "scs" in model else {}
     fast = {"max_velocity": "300 deg/s", "max_acceleration": "3000 deg/s2"}
-    made_of = {**wide, **fast}
+    made_of: dict[str, Any] = {**wide, **fast}
     with machine(arm="1-3", options=options, **made_of) as (made, _), Robot.of(made) as robot:
         for _ in range(rounds(100_000) // 2000):
             goals = {name: chance.uniform(-0.6, 0.6) for name in robot.axes}
@@ -262,7 +264,7 @@ def test_a_healthy_servo_that_moves_at_its_limits_never_trips(
 def test_a_healthy_kst_servo_that_moves_at_its_limits_never_trips(rounds: Callable[[int], int]) -> None:
     chance = Random(9)
     options = {"can": {"profile": "kst-ext", "boot_notice": True}}
-    fast = {"max_velocity": "300 deg/s", "max_acceleration": "3000 deg/s2"}
+    fast: dict[str, Any] = {"max_velocity": "300 deg/s", "max_acceleration": "3000 deg/s2"}
     with machine(can="0x25,0x26", options=options, **fast) as (made, _), Robot.of(made) as robot:
         for _ in range(rounds(100_000) // 2000):
             robot.move({name: chance.uniform(-0.6, 0.6) for name in robot.axes})

@@ -128,9 +128,7 @@ class Kst:
     def link(self) -> LinkNeeds:
         from motorbus.families.kst.simulator import OPTIONS
 
-        return LinkNeeds(
-            "frames", DEFAULT_RATE, RATES, OPTIONS, _SETTINGS, self._window, stops=("hold",)
-        )
+        return LinkNeeds("frames", DEFAULT_RATE, RATES, OPTIONS, _SETTINGS, self._window, stops=("hold",))
 
     def configured(self, **settings: object) -> Kst:
         unknown = settings.keys() - {option.name for option in _SETTINGS}

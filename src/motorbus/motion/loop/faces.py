@@ -39,6 +39,7 @@ from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
+from motorbus.motion.safety.gate import raise_blamed
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -158,7 +159,11 @@ class Loop(LoopFace):
         return self
 
     def __next__(self) -> LoopState:
-        return _carried(self._rounds.round(), self._conductor.run)
+        try:
+            return _carried(self._rounds.round(), self._conductor.run)
+        except MotorbusError as error:
+            raise_blamed(error, [part.bus for part in self._rounds.parts.values()])
+            raise
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         try:
@@ -187,7 +192,11 @@ class AsyncLoop(LoopFace):
         return self
 
     async def __anext__(self) -> LoopState:
-        return await _awaited(self._rounds.round(), self._conductor.run)
+        try:
+            return await _awaited(self._rounds.round(), self._conductor.run)
+        except MotorbusError as error:
+            raise_blamed(error, [part.bus for part in self._rounds.parts.values()])
+            raise
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: object

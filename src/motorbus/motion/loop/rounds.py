@@ -57,17 +57,8 @@ class Rounds:
         policy: Policy = "reject",
         watch: bool = True,
     ) -> None:
+        _check(rate, direct, jerk)
         check_policy(policy)
-        if not (isfinite(rate) and rate > 0):
-            raise RequestError(
-                f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
-            )
-        if direct and jerk is not None:
-            raise RequestError(
-                "jerk is said of goals that are sent as they are",
-                expected="jerk, or direct=True",
-                advice="leave direct out; nothing was sent",
-            )
         led, self.without = divided(body.chosen(axes))
         if not led:
             raise RequestError(
@@ -369,6 +360,20 @@ class Rounds:
                 advice=("make another one" if self._left else "enter the loop with `with`, or `async with`")
                 + "; nothing was sent",
             )
+
+
+def _check(rate: float, direct: bool, jerk: float | None) -> None:
+    """Raise RequestError for what cannot be."""
+    if not (isfinite(rate) and rate > 0):
+        raise RequestError(
+            f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
+        )
+    if direct and jerk is not None:
+        raise RequestError(
+            "jerk is said of goals that are sent as they are",
+            expected="jerk, or direct=True",
+            advice="leave direct out; nothing was sent",
+        )
 
 
 def _reported(events: Iterable[Clamped]) -> Operation[None]:

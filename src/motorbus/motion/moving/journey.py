@@ -34,8 +34,8 @@ ROUNDING: Final = 1e-6
 class Journey:
     """A movement of these `axes`, by their names; `origins` as in a `Body`. `rate` (Hz) is that of what is led.
 
-    `tolerance` (rad, m) is how near to its goal each that is led must come, `timeout` (s) within how long after the end;
-    None: as usual. Raises Refused for an axis that is at fault.
+    `tolerance` (rad, m) is how near to its goal each that is led must come, `timeout` (s) how long after the end at the
+    latest; None: as usual. Raises Refused for an axis that is at fault.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What is said of an axis that is led and does not do as it was told: it does not follow, does not arrive, is silent."""
+"""What is said of an axis that is led and does not do as it was told: does not follow, does not arrive, is silent."""
 
 from __future__ import annotations
 

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 USUAL: Final = 100.0
 """Hz at which axes are led where the wire carries twice as much."""
+SLOWEST: Final = 4.0
+"""Hz: a goal is one period ahead, and a host that dies must not leave more than 0.25 s of travel."""
 SHARE: Final = 0.5
 """Of what the wire carries: the rest is for others, and for a reply that has to be asked for again."""
 TOLERANCE: Final = 0.02
@@ -111,13 +113,13 @@ def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: flo
     cycle = (*train.goals(angles), *train.positions)
     highest = 1 / sum(bus.family.air_time(one, bus.rate) for one in cycle)
     if asked is None:
-        return min(USUAL, SHARE * highest)
-    if not 0 < asked <= highest:
+        asked = min(USUAL, max(SHARE * highest, SLOWEST))
+    if not SLOWEST <= asked <= highest:
         raise RequestError(
             f"{asked:.6g} Hz is not possible here",
-            expected=f"above 0, at most {highest:.4g} Hz",
+            expected=f"{SLOWEST:g} Hz or more, for so far goals may be ahead of who dies, at most {highest:.4g} Hz",
             cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} of these",
-            advice=f"take less; {NOTHING}",
+            advice=f"take another, or a quicker line; {NOTHING}",
         )
     return asked
 
@@ -151,8 +153,8 @@ class Stream:
     """Axes of one bus that are led along a course; `speeds` are the highest of it by name (rad/s, m/s).
 
     `within` is by name how near to its goal each must come in the end (rad of the device).
-    `command` is over these axes, `watch` over how they fare, `fate` is that of the whole movement. `patience` (s) is how
-    long after the end all must be in position. With `reports` it reports its progress.
+    `command` is over these axes, `watch` over how they fare, `fate` is that of the whole movement. `patience` is how
+    long (s) after the end all must be in position. With `reports` it reports its progress.
     """
 
     def __init__(
@@ -244,7 +246,8 @@ class Stream:
             yield from self._until(slot)
             yield from self._read()
             for axis in self._axes.values():
-                self._check_following(axis)
+                if self._is_behind(axis):
+                    raise (yield from self._stalled(axis))
             yield from self._ask()
             yield from self._report(slot * self._grid.period)
             slot = yield from self._next(slot)
@@ -262,8 +265,11 @@ class Stream:
             yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
         except LimitExceeded as error:
             if error.reason == "step" and error.node in self._axes:
-                raise self._stalled(self._axes[error.node]) from error
+                raise (yield from self._stalled(self._axes[error.node])) from error
             raise
+        except Interrupted:
+            if self._watch.fault is None:  # else who looks is about to raise that
+                raise
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -323,7 +329,7 @@ class Stream:
             if exact and all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
             if now - end > self._patience:
-                self._check_arrived()
+                yield from self._check_arrived()
             yield from self._ask()
             self._fate.check()
             self._command.check()
@@ -353,18 +359,21 @@ class Stream:
 
     # -- what must not be ----------------------------------------------------------------------------------------------
 
-    def _check_following(self, axis: AxisVerbs) -> None:
+    def _is_behind(self, axis: AxisVerbs) -> bool:
         _, goals, presents = self._tracks[axis.name]
-        if goals and abs(goals[-1] - presents[-1]) > self._allowed[axis.name]:
-            raise self._stalled(axis)
+        return bool(goals) and abs(goals[-1] - presents[-1]) > self._allowed[axis.name]
 
-    def _stalled(self, axis: AxisVerbs) -> Stalled:
+    def _stalled(self, axis: AxisVerbs) -> Operation[Stalled]:
+        """The error for one that does not follow; raises what is the matter with it, if it tells that."""
+        yield from self._watch.examine(axis)
         goal, present = (row[-1] for row in self._tracks[axis.name][1:])
         return behind(axis, goal, present, self._allowed[axis.name])
 
-    def _check_arrived(self) -> None:
-        """Raise Stalled for those that are not in position."""
+    def _check_arrived(self) -> Operation[None]:
+        """Raise Stalled for those that are not in position, or what is the matter with one of them."""
         short = [axis for axis in self._axes.values() if self._off(axis) > self._within[axis.name]]
+        for axis in short:
+            yield from self._watch.examine(axis)
         if short:
             near = self._within[short[0].name] / abs(short[0].spec.ratio)
             presents = {name: rows[2] for name, rows in self._tracks.items()}

@@ -148,13 +148,13 @@ def move(
 
     It is as quick as the slowest axis can, or takes `duration` (s). `speed` (above 0, at most 1) makes all of it so
     much slower: with 0.5 it takes twice the time. `kind` is `trapezoid`, or `minimum_jerk`, which is gentler; an axis
-    whose device has a profile of its own moves by that. Each that measures where it is must be within `tolerance` (rad, m)
-    of its goal `timeout` s after the end; without these within 0.02 rad of its device, or nearer on a tiny way, and 1 s.
+    whose device has a profile of its own moves by that. Each that measures where it is must be within `tolerance` (rad,
+    m) of its goal `timeout` s after the end; without these 0.02 rad of its device, or less on a tiny way, and 1 s.
 
     Raises before anything moves: RequestError for a name that is no axis and for a duration that is too short,
     LimitExceeded for a goal, NotHomed for an axis of which nobody knows where it is, NoReply. When anything goes wrong
     on the way, all axes are stopped and that is raised: Stalled, NoReply, Interrupted by a stop or another order,
-    Faulted for a device that has restarted or let go, Overloaded for one that pushes too hard for too long or is too hot.
+    Faulted for a device that has restarted or let go, Overloaded for one that pushes too hard for too long or is hot.
     """
     _check_end(tolerance, timeout)
     made = _moving(body, goals, duration, kind, speed)
@@ -283,8 +283,8 @@ def move_axis(
 ) -> Operation[Moved]:
     """Move to a position (rad, m) within a velocity and an acceleration (rad/s, m/s and per s²), and those of the axis.
 
-    As quick as these allow, or in `duration` (s). Returns when it is there, by `tolerance` and `timeout` as `Robot.move`
-    has them. Raises as `Robot.move`, and LimitExceeded
+    As quick as these allow, or in `duration` (s). Returns when it is there; `tolerance` and `timeout` as in
+    `Robot.move`. Raises as `Robot.move`, and LimitExceeded
     for a velocity or an acceleration above that of the axis.
     """
     limits.check_goal(axis.name, axis.spec, to)

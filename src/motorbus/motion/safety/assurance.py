@@ -33,7 +33,7 @@ class Bounded(NamedTuple):
     """One axis as the gate bounds it, in words: `limits`, `step`, `velocity` ("none" where there is no bound).
 
     `left` is how far it may still go when its host dies while it is led ("its move": to the end of that), `exit` and
-    `estop` what ends it otherwise.
+    `estop` what ends it otherwise. `guard` says whether load and heat end its movement, "on" or "none".
     """
 
     name: str
@@ -44,6 +44,7 @@ class Bounded(NamedTuple):
     left: str
     exit: str
     estop: str
+    guard: str
 
 
 class Bus(NamedTuple):
@@ -102,6 +103,7 @@ def _bounded(name: str, spec: AxisSpec, family: Family, said: Assurance | None, 
         spec.show(spec.max_velocity * period) if said is not None and said.led else WHOLE,
         spec.exit,
         spec.estop or (stops[0] if stops else "stop"),
+        "on" if spec.guard and said is not None and said.strain.given is not Given.NO else NONE,
     )
 
 
@@ -113,17 +115,15 @@ def _limits(spec: AxisSpec, said: Assurance | None) -> str:
 
 
 def unbounded(found: Assured) -> list[str]:
-    """What somebody ought to add to the file, each in a sentence."""
-    bare = [axis.name for axis in found.axes if axis.limits == NONE]
-    stepless = [axis.name for axis in found.axes if axis.step == NONE]
-    told = []
-    if bare:
-        told.append(f"{', '.join(bare)}: no limits of travel; low and high set them")
-    if stepless:
-        told.append(
-            f"{', '.join(stepless)}: one order may lead from one end to the other; max_step bounds it"
-        )
-    return told
+    """What bounds some axes lack, each in a sentence, with what would set it where something can."""
+    lacking = {
+        "no limits of travel; low and high set them": [one.name for one in found.axes if one.limits == NONE],
+        "one order may lead from one end to the other; max_step bounds it": [
+            one.name for one in found.axes if one.step == NONE
+        ],
+        "neither load nor heat ends a movement": [one.name for one in found.axes if one.guard == NONE],
+    }
+    return [f"{', '.join(names)}: {what}" for what, names in lacking.items() if names]
 
 
 MACHINE: Final[Mapping[str, Point]] = {

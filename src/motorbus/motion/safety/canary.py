@@ -36,8 +36,8 @@ class FaultNoted(NamedTuple):
 
 
 class Canary:
-    """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s); `fell` is
-    true where it had torque from here when it came to be at fault, until it is given some again."""
+    """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s);
+    `fell` is true where it had torque from here when it came to be at fault, until it is given some again."""
 
     __slots__ = ("_blank", "_restarts", "_stops", "at", "fell")
 
@@ -103,6 +103,16 @@ def looked_after(axis: AxisVerbs, now: float) -> Operation[None]:
     found = yield from outcome(axis.able["health"](axis.device))
     if isinstance(found, Health) and looked_at(axis, found) is not None:
         yield from Report(FaultNoted(axis.name, why(axis)))
+
+
+def kept(axis: AxisVerbs) -> Operation[None]:
+    """Of an axis that has just been told to hold: raise Faulted where its device has not kept its torque."""
+    if "health" not in axis.able:
+        return
+    found = yield from outcome(axis.able["health"](axis.device))
+    if isinstance(found, Health) and (error := looked_at(axis, found)) is not None:
+        yield from Report(FaultNoted(axis.name, why(axis)))
+        raise error
 
 
 def armed(axis: AxisVerbs) -> None:

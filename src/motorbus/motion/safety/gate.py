@@ -218,6 +218,13 @@ def blamed(error: MotorbusError, buses: Iterable[Any]) -> MotorbusError:
     return loss
 
 
+def raise_blamed(error: MotorbusError, buses: Iterable[Any]) -> None:
+    """Raise what it was ended by, where that is the loss of the lease."""
+    why = blamed(error, buses)
+    if why is not error:
+        raise why from error
+
+
 def _none(_: int) -> int:
     """The stops of a gate that was not told where they are counted."""
     return 0

@@ -71,8 +71,8 @@ class Verdict(Enum):
 class Strain:
     """Watches one motor, sample by sample; see `Bearable` for what is too much.
 
-    `sample` is the last one, `since` when (s) the strain began that lasts still. Load is the duty of the motor, which is
-    high at a high speed too, so of what turns it does not count; current does.
+    `sample` is the last one, `since` when (s) the strain began that lasts still. Load is the duty of the motor, which
+    is high at a high speed too, so of what turns it does not count; current does.
 
     OVERLOADED stays until `reset`, HOT until it has cooled down: whoever makes it easy for a moment must not find the
     motor pushing again at once.

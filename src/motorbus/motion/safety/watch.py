@@ -37,7 +37,10 @@ NOBODY: Final[Mapping[int, float]] = {}
 
 
 class Watch:
-    """Watches axes of one bus; those whose devices do not tell how they fare are left out."""
+    """Watches axes of one bus; those whose devices do not tell how they fare are left out.
+
+    `fault` is the last error that was raised for a device that has restarted or let go.
+    """
 
     def __init__(self, bus: BusFace, axes: Iterable[AxisVerbs]) -> None:
         self._bus: Final = bus
@@ -45,6 +48,7 @@ class Watch:
         self._strains: Final[dict[int, Strain | None]] = {}
         self._turns: Final[deque[int]] = deque()
         self._last: Final[dict[int, float]] = {}
+        self.fault: Faulted | None = None
         self._free = -inf
         self._next = inf
 
@@ -86,7 +90,9 @@ class Watch:
             return None
         node = self._turns[0]
         wanted = self._axes[node].able["health"](self._axes[node].device)
-        if not isinstance(wanted, Exchange):  # others set it up anew, and it is not known well enough for the moment
+        if not isinstance(
+            wanted, Exchange
+        ):  # others set it up anew, and it is not known well enough for the moment
             self._passed(node, now, 0.0)
             return None
         if self._air(wanted) > slack and now < self._last[node] + OVERDUE * HEALTH:
@@ -115,6 +121,7 @@ class Watch:
             return
         error = canary.looked_at(axis, told, led=True)
         if error is not None:
+            self.fault = error
             self.dismiss(node)
             raise error
         if strain is None:
@@ -137,6 +144,15 @@ class Watch:
         if wanted is not None:
             told = yield from outcome(wanted)
             yield from self._took(told, goals, (yield from Pause(0)), places)
+
+    def examine(self, axis: AxisVerbs) -> Operation[None]:
+        """Ask this one at once, for it does not do as it was told. Raises as `take` what is the matter with it."""
+        node = axis.spec.node
+        if node in self._strains:
+            self._turns.remove(node)
+            self._turns.appendleft(node)
+            told = yield from outcome(axis.able["health"](axis.device))
+            yield from self._took(told, NOBODY, (yield from Pause(0)))
 
     def _took(
         self,
@@ -187,7 +203,7 @@ def _overloaded(axis: AxisVerbs, strain: Strain, now: float) -> Overloaded:
         if value is not None
     ]
     felt = ", ".join(figures) + (f"; alarms: {', '.join(sample.alarm)}" if sample.alarm else "")
-    keeps = 'it keeps its torque; `guard = false` in its table of the machine file ends this watch'
+    keeps = "it keeps its torque; `guard = false` in its table of the machine file ends this watch"
     if strain.verdict is Verdict.HOT:
         return Overloaded(
             f"{axis.name} ({spec.device}) is too hot: {felt}",

@@ -12,7 +12,7 @@ from typing import Final
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.core.operation import Operation, Runnable
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
 from motorbus.families.feetech.driver.identity import known

@@ -1,0 +1,104 @@
+"""A program on real ports, each served by a process of its own, that is told to end in the midst of its movements."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motorbus.cli.simulated import Simulated
+from tests.motion.machines import described
+
+PROGRAM = """
+import sys, threading
+from motorbus import Robot
+
+with Robot.load(sys.argv[1]) as robot:
+    if "lift" in robot.axes:
+        robot["lift"].declare(0.0)
+    else:
+        robot.enable_torque()
+    print("ready", flush=True)
+    ways = {"a1": 2.0, "a2": -2.0, "c1": 0.8, "lift": 0.2}
+    robot.move({name: ways[name] for name in robot.axes}, duration=60.0)
+"""
+LOOKS = 100_000
+
+
+def status(control: Path) -> list[dict[str, Any]]:
+    """How the simulated devices of a bus are by now."""
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(control))
+        client.sendall(b"status\n")
+        nodes: list[dict[str, Any]] = json.loads(client.makefile().readline())["nodes"]
+    return nodes
+
+
+def ended(file: Path, *signals: signal.Signals) -> int:
+    """How the program ends that gets these signals, once it is about to move."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(file)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    ) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "ready\n"
+        for one in signals:
+            program.send_signal(one)
+        program.communicate(timeout=120)
+    return program.returncode
+
+
+@pytest.mark.parametrize(
+    ("family", "bus", "device"),
+    [("feetech", "arm", "arm#1-2"), ("kst", "can", "can#0x25"), ("stepper", "stage", "stage#1")],
+)
+@pytest.mark.parametrize(
+    ("signals", "code"),
+    [
+        ((signal.SIGTERM,), 143),
+        ((signal.SIGHUP,), 129),
+        ((signal.SIGINT, signal.SIGINT), -signal.SIGINT),
+        ((signal.SIGTERM, signal.SIGTERM), 143),
+    ],
+)
+def test_it_leaves_its_machine_as_the_file_says(
+    family: str,
+    bus: str,
+    device: str,
+    signals: tuple[signal.Signals, ...],
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    control = tmp_path / "control"
+    ids = {"arm": "1-2", "can": "0x25"}
+    options = {"ids": ids[bus]} if bus in ids else {}
+    with Simulated(family, link=tmp_path / bus, control=str(control), **options) as simulated:
+        file = tmp_path / "motorbus.toml"
+        there = {"arm": "", "can": "", **({bus: ids[bus]} if bus in ids else {})}
+        axes = {"a1": {"exit": "torque_off"}, "a2": {"exit": "hold"}}
+        file.write_text(
+            described(
+                {bus: simulated.bus}, there["arm"], there["can"], bus == "stage", axes, {"exit": "hold"}
+            ),
+            encoding="utf-8",
+        )
+        assert ended(file, *signals) == code
+        for _ in range(LOOKS):
+            found = status(control)
+            if not any(one.get("moving") or one.get("frequency") for one in found):
+                break
+        else:
+            pytest.fail("something goes on and on")
+        if family == "feetech":
+            assert [bool(one["torque"]) for one in found] == [False, True]
