@@ -147,7 +147,7 @@ device moves one axis.
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *_file(), *_tables(), *_exits(), "", *_estops(), *_units(), CONVERSION, EDITS]).rstrip() + "\n"
+    return "\n".join([HEAD, *_file(), *_tables(), *_exits(), *_estops(), *_units(), CONVERSION, EDITS]).rstrip() + "\n"
 
 
 def text_of_schema() -> str:

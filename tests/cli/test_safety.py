@@ -95,3 +95,11 @@ def test_without_any_file_it_says_where_it_looked(
     ran = run("safety")
     assert ran.code == 2
     assert "there is no machine file" in ran.err
+
+
+def test_what_cannot_be_opened_is_not_vouched_for(bench: Bench, run: Run) -> None:
+    text = bench.file.read_text(encoding="utf-8").replace("[axis.c1]", '[axis.c1]\nestop = "torque_off"', 1)
+    bench.file.write_text(text, encoding="utf-8")
+    ran = run("safety")
+    assert (ran.code, ran.out) == (2, "")
+    assert "c1" in ran.err

@@ -10,7 +10,7 @@ import pytest
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
 from motorbus.core.operation import Operation, Pause, Together, outcome
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.leaving import Leaving
+from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
 from motorbus.motion.moving import verbs as moving
 from tests.motion.machines import Cut, listened, machine, said
@@ -329,3 +329,48 @@ def test_a_bus_that_is_gone_keeps_no_other_from_being_left() -> None:
         assert [torque(sims, node) for node in (1, 2)] == [0, 0]
         with Robot.of(made) as robot:
             assert len(robot.axes) == 3
+
+
+# -- without its holder ----------------------------------------------------------------------------------------------
+
+
+def test_given_up_is_stopped_whatever_the_file_says_and_nothing_is_parked() -> None:
+    axes = {"a1": LIMP, "a2": PARKED, "a3": {"exit": "leave"}, "a4": LIMP}
+    with machine(arm="1-4", axes=axes) as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque(["a1", "a2", "a3"])
+        robot["a3"].device.set_mode("velocity")
+        robot["a3"].device.enable_torque()
+        with robot.attended():
+            robot["a3"].device.set_velocity(1.0)
+            assert goes_on(robot["a3"])
+            robot["a2"].under_way = True
+            sims["arm"][1].unplug()
+            errors = robot.buses["arm"].run(given_up(robot.axes.values()))  # type: ignore[attr-defined]
+            assert list(errors) == ["a1"]
+            assert not goes_on(robot["a3"])
+        assert [torque(sims, node) for node in (2, 3, 4)] == [1, 1, 0]
+        assert not sims["arm"][3].memory["goal_velocity"]
+        assert not robot["a2"].under_way
+        assert abs(sims["arm"][2].raw_position - 2048) < 5
+        sims["arm"][1].plug()
+
+
+def test_given_up_after_an_emergency_stop_is_nothing_to_do() -> None:
+    with machine(arm="1", axes={"a1": LIMP}) as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        robot.estop()
+        listened(sims)
+        assert robot.buses["arm"].run(given_up(robot.axes.values())) == {}  # type: ignore[attr-defined]
+        assert said(sims) == []
+        robot.reset()
+
+
+def test_what_goes_on_without_an_end_is_stopped_when_it_is_left() -> None:
+    for how, turns in (("hold", False), ("leave", True)):
+        with machine(arm="1", exit=how) as (made, sims):
+            with Robot.of(made) as robot:
+                robot["a1"].device.set_mode("velocity")
+                robot["a1"].device.enable_torque()
+                robot.buses["arm"].admit.attended = False  # type: ignore[union-attr]  # as if nobody had to attend
+                robot["a1"].device.set_velocity(1.0)
+            assert bool(sims["arm"][1].memory["goal_velocity"]) == turns

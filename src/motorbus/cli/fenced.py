@@ -13,6 +13,8 @@ from motorbus.cli.machine import machine_file, shown
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from motorbus.bus.face import BusFace
     from motorbus.cli.output import Output
 
@@ -38,6 +40,13 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
         with suppress(RequestError):  # an id that cannot be bounds nobody, and stops no stop
             if spec.bus in there:
                 enclose(bus, {name: spec})
+
+
+def pace(bus: BusFace, nodes: Iterable[int]) -> float | None:
+    """The greatest speed (rad/s) that the file allows to all of these; None where it bounds none of them."""
+    guards = getattr(bus.admit, "guards", {})
+    speeds = [guards[node].bounds.speed for node in nodes if node in guards]
+    return min(speeds, default=None)
 
 
 def _line(address: str) -> tuple[str, str]:

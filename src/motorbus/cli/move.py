@@ -5,6 +5,7 @@ Of devices that do not know where they are, by an angle from where they stand.
 
 from __future__ import annotations
 
+import inspect
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -15,6 +16,7 @@ from motorbus.cli import dry, faces
 from motorbus.cli.acting import acted
 from motorbus.cli.consent import FAR, consent_to_ways
 from motorbus.cli.exits import Exit
+from motorbus.cli.fenced import pace
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.moving import How, Known, go, goals_of, how_of, names_axes, positions_of
 from motorbus.cli.output import Output
@@ -100,7 +102,8 @@ def move(
     goals
         Devices, or axes, and where they shall go.
     velocity
-        At most so fast, in rad/s or as 90deg/s; the maximum of the device when left out.
+        At most so fast, in rad/s or as 90deg/s; the maximum when left out: of the machine
+        file, else of the device.
     acceleration
         At most so steep, in rad/s² or as 500deg/s2; the maximum when left out.
     wait
@@ -131,10 +134,11 @@ class _Asked(NamedTuple):
 
 def _moved_to(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str], output: Output) -> Exit:
     """Devices to positions, those of one bus in the same instant where their family can do that."""
-    bounds, wait, yes, dry_run = asked
+    _, wait, yes, dry_run = asked
     results = []
     for bus, wanted in _wanted(texts).items():
         with opened(bus, options, output) as opening:
+            bounds = _paced(opening, wanted, asked.bounds)
             ways, rehearsal = _ways(opening, wanted, bounds), dry.DryBus(opening)
             rehearse = partial(_move, rehearsal, wanted, {**bounds, "wait": False})
             consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
@@ -152,6 +156,15 @@ def _moved_to(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str],
         ]
         output.table("", ["device", "goal", "present"], shown)
     return Exit.OK
+
+
+def _paced(bus: Bus, goals: Goals, bounds: dict[str, float]) -> dict[str, float]:
+    """The same bounds; where no velocity was said and the machine file bounds that of these, its bound."""
+    slowest = pace(bus, goals)
+    verb = type(face(bus, next(iter(goals)))).move
+    if slowest is None or "velocity" not in inspect.signature(verb.function).parameters:
+        return bounds
+    return {"velocity": slowest, **bounds}
 
 
 def _for_axes(texts: tuple[str, ...], for_devices: list[str], for_axes: list[str], home: bool) -> bool:

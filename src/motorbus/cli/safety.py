@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import is_address, machine, machine_file, shown, using
+from motorbus.cli.machine import asked_of_the_file, is_address, machine, machine_file, shown, using
 from motorbus.cli.output import Output
 from motorbus.errors import RequestError
 
@@ -77,19 +77,22 @@ def safety(
             expected="FILE, as motorbus.toml",
             advice="`motorbus init BUS` writes one; nothing was opened",
         )
+    from motorbus.session.plan import Plan
+
     with using(file, "the command itself") if file else nullcontext():
-        known = machine()
-        path = machine_file().path
+        with asked_of_the_file():
+            Plan.of(machine())  # as whoever opens it would refuse it
+        known, path = machine(), machine_file().path
     assert path is not None
     _show(shown(path), known, output)
     return Exit.OK
 
 
 def _show(path: str, known: Machine, output: Output) -> None:
-    from motorbus import session
     from motorbus.motion.safety.assurance import SCOPE, assured, unbounded
+    from motorbus.session import prepare
 
-    families = {name: session.prepare(bus.address, {}).family for name, bus in known.buses.items()}
+    families = {name: prepare(bus.address, {}).family for name, bus in known.buses.items()}
     found = assured(known, families, _cycles(known, families))
     advice = unbounded(found)
     output.document("motorbus.safety/1", {"file": path, "scope": SCOPE, **_facts(found), "advice": advice})

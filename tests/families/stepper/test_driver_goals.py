@@ -20,14 +20,18 @@ THERE_AND_BACK = with_steps(
 )
 
 
+TURN = Goal(1, "speed", 60 * tau / 60, -inf, inf)
+"""60 RPM."""
+
+
 def test_a_project_orders_the_farthest_that_a_pass_gets() -> None:
-    assert goals.of_project(Node(), THERE_AND_BACK) == (Goal(1, "relative", 3 * tau, -inf, inf),)
+    assert goals.of_project(Node(), THERE_AND_BACK) == (Goal(1, "relative", 3 * tau, -inf, inf), TURN)
     further = replace(THERE_AND_BACK, loop_first=2, loop_last=2, loop_count=2)
-    assert goals.of_project(Node(), further) == (Goal(1, "relative", -6 * tau, -inf, inf),)
+    assert goals.of_project(Node(), further) == (Goal(1, "relative", -6 * tau, -inf, inf), TURN)
 
 
 def test_a_single_move_and_a_jog_take_step_1() -> None:
-    assert goals.of_move(Node(), THERE_AND_BACK) == (Goal(1, "relative", 3 * tau, -inf, inf),)
+    assert goals.of_move(Node(), THERE_AND_BACK) == (Goal(1, "relative", 3 * tau, -inf, inf), TURN)
     (jog,) = goals.of_jog(Node(), THERE_AND_BACK, -1)
     assert jog == Goal(1, "velocity", jog.value, -inf, inf)
     assert jog.value == pytest.approx(-tau)

@@ -177,7 +177,6 @@ def test_nothing_that_moves_it_or_gives_it_torque_leaves_after_the_fault_was_see
             line = sim.line = At(robot.buses["arm"].link.now() + 0.9, sim[1].power_cycle)
             with pytest.raises(Faulted):
                 robot.move(GOALS, duration=2.0)
-            bus = robot.buses["arm"]
         (seen,) = noted
         late = [data for at, data in line.sent if at > seen and moving_or_giving_torque(data, 1)]
         assert late == []

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from motorbus.errors import NoReply, Stalled
+from motorbus.motion.safety.canary import PROTECTIVE
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
 
 
-def behind(axis: AxisVerbs, goal: float, present: float, allowed: float) -> Stalled:
-    """The error for an axis that is farther from where it should be by now than is `allowed` (all rad, m)."""
+def behind(
+    axis: AxisVerbs, goal: float, present: float, allowed: float, alarms: Collection[str] = ()
+) -> Stalled:
+    """The error for an axis that is farther from where it should be by now than is `allowed` (all rad, m).
+
+    `alarms` are those of its device.
+    """
     spec = axis.spec
+    where = f"it is at {spec.show(present)}, and should be at {spec.show(goal)} by now"
     return Stalled(
-        f"{axis.name} does not follow: it is at {spec.show(present)}, and should be at {spec.show(goal)} by now",
+        f"{axis.name} does not follow: {where}{_told(alarms)}",
         expected=f"within {spec.show(allowed)} of where it should be",
-        cause="something blocks it, the load is too heavy, or it is slower than max_velocity says",
+        cause=_cause(
+            alarms, "something blocks it, the load is too heavy, or it is slower than max_velocity says"
+        ),
         advice="clear the way, move slower, or change the limits of the axis; all of the movement were stopped",
         node=spec.node,
     )
@@ -29,13 +38,22 @@ def not_there(
     presents: Mapping[str, Sequence[float]],
     near: float,
     patience: float,
+    alarms: Mapping[str, Collection[str]],
 ) -> Stalled:
-    """The error for axes that are not in position so long (s) after the end; the first must come so `near` (rad, m)."""
+    """The error for axes that are not in position so long (s) after the end; the first must come so `near` (rad, m).
+
+    `alarms` are those of their devices, by name.
+    """
     first = short[0]
     return Stalled(
-        "; ".join(_stands(one, goals[one.name], presents[one.name]) for one in short),
+        "; ".join(
+            f"{_stands(one, goals[one.name], presents[one.name])}{_told(alarms[one.name])}" for one in short
+        ),
         expected=f"within {first.spec.show(near)} of it, {patience:g} s after the end",
-        cause="something blocks it, the load is too heavy, or its torque is bounded",
+        cause=_cause(
+            [alarm for one in short for alarm in alarms[one.name]],
+            "something blocks it, the load is too heavy, or its torque is bounded",
+        ),
         advice="clear the way, allow it more torque, or give a wider tolerance; all of the movement were stopped",
         node=first.spec.node,
     )
@@ -59,6 +77,15 @@ def does_not_begin(axis: AxisVerbs) -> NoReply:
         advice="look at the cable and the supply; nothing was sent that moves anything",
         node=axis.spec.node,
     )
+
+
+def _told(alarms: Collection[str]) -> str:
+    return f" (alarms: {', '.join(alarms)})" if alarms else ""
+
+
+def _cause(alarms: Collection[str], otherwise: str) -> str:
+    """Why it does not get there: a device that protects itself pushes with a part of its torque, or not at all."""
+    return f"its device protects itself: {', '.join(alarms)}" if PROTECTIVE & set(alarms) else otherwise
 
 
 def _stands(axis: AxisVerbs, goal: float, presents: Sequence[float]) -> str:

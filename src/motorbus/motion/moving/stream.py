@@ -367,7 +367,7 @@ class Stream:
         """The error for one that does not follow; raises what is the matter with it, if it tells that."""
         yield from self._watch.examine(axis)
         goal, present = (row[-1] for row in self._tracks[axis.name][1:])
-        return behind(axis, goal, present, self._allowed[axis.name])
+        return behind(axis, goal, present, self._allowed[axis.name], self._watch.alarms(axis))
 
     def _check_arrived(self) -> Operation[None]:
         """Raise Stalled for those that are not in position, or what is the matter with one of them."""
@@ -378,7 +378,8 @@ class Stream:
             near = self._within[short[0].name] / abs(short[0].spec.ratio)
             presents = {name: rows[2] for name, rows in self._tracks.items()}
             goals = self._course.positions(self._course.duration)
-            raise not_there(short, goals, presents, near, self._patience)
+            alarms = {axis.name: self._watch.alarms(axis) for axis in short}
+            raise not_there(short, goals, presents, near, self._patience, alarms)
 
     def _check_heard(self, node: int, now: float) -> None:
         """Raise NoReply for an axis that has been silent for too long."""

@@ -13,7 +13,6 @@ from motorbus.core.assurance import Assurance, Given, Point
 from motorbus.motion.limits import shown_rate
 from motorbus.motion.machine.model import VELOCITY
 from motorbus.motion.moving.stream import SHARE, USUAL
-from motorbus.motion.safety.lease import LASTS
 from motorbus.motion.safety.track import FRESH
 
 if TYPE_CHECKING:
@@ -143,7 +142,7 @@ MACHINE: Final[Mapping[str, Point]] = {
     "on connect": Point(Given.YES, "opening, scanning and reading move nothing; torque on does not jump"),
     "endless motion": Point(
         Given.PARTLY,
-        f"only while somebody attends, whose program says so every {LASTS:g} s; ended by the host alone",
+        "only while somebody attends, and stopped when he has ended or his lease is lost; but by the host alone",
     ),
     "all or nothing": Point(
         Given.PARTLY,

@@ -48,6 +48,7 @@ class Watch:
         self._strains: Final[dict[int, Strain | None]] = {}
         self._turns: Final[deque[int]] = deque()
         self._last: Final[dict[int, float]] = {}
+        self._alarms: Final[dict[int, tuple[str, ...]]] = {}
         self.fault: Faulted | None = None
         self._free = -inf
         self._next = inf
@@ -78,6 +79,10 @@ class Watch:
             if node in self._turns:
                 self._turns.remove(node)
             self._plan()
+
+    def alarms(self, axis: AxisVerbs) -> tuple[str, ...]:
+        """The alarms that its device told of when it was asked last; () when there were none, or nobody knows."""
+        return self._alarms.get(axis.spec.node, ())
 
     # -- whom to ask, and what the answer means ------------------------------------------------------------------------
 
@@ -119,6 +124,7 @@ class Watch:
             if not isinstance(told, LOST):  # it does not tell, though devices of its kind do
                 self.dismiss(node)
             return
+        self._alarms[node] = told.state.alarm
         error = canary.looked_at(axis, told, led=True)
         if error is not None:
             self.fault = error

@@ -25,8 +25,8 @@ ASSURANCE: Final = Assurance(
     torque=Point(Given.NO, "none: it holds with all its force as long as it has its supply"),
     restart=Point(
         Given.PARTLY,
-        "it says so once, in a frame of its own, and then it is a fault; a frame that is lost, or comes while no bus "
-        "is open, is not seen",
+        "where it says so, by the boot notice of CANopen, it is a fault; no sheet promises that it does, and a frame "
+        "that is lost is not seen",
     ),
     strain=Point(
         Given.PARTLY,

@@ -16,19 +16,25 @@ from motorbus.families.stepper.table import Project
 
 
 def of_project(node: Node, project: Project, how: Behaviour = USUAL) -> tuple[Goal, ...]:
-    """Starting it: the farthest that one pass gets from where it begins, in rad."""
-    return (_goal(node, "relative", _angle(project, _farthest(project, how))),)
+    """Starting it: the farthest that one pass gets from where it begins, in rad, and its greatest speed in rad/s."""
+    places = {place.step for place in execution.one_pass(project, how)}
+    fastest = max((project.step(number).speed for number in places), default=0)
+    return (_goal(node, "relative", _angle(project, _farthest(project, how))), _speed(node, fastest))
 
 
 def of_move(node: Node, project: Project) -> tuple[Goal, ...]:
-    """A single move, which takes distance and direction from step 1."""
+    """A single move, which takes distance, direction and speed from step 1."""
     step = project.step(1)
-    return (_goal(node, "relative", _angle(project, step.sign * step.distance)),)
+    return (_goal(node, "relative", _angle(project, step.sign * step.distance)), _speed(node, step.speed))
 
 
 def of_jog(node: Node, project: Project, sign: int) -> tuple[Goal, ...]:
     """Jog and homing, which take their speed from step 1 and end when they are stopped."""
     return (_goal(node, "velocity", sign * project.step(1).speed * tau / 60),)
+
+
+def _speed(node: Node, rpm: int) -> Goal:
+    return _goal(node, "speed", rpm * tau / 60)
 
 
 def _goal(node: Node, quantity: str, value: float) -> Goal:
