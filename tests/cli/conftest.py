@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import pytest
@@ -42,12 +43,12 @@ Run = Callable[..., Ran]
 
 
 @pytest.fixture(autouse=True)
-def no_file_of_the_user(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def no_file_of_the_user(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """No machine file of whoever runs the tests counts. The folder where one would be looked for."""
     monkeypatch.delenv(VARIABLE, raising=False)
-    folder = tmp_path_factory.mktemp("config")
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder))
-    return folder / "motorbus"
+    with TemporaryDirectory() as folder:
+        monkeypatch.setenv("XDG_CONFIG_HOME", folder)
+        yield Path(folder) / "motorbus"
 
 
 @pytest.fixture
