@@ -16,6 +16,7 @@ from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
+from motorbus.link import adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
@@ -78,7 +79,13 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def served(tmp_path: Path, state_folder: Path) -> Iterator[Simulated]:
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever answers in a process of its own may be kept waiting for a processor by all the other tests."""
+    monkeypatch.setattr(adapters, "TERMINAL_LATENCY", 0.02)
+
+
+@pytest.fixture
+def served(tmp_path: Path, state_folder: Path, patient: None) -> Iterator[Simulated]:
     """Three simulated servos in a process of their own on a pseudo-terminal; `served.bus` is their bus."""
     with Simulated("feetech", ids="1-3", link=tmp_path / "bus") as simulated:
         yield simulated
