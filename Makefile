@@ -24,6 +24,9 @@ demo: $(READY)
 	@mkdir -p build
 	$(BIN)/motorbus demo --output build/demo.png
 
+# Tests start hundreds of processes; each would compile the whole package again where a shell forbids to keep that.
+test soak bench: export PYTHONDONTWRITEBYTECODE =
+
 test: $(READY) $(PEERS)
 	$(BIN)/python -m pytest -n auto --dist loadgroup $(ARGS)
 

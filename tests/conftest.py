@@ -1,11 +1,13 @@
 """How much of each test is run: all but the long ones, the long ones (`--soak`), or a quick few (`--quick`).
 
 A test that counts asks the fixture `rounds` how often; so the same test runs 10^4 times in `make test`, its full
-count in `make soak` and a hundred times on the other interpreters.
+count in `make soak` and a hundred times on the other interpreters. Here is too what makes all of them together quick.
 """
 
 from __future__ import annotations
 
+import gc
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,6 +49,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker("soak")
     config.hook.pytest_deselected(items=[item for item in items if not wanted(item)])
     items[:] = [item for item in items if wanted(item)]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """`-n auto`: three for every two cores, since tests of real ports and processes wait for most of their time."""
+    return max(2, 3 * (os.cpu_count() or 1) // 2)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Tens of thousands of tests stay until the end; the collector need not go through them again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 def _is_soak(item: pytest.Item) -> bool:

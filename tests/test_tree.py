@@ -76,56 +76,114 @@ FILES = python_files(*FOLDERS)
 BUILT_IN = python_files("src")
 
 
-@pytest.mark.parametrize("file", BUILT_IN, ids=name_of)
-def test_every_source_file_has_its_test(file: Path) -> None:
-    if file.name == "__main__.py" or not any(map(does_something, functions(parsed(file)))):
-        return  # declares only: there is no behaviour to test
+def has_its_test(file: Path, tree: ast.Module) -> Iterator[str]:
+    """Every source file has a test where one looks for it."""
+    if not file.is_relative_to(ROOT / "src") or file.name == "__main__.py":
+        return
     places = places_of_its_test(file)
-    assert any(place.exists() for place in places), f"expected {' or '.join(map(name_of, places))}"
+    if any(map(does_something, functions(tree))) and not any(place.exists() for place in places):
+        yield f"has no test; expected {' or '.join(map(name_of, places))}"
 
 
-@pytest.mark.parametrize("file", FILES, ids=name_of)
-def test_no_file_is_long(file: Path) -> None:
-    if file.stem == "table" or file.parent.name == "table":
-        return  # a table is data, however long
-    assert len(file.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+def no_file_is_long(file: Path, tree: ast.Module) -> Iterator[str]:
+    """A table is data, however long."""
+    lines = len(file.read_text(encoding="utf-8").splitlines())
+    if lines > LONGEST_FILE and "table" not in (file.stem, file.parent.name):
+        yield f"has {lines} lines"
 
 
-@pytest.mark.parametrize("file", FILES, ids=name_of)
-def test_no_function_is_long(file: Path) -> None:
-    lengths = {found.name: (found.end_lineno or 0) - found.lineno + 1 for found in functions(parsed(file))}
-    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FUNCTION} == {}
+def no_function_is_long(file: Path, tree: ast.Module) -> Iterator[str]:
+    """It fits a screen."""
+    for found in functions(tree):
+        lines = (found.end_lineno or 0) - found.lineno + 1
+        if lines > LONGEST_FUNCTION:
+            yield f"{found.name} has {lines} lines"
 
 
-@pytest.mark.parametrize("file", FILES, ids=name_of)
-def test_every_file_says_why_it_is_there(file: Path) -> None:
-    tree = parsed(file)
-    assert not tree.body or ast.get_docstring(tree), "a short prologue in prose is missing"
+def it_says_why_it_is_there(file: Path, tree: ast.Module) -> Iterator[str]:
+    """In its docstring."""
+    if tree.body and not ast.get_docstring(tree):
+        yield "a short prologue in prose is missing"
 
 
-@pytest.mark.parametrize("file", BUILT_IN, ids=name_of)
-def test_what_is_public_has_a_docstring(file: Path) -> None:
-    public = [
-        node
-        for node in parsed(file).body
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-        and not node.name.startswith("_")
-    ]
-    assert [node.name for node in public if not ast.get_docstring(node)] == []
+def what_is_public_has_a_docstring(file: Path, tree: ast.Module) -> Iterator[str]:
+    """In what is built in; a test says it by its name."""
+    public = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+    for node in tree.body if file.is_relative_to(ROOT / "src") else ():
+        if isinstance(node, public) and not node.name.startswith("_") and not ast.get_docstring(node):
+            yield f"{node.name} has no docstring"
 
 
-@pytest.mark.parametrize("file", FILES, ids=name_of)
-def test_no_name_is_an_empty_word(file: Path) -> None:
-    classes = [node.name for node in ast.walk(parsed(file)) if isinstance(node, ast.ClassDef)]
-    assert [name for name in [*classes, file.stem.title()] if EMPTY_WORDS.search(name)] == []
+def no_name_is_an_empty_word(file: Path, tree: ast.Module) -> Iterator[str]:
+    """Neither that of a class nor that of a file."""
+    classes = [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    for name in [*classes, file.stem.title()]:
+        if EMPTY_WORDS.search(name):
+            yield f"{name} says nothing"
 
 
-@pytest.mark.parametrize("file", python_files("tests"), ids=name_of)
-def test_no_test_is_skipped_in_silence(file: Path) -> None:
+def no_test_is_skipped_in_silence(file: Path, tree: ast.Module) -> Iterator[str]:
+    """The reason is in `MAY_SKIP`."""
     marks = {"skip", "skipif", "xfail", "importorskip"}
-    tree = parsed(file)
     used = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)} & marks
-    assert not used or name_of(file) in MAY_SKIP, f"{used}: give the reason in MAY_SKIP"
+    if file.is_relative_to(TESTS) and used and name_of(file) not in MAY_SKIP:
+        yield f"{used}: give the reason in MAY_SKIP"
+
+
+RULES = (
+    has_its_test,
+    no_file_is_long,
+    no_function_is_long,
+    it_says_why_it_is_there,
+    what_is_public_has_a_docstring,
+    no_name_is_an_empty_word,
+    no_test_is_skipped_in_silence,
+)
+
+
+def faults_of(file: Path) -> list[str]:
+    """What each rule has against this file, which is read once for all of them."""
+    tree = parsed(file)
+    return [f"{name_of(file)}: {rule.__name__}: {fault}" for rule in RULES for fault in rule(file, tree)]
+
+
+@pytest.mark.parametrize("folder", sorted({file.parent for file in FILES}), ids=name_of)
+def test_every_file_of_a_folder_keeps_every_rule(folder: Path) -> None:
+    assert [fault for file in FILES if file.parent == folder for fault in faults_of(file)] == []
+
+
+WRONG = {
+    "src/motorbus/untested.py": (
+        '"""Why."""\n\nclass IdHandler:\n    def do(self) -> int:\n        return 1\n',
+        ["has_its_test", "what_is_public_has_a_docstring", "no_name_is_an_empty_word"],
+    ),
+    "tests/test_long.py": (
+        "import pytest\n\n@pytest.mark.skip\ndef test_it() -> None:\n" + "    assert 1\n" * 400,
+        [
+            "no_file_is_long",
+            "no_function_is_long",
+            "it_says_why_it_is_there",
+            "no_test_is_skipped_in_silence",
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_file_that_breaks_a_rule_is_found(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, broken = WRONG[name]
+    for place, folder in (("ROOT", ""), ("SOURCES", "src/motorbus"), ("TESTS", "tests")):
+        monkeypatch.setitem(globals(), place, tmp_path / folder)
+    file = tmp_path / name
+    file.parent.mkdir(parents=True)
+    file.write_text(text, encoding="utf-8")
+    assert [fault.split(": ")[1] for fault in faults_of(file)] == broken
+
+
+def test_every_rule_is_known_to_find_something() -> None:
+    assert {rule for _, broken in WRONG.values() for rule in broken} == {rule.__name__ for rule in RULES}
 
 
 def decisions() -> list[Path]:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import pytest
@@ -15,6 +16,7 @@ from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
+from motorbus.link import adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
@@ -42,12 +44,12 @@ Run = Callable[..., Ran]
 
 
 @pytest.fixture(autouse=True)
-def no_file_of_the_user(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def no_file_of_the_user(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """No machine file of whoever runs the tests counts. The folder where one would be looked for."""
     monkeypatch.delenv(VARIABLE, raising=False)
-    folder = tmp_path_factory.mktemp("config")
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder))
-    return folder / "motorbus"
+    with TemporaryDirectory() as folder:
+        monkeypatch.setenv("XDG_CONFIG_HOME", folder)
+        yield Path(folder) / "motorbus"
 
 
 @pytest.fixture
@@ -77,7 +79,13 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def served(tmp_path: Path, state_folder: Path) -> Iterator[Simulated]:
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever answers in a process of its own may be kept waiting for a processor by all the other tests."""
+    monkeypatch.setattr(adapters, "TERMINAL_LATENCY", 0.02)
+
+
+@pytest.fixture
+def served(tmp_path: Path, state_folder: Path, patient: None) -> Iterator[Simulated]:
     """Three simulated servos in a process of their own on a pseudo-terminal; `served.bus` is their bus."""
     with Simulated("feetech", ids="1-3", link=tmp_path / "bus") as simulated:
         yield simulated

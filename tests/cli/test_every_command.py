@@ -157,7 +157,7 @@ AXES = [
     "ping all",
     "scan can --ids 0x25",
     "monitor a1 c1 --count 1",
-    "init arm=feetech:sim,ids=1-3 kst:sim --force",
+    "init arm=feetech:sim,ids=1-3#1-3 kst:sim#1 --force",
 ]
 """By the names of a machine file."""
 LACKS = {"kst": ("torque ", "--velocity")}

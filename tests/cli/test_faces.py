@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from motorbus import families
 from motorbus.cli import faces
 
 
@@ -15,3 +18,15 @@ def test_what_a_face_offers() -> None:
     assert faces.offer("feetech", "budget_frames") is None
     assert faces.offer("feetech", "make_coffee") is None
     assert faces.offer("nobody", "move_together") is None
+
+
+def test_what_is_installed_is_not_looked_through_again_at_every_frame(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert callable(faces.offer("kst", "budget_frames"))
+
+    def again() -> list[str]:
+        raise AssertionError("it was looked through again")
+
+    monkeypatch.setattr(families, "names", again)
+    assert callable(faces.offer("kst", "budget_frames"))

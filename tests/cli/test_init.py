@@ -53,7 +53,7 @@ def test_its_limits_are_those_of_the_device_around_their_middle(run: Run, here: 
 
 
 def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: Path) -> None:
-    assert run("init", "stepper:sim", "feetech:sim", "--name", "bench").code == 0
+    assert run("init", "stepper:sim", "feetech:sim#1", "--name", "bench").code == 0
     text = (here / "motorbus.toml").read_text(encoding="utf-8")
     assert 'name = "bench"' in text
     assert "# STS3215, firmware 3.10\n[axis.feetech_1]" in text
@@ -65,7 +65,7 @@ def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: P
 
 
 def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:
-    ran = run("init", f"arm={arm.url}#1-3")
+    ran = run("init", f"arm={arm.url}")
     assert ran.code == 0
     steps = re.findall(r"^    motorbus (.*)$", ran.out, re.M)
     assert steps == ["info arm_1", "torque on arm_1", "move arm_1+=5deg", "pose --save first arm_1"]
@@ -77,7 +77,7 @@ def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:
 def test_of_a_file_that_does_not_count_the_next_commands_name_it(
     run: Run, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ran = run("init", "feetech:sim", "--output", "bench.toml", "--json")
+    ran = run("init", "feetech:sim#1", "--output", "bench.toml", "--json")
     assert ran.document["next"][0] == "motorbus info feetech_1 --machine bench.toml"
     assert run("init", "kst:sim", "--machine", "other.toml").code == 0
     assert sorted(path.name for path in here.glob("*.toml")) == ["bench.toml", "other.toml"]
@@ -94,19 +94,19 @@ def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Pa
     assert "is there already" in ran.err
     assert " tx " not in ran.err
     assert (here / "motorbus.toml").read_text(encoding="utf-8") == "mine"
-    ran = run("init", "feetech:sim", "--force")
+    ran = run("init", "feetech:sim#1", "--force")
     assert (ran.code, "nothing of it is kept" in ran.err) == (0, True)
     assert list(Machine.load(here / "motorbus.toml").axes) == ["feetech_1"]
 
 
 def test_options_by_flags_stand_in_the_file(run: Run, here: Path) -> None:
-    assert run("init", "feetech:sim", "--ids", "4", "--model", "sts3250").code == 0
+    assert run("init", "feetech:sim#4", "--ids", "4", "--model", "sts3250").code == 0
     made = Machine.load(here / "motorbus.toml")
     assert made.buses["feetech"].address == "feetech:sim,ids=4,model=sts3250"
 
 
 def test_two_buses_of_a_family_have_two_names(run: Run, here: Path) -> None:
-    assert run("init", "feetech:sim,ids=1", "feetech:sim,ids=2").code == 0
+    assert run("init", "feetech:sim,ids=1#1", "feetech:sim,ids=2#2").code == 0
     made = Machine.load(here / "motorbus.toml")
     assert list(made.axes) == ["feetech_1", "feetech_bus2_2"]
 
@@ -127,7 +127,7 @@ def test_nothing_is_written_to_any_device(arm: Simulation, run: Run, monkeypatch
 
 
 def test_where_nobody_answers_there_is_no_file(run: Run, here: Path) -> None:
-    ran = run("init", "feetech:sim,ids=1", "feetech:sim,ids=2#7")
+    ran = run("init", "feetech:sim,ids=1#1", "feetech:sim,ids=2#7")
     assert (ran.code, ran.out) == (5, "")
     assert list(here.iterdir()) == []
 
@@ -168,7 +168,7 @@ def test_without_a_bus_it_shows_what_to_type(run: Run, monkeypatch: pytest.Monke
         ("feetech:sim --output nowhere/bench.toml", 2),
         ("feetech:sim --output .", 2),
         ("feetech:/dev/no-such-port", 3),
-        ("feetech:sim feetech:/dev/no-such-port", 3),
+        ("feetech:sim#1 feetech:/dev/no-such-port", 3),
         ("feetech:sim --dry-run", 2),
     ],
 )

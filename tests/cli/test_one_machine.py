@@ -105,7 +105,7 @@ def test_it_moves_as_one(served_machine: Served, run: Run) -> None:
 def test_a_port_that_dies_on_the_way_stops_the_others_and_is_the_one_error(
     served_machine: Served, run: Run
 ) -> None:
-    with command("move", "a1=120deg", "c1=45deg", "--duration", "8s") as process:
+    with command("move", "a1=120deg", "c1=45deg", "--duration", "40s") as process:
         under_way(process)
         served_machine.simulators["arm"].process.kill()
         error = told(process)
@@ -117,7 +117,7 @@ def test_a_port_that_dies_on_the_way_stops_the_others_and_is_the_one_error(
 
 
 def test_ctrl_c_stops_them_all_and_says_where_they_stand(served_machine: Served, run: Run) -> None:
-    with command("move", "a1=120deg", "a2=-120deg", "c1=45deg", "--duration", "8s") as process:
+    with command("move", "a1=120deg", "a2=-120deg", "c1=45deg", "--duration", "20s") as process:
         under_way(process)
         process.send_signal(signal.SIGINT)
         error = told(process)

@@ -305,14 +305,18 @@ def test_a_journal_of_a_later_version_is_told_and_touched_by_nobody(run: Run, se
     assert path.read_text() == '{"format": 2}\n'
 
 
-def test_what_is_told_of_a_changed_id_has_the_rate_it_answers_at(run: Run, served: Simulated) -> None:
+def test_what_is_told_of_a_changed_id_has_the_rate_it_answers_at(
+    run: Run, tmp_path: Path, state_folder: Path
+) -> None:
     """The change was made at another rate than the one at which the bus is opened now."""
-    assert run("set-baud", served.bus, "500000", "--yes", "--among", "1-9").code == 0
-    killed("written 7", "set-id", f"{served.bus},baud=500000#3", "7", "--yes", "--among", "1-9")
-    ran = run("recover", served.bus, "--yes", "--json")
-    assert ran.code == 0, ran.err
-    assert ran.document["address"] == f"{served.bus},baud=500000#7"
-    assert run("ping", ran.document["address"]).code == 0
+    with Simulated("feetech", ids="1-3", link=tmp_path / "bus", servo_baud="500000") as slower:
+        bus, _, rate = slower.bus.partition(",")
+        assert rate == "baud=500000"
+        killed("written 7", "set-id", f"{slower.bus}#3", "7", "--yes", "--among", "1-9")
+        ran = run("recover", bus, "--yes", "--json")
+        assert ran.code == 0, ran.err
+        assert ran.document["address"] == f"{bus},baud=500000#7"
+        assert run("ping", ran.document["address"]).code == 0
 
 
 @pytest.mark.parametrize("line", ['{"state": "x"}', '{"state": "x", "facts": [1]}', "{", ""])

@@ -27,7 +27,7 @@ def newer() -> Iterator[Simulation]:
 
 
 @pytest.fixture
-def on_slcan(tmp_path: Path, state_folder: Path) -> Iterator[Simulated]:
+def on_slcan(tmp_path: Path, state_folder: Path, patient: None) -> Iterator[Simulated]:
     """Two servos, 37 and 38, in a process of their own behind a simulated slcan adapter, with a control socket."""
     control = str(tmp_path / "control")
     with Simulated("kst", ids="0x25+0x26", link=tmp_path / "can", control=control) as simulated:

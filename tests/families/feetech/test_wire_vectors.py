@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import pytest
 
@@ -85,33 +86,26 @@ def test_a_valid_packet_is_read(
 
 
 @pytest.mark.parametrize("feed", [whole, byte_by_byte])
-@pytest.mark.parametrize("after", AFTER, ids=repr)
-@pytest.mark.parametrize("before", BEFORE, ids=repr)
 @pytest.mark.parametrize("vector", VALID, ids=name_of)
 def test_noise_around_a_valid_packet_is_told_apart(
-    vector: Vector,
-    before: str,
-    after: str,
-    feed: Callable[[wire.Splitter, bytes], list[wire.Packet | Noise]],
+    vector: Vector, feed: Callable[[wire.Splitter, bytes], list[wire.Packet | Noise]]
 ) -> None:
-    data = bytes.fromhex(before) + vector.data + bytes.fromhex(after)
-    events = feed(splitter(vector), data)
-    assert [event for event in events if not isinstance(event, Noise)] == [packet_of(vector)]
-    assert b"".join(event.data for event in events) == data
+    for before, after in product(BEFORE, AFTER):
+        data = bytes.fromhex(before) + vector.data + bytes.fromhex(after)
+        events = feed(splitter(vector), data)
+        around = f"between {before!r} and {after!r}"
+        assert [event for event in events if not isinstance(event, Noise)] == [packet_of(vector)], around
+        assert b"".join(event.data for event in events) == data, around
 
 
 @pytest.mark.parametrize("feed", [whole, byte_by_byte])
-@pytest.mark.parametrize("after", AFTER, ids=repr)
-@pytest.mark.parametrize("before", BEFORE, ids=repr)
 @pytest.mark.parametrize("vector", INVALID, ids=name_of)
 def test_an_invalid_packet_is_noise_whatever_is_around_it(
-    vector: Vector,
-    before: str,
-    after: str,
-    feed: Callable[[wire.Splitter, bytes], list[wire.Packet | Noise]],
+    vector: Vector, feed: Callable[[wire.Splitter, bytes], list[wire.Packet | Noise]]
 ) -> None:
-    events = feed(splitter(vector), bytes.fromhex(before) + vector.data + bytes.fromhex(after))
-    assert {type(event) for event in events} == {Noise}
+    for before, after in product(BEFORE, AFTER):
+        events = feed(splitter(vector), bytes.fromhex(before) + vector.data + bytes.fromhex(after))
+        assert {type(event) for event in events} == {Noise}, f"between {before!r} and {after!r}"
 
 
 @pytest.mark.parametrize("vector", INVALID, ids=name_of)
