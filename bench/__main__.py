@@ -9,6 +9,7 @@ from pathlib import Path
 from bench import (
     can_rounds,
     estimates,
+    estop,
     machine,
     report,
     responder,
@@ -77,6 +78,7 @@ def measured(given: argparse.Namespace) -> report.Results:
         forecasts=() if given.only else estimates.costs(given.rounds, say),
         stepper=() if given.only else stepper_line.samples(given.rounds, say),
         loop=() if given.only else robot_loop.samples(robot_loop.SECONDS, say),
+        stops=() if given.only else estop.samples(estop.STOPS, say),
     )
 
 
@@ -90,6 +92,7 @@ def main() -> int:
         rounds.Failed,
         stepper_line.Wrong,
         robot_loop.Wrong,
+        estop.Wrong,
         MotorbusError,
         OSError,
     ) as error:

@@ -98,7 +98,7 @@ def _polls(bus: Any, over: Event) -> None:
     servo = bus.family.devices.blocking(bus, 1)
     while not over.is_set():
         with suppress(MotorbusError):
-            servo.read_raw(56, 15)
+            servo.position()
 
 
 def load() -> None:

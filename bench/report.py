@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from bench import can_report, estimates, robot_loop, stepper_line
+from bench import can_report, estimates, estop, robot_loop, stepper_line
 from bench.figures import Spread, cost, ratio
 from bench.rounds import Sample
 from bench.startup import Cost
@@ -36,6 +36,7 @@ class Results(NamedTuple):
     forecasts: Sequence[estimates.Cost] = ()
     stepper: Sequence[stepper_line.Sample] = ()
     loop: Sequence[robot_loop.Sample] = ()
+    stops: Sequence[estop.Sample] = ()
 
 
 class Table(NamedTuple):
@@ -130,6 +131,11 @@ def loop_table(results: Results) -> Table:
     return Table("robot.loop, six axes at 1 Mbaud", robot_loop.COLUMNS, robot_loop.rows(results.loop))
 
 
+def stop_table(results: Results) -> Table:
+    """How soon the first byte of an emergency stop arrives."""
+    return Table("Emergency stop", estop.COLUMNS, estop.rows(results.stops))
+
+
 def tables(results: Results) -> list[Table]:
     """All of them, in reading order."""
     found = list(wire_tables(results))
@@ -145,6 +151,8 @@ def tables(results: Results) -> list[Table]:
         found.append(stepper_table(results))
     if results.loop:
         found.append(loop_table(results))
+    if results.stops:
+        found.append(stop_table(results))
     return found
 
 
@@ -200,6 +208,7 @@ def as_json(results: Results) -> str:
         "estimates": [{**one._asdict(), "seconds": one.seconds._asdict()} for one in results.forecasts],
         "stepper": [sample._asdict() for sample in results.stepper],
         "loop": [sample._asdict() for sample in results.loop],
+        "stops": [sample._asdict() for sample in results.stops],
         "missing": results.missing,
     }
     return json.dumps(document, indent=1) + "\n"
@@ -237,7 +246,7 @@ can be measured so.
 Wall time of a whole process less that of an empty one, the best of four of each, with compiled modules at hand.
 
 {start}
-{forecasts}{stepper}{loop}"""
+{forecasts}{stepper}{loop}{stops}"""
 
 _FORECASTS = """
 ## Estimates
@@ -266,6 +275,7 @@ def page(results: Results) -> str:
         forecasts=_estimated(results),
         stepper=_on_the_line(results),
         loop=in_a_loop(results),
+        stops=in_an_emergency(results),
     )
 
 
@@ -307,3 +317,22 @@ def in_a_loop(results: Results) -> str:
     if not results.loop:
         return ""
     return f"{_LOOP}{as_markdown(loop_table(results))}\n\n{robot_loop.verdict(results.loop)}\n"
+
+
+_STOPS = """
+## Emergency stop
+
+From the moment at which a program asks for an emergency stop of a machine to the first byte of it that arrives at the
+other end of a pseudo-terminal, by the clock of whoever listens there. Four buses in one program: six servos that a thread
+polls, a stepper controller, a line on which somebody talks without a pause, and one from which nobody reads. Devices and
+listeners are processes of their own, and for each processor two more processes only compute. On a real line what is being
+said when the stop is asked for adds the rest of its time: see [Safety](explanation/safety.md).
+
+"""
+
+
+def in_an_emergency(results: Results) -> str:
+    """The part of the page on emergency stops; "" where they were not measured."""
+    if not results.stops:
+        return ""
+    return f"{_STOPS}{as_markdown(stop_table(results))}\n\n{estop.verdict(results.stops)}\n"

@@ -225,7 +225,7 @@ def test_capabilities_belong_to_a_model(subject: Family) -> None:
 
 
 def test_both_faces_have_the_same_verbs(family: Family) -> None:
-    blocking, awaiting = family.devices
+    blocking, awaiting, _ = family.devices
     assert public(blocking) == public(awaiting)
     verbs = {"ping", "identify", "read", "node", "alarm", *(["write"] if line_of(family).writes else [])}
     assert verbs <= public(blocking(World(family).bus, 1))

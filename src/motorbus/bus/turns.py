@@ -58,9 +58,7 @@ class Turns(Air):
         self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
         self.lock = RLock()
         self.look: Look | None = None
-        self.chores: list[
-            Callable[[], None]
-        ] = []  # what else whoever pumps does before he sends; see `background`
+        self.chores: list[Callable[[], None]] = []  # what else whoever pumps does; see `background`
         self.latched = self.stopping = False
         self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
         self._timers: list[Timer | Listener] = []
