@@ -65,11 +65,13 @@ def samples(stops: int, progress: Callable[[str], None]) -> list[Sample]:
 
 
 def _matched(bus: str, asked: Sequence[float], heard: Path) -> Iterator[Sample]:
-    """The first stop frame that arrived after each time it was asked for. Raises Wrong for one that never did."""
+    """The first stop frame that arrived after each time it was asked for; one that is lost counts until the next.
+
+    Raises Wrong where none came any more.
+    """
     arrived = [float(line) for line in heard.read_text(encoding="ascii").split()]
     for number, begun in enumerate(asked):
-        end = asked[number + 1] if number + 1 < len(asked) else float("inf")
-        first = next((at for at in arrived if begun <= at < end), None)
+        first = next((at for at in arrived if at >= begun), None)
         if first is None:
             raise Wrong(f"{bus}: stop {number + 1} of {len(asked)} did not arrive")
         yield Sample(bus, first - begun)

@@ -1,8 +1,8 @@
-"""The processes of `bench.estop`: whoever listens on a wire, the program that is stopped, and what keeps it from running.
+"""The processes of `bench.estop`: whoever listens on a wire, the program that is stopped, and what keeps it busy.
 
-    python -m bench.estop_parts wire BUS FAR FOLDER
-    python -m bench.estop_parts program STOPS FOLDER
-    python -m bench.estop_parts load
+python -m bench.estop_parts wire BUS FAR FOLDER
+python -m bench.estop_parts program STOPS FOLDER
+python -m bench.estop_parts load
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STOP_FRAMES = (bytes.fromhex("fffffe04032800d2"), bytes.fromhex("ffaa5e"))
 PIECE = b"\xff\xff\x02\x99" * 25
 EVERY = 0.001  # s: 100 bytes are what 1 Mbaud carries in it
 NODES = range(1, 7)
-REST = 0.005  # s between two stops
+REST = 0.05  # s between two stops, so that nothing of one is taken for the next
 
 
 def wire(bus: str, far: str, folder: str) -> None:
@@ -109,6 +109,10 @@ def load() -> None:
 
 
 if __name__ == "__main__":
-    {"wire": wire, "program": lambda times, folder: program(int(times), folder), "load": load}[sys.argv[1]](
-        *sys.argv[2:]
-    )
+    what, *words = sys.argv[1:]
+    if what == "wire":
+        wire(*words)
+    elif what == "program":
+        program(int(words[0]), words[1])
+    else:
+        load()

@@ -147,7 +147,10 @@ device moves one axis.
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *_file(), *_tables(), *_exits(), *_estops(), *_units(), CONVERSION, EDITS]).rstrip() + "\n"
+    return (
+        "\n".join([HEAD, *_file(), *_tables(), *_exits(), *_estops(), *_units(), CONVERSION, EDITS]).rstrip()
+        + "\n"
+    )
 
 
 def text_of_schema() -> str:
@@ -206,9 +209,9 @@ def _exits() -> Iterator[str]:
 
 def _estops() -> Iterator[str]:
     yield (
-        "## `estop`\n\nWhat an emergency stop does to an axis. What a device cannot do is refused before a port is opened: "
-        "`torque_off` and `hold` are for FEETECH servos, which let go if nothing is said; KST servos always hold; a stepper "
-        "controller has one kind of stop, and no such key. See [Stop](../how-to/stop.md).\n"
+        "## `estop`\n\nWhat an emergency stop does to an axis. What a device cannot do is refused before a port is "
+        "opened: `torque_off` and `hold` are for FEETECH servos, which let go if nothing is said; KST servos always "
+        "hold; a stepper controller has one kind of stop, and no such key. See [Stop](../how-to/stop.md).\n"
     )
     yield from listed(("estop", "means"), [[f"`{name}`", means] for name, means in ESTOPS.items()])
 

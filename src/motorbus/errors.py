@@ -29,15 +29,13 @@ likely cause and what to do. The parts are attributes too, so a program need not
 
 from __future__ import annotations
 
-from typing import Any
-
 
 class MotorbusError(Exception):
     """Base of every error of this package. `summary` is one line; the other parts may be empty."""
 
     unmoved = False
     """True where it is certain that nothing has moved for what was asked; False: it may have, or nobody said."""
-    so_far: Any = None
+    so_far: object = None
     """What there was by then of the result that was asked for, where that is of use: the trajectory that `teach` has
     seen. None where there is nothing."""
 

@@ -193,3 +193,9 @@ def test_stop_frames_are_small_enough_to_hurry(family: Family) -> None:
 
     nodes = dict.fromkeys(possible(family, IDS))
     assert all(air(exchange) < 0.02 for exchange in family.stop(nodes).exchanges)
+
+
+def test_who_can_hold_instead_of_letting_go_takes_whom_it_is_to_hold(family: Family) -> None:
+    stops, settings = family.link.stops, {option.name for option in family.link.settings}
+    assert set(stops) <= {"torque_off", "hold"}
+    assert ("estop_hold" in settings) == ("hold" in stops[1:])

@@ -81,8 +81,8 @@ def test_what_is_no_name_is_one_clear_error_and_sends_nothing() -> None:
 def test_its_clock_is_that_of_its_buses_which_is_ahead() -> None:
     with machine(arm="1", can="0x25") as (made, _), Robot.of(made) as robot:
         before = robot.now
-        robot.buses["arm"].run(iter(Pause(1.5)))
+        robot.buses["arm"].run(iter(Pause(1.5)))  # type: ignore[attr-defined]
         assert robot.now - before == pytest.approx(1.5, abs=0.3)
         at = robot.now
-        robot.buses["can"].run(iter(Pause(0.1)))
+        robot.buses["can"].run(iter(Pause(0.1)))  # type: ignore[attr-defined]
         assert robot.now == at

@@ -111,6 +111,7 @@ def test_a_port_that_dies_takes_nothing_along_of_what_was_taught(
         lost = pytest.raises(LinkLost)
         with lost as raised, Robot.of(made) as robot:
             robot.teach(until=over)
+        assert isinstance(raised.value.so_far, Trajectory)
         assert len(raised.value.so_far.times) in range(20, 31)  # a busy host may lose some of its own
 
 
@@ -199,6 +200,7 @@ def test_an_async_robot_keeps_what_was_taught_too() -> None:
 
                 with pytest.raises(NoReply) as raised:
                     await robot.teach(until=over)
+                assert isinstance(raised.value.so_far, Trajectory)
                 assert len(raised.value.so_far.times) == 21
 
     asyncio.run(main())

@@ -120,7 +120,7 @@ class BusFace:
         self.stopper.trigger()
 
     def latch(self) -> None:
-        """Refuse motion and torque until `reset`, as after an emergency stop that was given elsewhere; sends nothing."""
+        """Refuse motion and torque until `reset`, as an emergency stop that was given elsewhere; sends nothing."""
         with self.turns.lock:
             self.turns.latch(self.link.now())
             self.turns.stopped()

@@ -30,7 +30,8 @@ BY_HAND: Final = "cut the power by hand"
 app = App(
     name="estop",
     help_epilogue="""THE ARM WILL SAG: an emergency stop cuts the torque of FEETECH servos, and
-nothing holds them up then. `motorbus stop` decelerates and holds instead. KST
+nothing holds them up then, but for axes whose machine file says estop = "hold"
+(or --estop-hold IDS). `motorbus stop` decelerates and holds instead. KST
 servos have no torque switch: their target becomes the place where they were
 last seen, or asked for now, and they hold there. A stepper controller is told
 to end its project and to stop its motor, as fast as its stop mode says.

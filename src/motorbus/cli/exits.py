@@ -42,7 +42,7 @@ MEANINGS: Final[Mapping[Exit, str]] = {
     Exit.PARTIAL: "part of it was done; the rest is named on stderr",
     Exit.DEVICE_REFUSED: "a device answered and said no",
     Exit.UNSAFE: "refused as unsafe: outside the limits, or it needs --yes or --expert",
-    Exit.VERIFICATION_FAILED: "what was read back differs from what was written",
+    Exit.VERIFICATION_FAILED: "what was read back is not what was written, or what was stopped was not seen to rest",
     Exit.CANCELLED: "cancelled before it was complete",
 }
 

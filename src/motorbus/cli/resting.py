@@ -1,4 +1,4 @@
-"""What `motorbus stop --verify` adds: whether what was stopped was seen to rest, looked at when everyone was stopped."""
+"""What `motorbus stop --verify` adds: whether what was stopped is seen to rest, when everyone has been stopped."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 BY_HAND: Final = "stop it once more, or cut the power by hand"
 
 
-def look(results: Sequence[dict[str, Any]], options: Mapping[str, str], output: Output) -> list[MotorbusError]:
+def look(
+    results: Sequence[dict[str, Any]], options: Mapping[str, str], output: Output
+) -> list[MotorbusError]:
     """Look at each that has accepted a stop, and write into its result what was seen: `rest` and `evidence`.
 
     Gives an error for each that tells where it is and was not seen to rest. Of one that does not tell it nobody ever

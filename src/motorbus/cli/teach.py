@@ -180,8 +180,10 @@ def _rescued(smooth: float, file: Path) -> Iterator[None]:
 
 def _rescue(error: MotorbusError, smooth: float, file: Path) -> None:
     """Write what was recorded before this error, and add to it what is kept."""
-    taught: Trajectory | None = error.so_far
-    if taught is None:
+    from motorbus.motion.trajectory import Trajectory
+
+    taught = error.so_far
+    if not isinstance(taught, Trajectory):
         return
     with suppress(MotorbusError):  # what cannot be smoothed is kept as it is
         taught = taught.smoothed(smooth) if smooth else taught

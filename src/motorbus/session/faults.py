@@ -17,9 +17,6 @@ from motorbus.motion.body import Body
 from motorbus.motion.safety import canary
 from motorbus.session.keeping import unfinished
 
-UNTRUSTED = "untrusted: "
-"""How the reason of a fault begins that only `motorbus recover` ends."""
-
 
 def faults(body: Body) -> dict[str, str]:
     """Why each axis is at fault that is, by its name."""
@@ -31,7 +28,7 @@ def clear(body: Body, names: str | Iterable[str] | None) -> None:
     Refused, when none was cleared, for one whose guarded change is unfinished still."""
     axes = body.chosen(names)
     for axis in axes.values():
-        if canary.why(axis).startswith(UNTRUSTED) and (text := _in_doubt(body, axis)):
+        if canary.why(axis).startswith(canary.UNTRUSTED) and (text := _in_doubt(body, axis)):
             raise Refused(
                 f"{axis.name} is {text}",
                 reason="fault",
@@ -58,7 +55,7 @@ def _in_doubt(body: Body, axis: Any) -> str:
     if change is None or change.facts.get(READABLE) or axis.spec.node not in _concerned(change):
         return ""
     what = change.what or f"{change.verb}() of {axis.spec.device}"
-    return f"{UNTRUSTED}{what} did not come to its end; `motorbus recover {change.bus}` ends it"
+    return f"{canary.UNTRUSTED}{what} did not come to its end; `motorbus recover {change.bus}` ends it"
 
 
 def _concerned(change: Change) -> set[int]:

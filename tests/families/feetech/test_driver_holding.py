@@ -92,7 +92,7 @@ def test_of_a_map_that_nobody_has_described_nothing_but_the_switch_is_written() 
 
 def test_nobody_is_sent_turns_away() -> None:
     """Goals count over many turns (both limits 0), and its position is told within one (phase, bit 4)."""
-    both = {"min_position_limit": 0, "max_position_limit": 0}
+    both: dict[str, Any] = {"min_position_limit": 0, "max_position_limit": 0}
     assert resting(3, registers("sts", phase=0, **both)).address == 40
     assert resting(3, registers("sts", phase=0x10, **both)).address == 42
 

@@ -11,6 +11,7 @@ import pytest
 from motorbus.bus.turns import Turns
 from motorbus.core.operation import CanFrame, Effect, Exchange, Rank
 from motorbus.errors import Interrupted, NoReply
+from motorbus.motion.command import Command
 from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
 from motorbus.motion.loop.place import Place
 from motorbus.session.robot import Robot
@@ -109,6 +110,19 @@ def test_beginning_sets_the_cap_of_the_machine_file() -> None:
         part, bus = part_of(robot, "arm"), robot.buses["arm"]
         begun(part, bus)
         assert sims["arm"][1].memory["torque_limit"] == 400
+
+
+def test_the_command_over_who_begins_is_that_from_when_its_goal_was_set(arm: tuple[Part, Any, Any]) -> None:
+    part, bus, sim = arm
+    places = list(part.places.values())[:2]
+    for place in places:
+        place.claim = Command((place.axis,))
+    places[0].axis.orders += 1  # somebody tells it something before this gets to its bus
+    sim.line = line = Heard()
+    with pytest.raises(Interrupted, match="^a1: stopped from elsewhere"):
+        bus.run(part.begin(places))
+    assert not line.sent
+    assert not any(place.begun for place in places)
 
 
 def test_who_cannot_begin_goes_nowhere_and_is_led_by_nobody(arm: tuple[Part, Any, Any]) -> None:

@@ -235,3 +235,13 @@ def test_a_direct_goal_that_no_place_is_near_to_is_refused_with_clamp_too(axis: 
     with pytest.raises(LimitExceeded, match="one command may be"):
         one.judge(1)
     assert one.clamps == []
+
+
+def test_a_direct_goal_is_judged_by_its_way_when_it_may_be_sent_again(axis: Any) -> None:
+    one = place(axis, direct=True)
+    one.silent = one.endures + 1
+    one.asked = 10 * STEP
+    one.judge(1)  # it is not sent now
+    one.hear(pi, 1.0)
+    with pytest.raises(LimitExceeded, match="its limit is 90 deg/s"):
+        one.judge(1)

@@ -126,7 +126,7 @@ def test_a_direct_loop_goes_on_from_there_too() -> None:
         def lead(count: int) -> None:
             for _ in range(count):
                 for name in goals:
-                    goals[name] += 0.3 * STEP
+                    goals[name] += 0.6 * STEP
                 loop.goal.update(goals)
                 next(loop)
 

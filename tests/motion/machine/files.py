@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, get_args
 from hypothesis import strategies as st
 
 from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine
-from motorbus.motion.machine.model import Exit
+from motorbus.motion.machine.model import Estop, Exit
 
 GOOD = """\
 # The bench in the cellar.
@@ -185,6 +185,7 @@ def axes(draw: st.DrawFn, device: str = "arm#1") -> AxisSpec:
     limits = draw(st.sampled_from([{}, {"low": low, "high": high}]))
     inside = st.floats(low, high)
     exit_: Exit = draw(st.sampled_from(get_args(Exit)))
+    estop: Estop | None = draw(st.sampled_from([None, *get_args(Estop)]))
     caps = [{}, {"torque": draw(st.floats(1e-3, 1))}, {"current": draw(st.floats(1e-3, 100))}]
     return AxisSpec(
         device=device,
@@ -197,6 +198,7 @@ def axes(draw: st.DrawFn, device: str = "arm#1") -> AxisSpec:
         max_acceleration=draw(st.floats(1e-3, 1e3)),
         max_step=draw(st.none() | st.floats(1e-3, 1e3)),
         exit=exit_,
+        estop=estop,
         guard=draw(st.booleans()),
         park=draw(inside) if exit_ == "park" else None,
         **limits,

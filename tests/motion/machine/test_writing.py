@@ -52,6 +52,7 @@ max_acceleration = "360 deg/s2"
 exit = "park"
 park = "0 deg"                  # where parking goes; needed with exit = "park"
 current = "0.4 A"               # cap of its current; not with `torque`
+guard = false                   # whether a movement ends when its motor pushes too hard for too long, or is too hot
 
 [axis.slide]
 device = "gimbal#0x25"

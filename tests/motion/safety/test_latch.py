@@ -22,7 +22,7 @@ from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
 from motorbus.core.operation import CanFrame, Data, Effect, Exchange, Goal
 from motorbus.errors import MotorbusError
 from tests.motion.machines import listened, machine
-from tests.motion.safety.test_points import asks, sent
+from tests.motion.safety.points import asks, sent
 
 ROOT = Path(__file__).parents[3]
 

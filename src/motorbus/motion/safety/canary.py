@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 HEALTH: Final = 0.25
 """s after which an axis is asked again how it fares."""
+UNTRUSTED: Final = "untrusted: "
+"""How the reason of a fault begins that only `motorbus recover` ends."""
 RESTART: Final = "restart"
 LET_GO: Final = "let go"
 PROTECTIVE: Final = frozenset(("sensor", "temperature", "current", "overload"))
@@ -156,10 +158,11 @@ def why(axis: AxisVerbs) -> str:
 def check(axis: AxisVerbs) -> None:
     """Raise Refused while it is at fault: before anything is sent that would move it or give it torque."""
     if text := why(axis):
+        see = f'see to it, then robot.clear_fault("{axis.name}"), or open the machine anew'
         raise Refused(
             f"{axis.name} is at fault: {text}",
             reason="fault",
-            advice=f'see to it, then robot.clear_fault("{axis.name}"), or open the machine anew; nothing was sent',
+            advice=f"{'end that change first' if text.startswith(UNTRUSTED) else see}; nothing was sent",
             node=axis.spec.node,
         )
 

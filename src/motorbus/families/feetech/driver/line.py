@@ -35,6 +35,8 @@ _ADAPTER: Final = 0.016
 _SCHEDULING: Final = 0.005
 """s; how late a loaded host may run between two bytes that belong together."""
 
+AT_ONCE: Final = 60
+"""Servos that one frame of a stop lets go: 128 bytes, so that what comes next never waits long."""
 ID: Final = 5
 PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
 """Bytes a probe reads from register 5 on. Never 2, whose reply is as long as the echo of its request, and none
@@ -114,9 +116,8 @@ def _everyone() -> Exchange[Answer]:
 
 def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Answer]]:
     """Torque off to these and to nobody else, as many frames as that takes; nobody answers."""
-    capacity = wire.sync_write_capacity(len(LIMP.data))
-    for start in range(0, len(nodes), capacity):
-        items = [(node, LIMP.data) for node in nodes[start : start + capacity]]
+    for start in range(0, len(nodes), AT_ONCE):
+        items = [(node, LIMP.data) for node in nodes[start : start + AT_ONCE]]
         yield Exchange(
             wire.sync_write(LIMP.address, items), (), rank=Rank.STOP, effect=LIMP.effect, repeatable=True
         )

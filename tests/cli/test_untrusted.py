@@ -1,0 +1,41 @@
+"""An axis whose guarded change was cut off: no command moves it or gives it torque, and each says what ends that."""
+
+from __future__ import annotations
+
+import pytest
+
+import motorbus
+from motorbus.cli.exits import Exit
+from motorbus.core.operation import INTENT, OUTCOME, Journal
+from tests.cli.conftest import Bench, Run
+
+
+def noted(bench: Bench, state: str, **facts: object) -> None:
+    """It stands in the journal of the bus of the arm."""
+    with motorbus.open(bench.simulations["arm"].url) as bus:
+        assert bus.journal is not None
+        bus.journal(Journal("set_id", state, {"node": 1, "new": 9, **facts}))
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["move a1=10deg", "move a1=10deg a2=10deg", "torque on a1", "hold a1", "jog a1=5deg/s --seconds 1"],
+)
+def test_what_moves_it_or_gives_it_torque_is_refused_and_says_what_ends_that(
+    command: str, bench: Bench, run: Run
+) -> None:
+    noted(bench, INTENT)
+    told = run(*command.split())
+    assert told.code == Exit.UNSAFE
+    assert "a1 is at fault: untrusted: " in told.err
+    assert "of arm#1 did not come to its end" in told.err
+    assert "motorbus recover" in told.err
+    assert "nothing was sent" in told.err
+    noted(bench, OUTCOME, outcome="taken back")
+    assert run(*command.split()).code == 0
+
+
+def test_stop_and_torque_off_go(bench: Bench, run: Run) -> None:
+    noted(bench, INTENT)
+    assert run("stop", "a1").code == 0
+    assert run("torque", "off", "a1").code == 0
