@@ -6,7 +6,8 @@ Four buses of one program, each on a pseudo-terminal of its own: six servos, a s
 somebody talks without a pause, and one from which nobody reads. The first two are simulated in processes of their own.
 Whoever listens on the wire is another process, and its clock counts: from the moment at which the program asks for the
 stop to the first byte that arrives there. Meanwhile a thread polls, and processes that only compute keep every
-processor busy, two for each.
+processor busy, two for each. The program and whoever listens have real-time priority where that is permitted, as a
+program that moves a machine would; without it the figure is that of the scheduler on a machine that others use too.
 """
 
 from __future__ import annotations

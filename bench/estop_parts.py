@@ -22,7 +22,8 @@ STOP_FRAMES = (bytes.fromhex("fffffe04032800d2"), bytes.fromhex("ffaa5e"))
 """Torque off for everyone on a FEETECH bus; the end of a stepper's project."""
 PIECE = b"\xff\xff\x02\x99" * 25
 EVERY = 0.001  # s: 100 bytes are what 1 Mbaud carries in it
-NODES = range(1, 7)
+NODES = tuple(range(1, 7))
+TRIES = 20
 REST = 0.05  # s between two stops, so that nothing of one is taken for the next
 
 
@@ -75,10 +76,9 @@ def program(stops: int, folder: str) -> None:
     places = {"arm": f"feetech:{folder}/arm", "stage": f"stepper:{folder}/stage"}
     places |= {"noisy": f"feetech:{folder}/noisy", "blocked": f"feetech:{os.ttyname(slave)}"}
     buses: dict[str, Any] = {name: motorbus.open(place) for name, place in places.items()}
-    for node in NODES:
-        buses["arm"].run(buses["arm"].family.identify(node))
-    with suppress(MotorbusError):
-        buses["stage"].run(buses["stage"].family.identify(1))
+    for name, nodes in (("arm", NODES), ("stage", (1,))):
+        for node in nodes:
+            _met(buses[name], node)
     over = Event()
     for name in ("arm", "noisy"):
         Thread(target=_polls, args=(buses[name], over), daemon=True).start()
@@ -92,6 +92,20 @@ def program(stops: int, folder: str) -> None:
         reset(body)
     over.set()
     os.close(blocked)
+
+
+def _first() -> None:
+    """With the priority of what moves a machine, where that is permitted; whoever listens must not be late either."""
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+
+
+def _met(bus: Any, node: int) -> None:
+    """It has answered once, so that the stop knows it; where nothing runs in time it is asked again."""
+    for _ in range(TRIES):
+        with suppress(MotorbusError):
+            bus.run(bus.family.identify(node))
+            return
 
 
 def _polls(bus: Any, over: Event) -> None:
@@ -110,6 +124,8 @@ def load() -> None:
 
 if __name__ == "__main__":
     what, *words = sys.argv[1:]
+    if what != "load":
+        _first()
     if what == "wire":
         wire(*words)
     elif what == "program":

@@ -325,8 +325,10 @@ _STOPS = """
 From the moment at which a program asks for an emergency stop of a machine to the first byte of it that arrives at the
 other end of a pseudo-terminal, by the clock of whoever listens there. Four buses in one program: six servos that a
 thread polls, a stepper controller, a line on which somebody talks without a pause, and one from which nobody reads.
-Devices and listeners are processes of their own, and for each processor two more processes only compute. On a real line
-what is being said when the stop is asked for adds the rest of its time: see [Safety](explanation/safety.md).
+Devices and listeners are processes of their own, and for each processor two more processes only compute. Program and
+listeners have real-time priority where that is permitted; without it the last thousandth shows how long the system lets
+a process wait that others compute beside. On a real line what is being said when the stop is asked for adds the rest of
+its time: see [Safety](explanation/safety.md).
 
 """
 

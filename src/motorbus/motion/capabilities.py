@@ -190,6 +190,7 @@ class AxisVerbs:
         Where the position is reckoned it is not known until `arrives`. Raises as `refuse_under_way`.
         """
         self.refuse_under_way()
+        canary.expected(self)
         self.orders += 1
         begun = Movement(accounted=False) if movement is None else movement
         begun.engaged, begun.under_way = self.engaged, self.under_way
@@ -330,6 +331,7 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
     fault.
     """
     canary.check(axis)
+    canary.expected(axis)
     axis.orders += 1
     command = Command([axis])
     axis.engaged = True

@@ -13,7 +13,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import Interrupted, LimitExceeded, LinkError, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
-from motorbus.motion.loop.readings import PATIENCE
+from motorbus.motion.loop.readings import patience
 from motorbus.session.robot import Robot
 from tests.motion.machines import Heard, machine
 
@@ -168,10 +168,12 @@ def test_who_is_silent_too_long_ends_it_by_name() -> None:
     with looping(arm="1-3") as (_, loop, sims):
         cycles(loop, 2)
         sims["arm"][2].unplug()
-        cycles(loop, PATIENCE)
-        with pytest.raises(NoReply, match=f"a2: no reading in {PATIENCE + 1} cycles"):
+        cycles(loop, patience(RATE))
+        with pytest.raises(NoReply, match=f"a2: no reading in {patience(RATE) + 1} cycles"):
             next(loop)
         sims["arm"][2].plug()
+        with suppress(NoReply):  # who was silent for long is left alone by the bus for as long
+            cycles(loop, 80)
         assert not cycles(loop, 20).missing  # it can go on
 
 

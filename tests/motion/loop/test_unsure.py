@@ -14,7 +14,7 @@ from motorbus.core.operation import CanFrame
 from motorbus.errors import NoReply
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.place import STALE
-from motorbus.motion.loop.readings import PATIENCE
+from motorbus.motion.loop.readings import PATIENCE, patience
 from motorbus.session.robot import Robot
 from tests.motion.loop.lines import Doubtful
 from tests.motion.loop.test_rounds import RATE, cycles, looping
@@ -95,8 +95,8 @@ def test_the_limit_after_which_it_is_an_error_stays_and_comes_again() -> None:
         loop.goal.update(dict.fromkeys(loop.axes, 1.0))
         cycles(loop, 20)
         line.mute = {2}
-        for silent in (PATIENCE + 1, 2 * (PATIENCE + 1)):
-            cycles(loop, PATIENCE)
+        for silent in (patience(SLOW) + 1, 2 * (patience(SLOW) + 1)):
+            cycles(loop, patience(SLOW))
             with pytest.raises(NoReply, match=f"a2: no reading in {silent} cycles"):
                 next(loop)
         line.sent.clear()
@@ -202,7 +202,7 @@ def test_who_is_never_believed_ends_it_as_who_is_never_heard() -> None:
     with doubtful(rate=400.0) as (loop, line, _):
         loop.goal.update(dict.fromkeys(loop.axes, 0.0))
         cycles(loop, 20)
-        turn = iter(range(100))
+        turn = iter(range(1000))
         line.lying = {2: lambda raw: 300 + 3500 * (next(turn) % 2)}
         ordered(line)
         cycles(loop, PATIENCE)
@@ -246,7 +246,7 @@ def test_a_follower_stays_while_its_leader_is_not_heard_or_not_believed(silent: 
                     line.mute = {1}
                 else:
                     line.lying = {1: lambda raw: raw + FAR * (1 + next(lies) % 2)}
-            if number == 5 + PATIENCE - 1:
+            if number == 9:
                 line.mute, line.lying = set(), {}
                 sent.extend(ordered(line))
                 return True

@@ -12,6 +12,7 @@ from motorbus.motion.safety.watch import OVERDUE
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.motion.machines import Heard, machine
+from tests.motion.safety.test_canary import Drops
 
 
 def polls(line: Heard) -> list[int]:
@@ -161,3 +162,13 @@ class Deaf(Heard):
             self.dropped += 1
             return []
         return found
+
+
+def test_who_loses_his_supply_in_the_moment_he_is_given_torque_is_at_fault_and_not_called_stopped() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        sims["arm"].line = Drops(sims["arm"][1].power_cycle)
+        with robot.loop(100) as loop:
+            loop.goal["a1"] = 0.2
+            with pytest.raises(Faulted, match="a1 is at fault"):
+                next(iter(loop))
+        assert set(robot.faults) == {"a1"}

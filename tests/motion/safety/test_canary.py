@@ -82,14 +82,14 @@ def test_who_was_given_no_torque_may_be_limp() -> None:
 
 def test_torque_that_came_back_by_itself_hides_no_restart_from_who_leads_it() -> None:
     bird = Canary()
-    bird.arm(0)
+    bird.arm()
     assert bird.take(sample(), armed=True, led=True) == ""
     assert bird.take(sample(blank=True), armed=True, led=True) == RESTART
-    bird.arm(0)
+    bird.arm()
     assert (
         bird.take(sample(blank=True), armed=True, led=True) == ""
     )  # nothing was told to it that could be lost
-    bird.arm(0)
+    bird.arm()
     assert bird.take(sample(), armed=True, led=False) == ""
     assert bird.take(sample(blank=True), armed=True, led=False) == ""  # others may tell it how fast to be
 
@@ -103,7 +103,9 @@ def test_a_device_that_says_that_it_starts_has_restarted() -> None:
 def test_a_stop_since_it_got_torque_makes_torque_no_news() -> None:
     bird = Canary()
     assert not bird.is_armed(0)
-    bird.arm(4)
+    bird.prepare(4)
+    assert not bird.is_armed(4)
+    bird.arm()
     assert bird.is_armed(4)
     assert not bird.is_armed(5)
     bird.disarm()

@@ -162,7 +162,7 @@ def start_project(
 
 def _question(project: int, how: Behaviour, bus: Bus) -> str:
     one = face(bus, 1)
-    (goal,) = of_project(one, one.read_project(project).project, how)
+    goal, _ = of_project(one, one.read_project(project).project, how)
     if abs(goal.value) <= FAR:
         return ""
     return (

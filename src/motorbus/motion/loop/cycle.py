@@ -15,6 +15,7 @@ from motorbus.bus.pump import Bus
 from motorbus.core.family import Positions, Quality, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import (
+    Faulted,
     Interrupted,
     LimitExceeded,
     MotionError,
@@ -279,6 +280,8 @@ class Part:
         try:
             command.depart()
             angles = yield from _begun(train, command, self.watch)
+        except Faulted:
+            raise
         except MotionError as error:
             if lost := set(axes).difference(command.held()):
                 raise stopped([axis.name for axis in axes if axis in lost]) from error

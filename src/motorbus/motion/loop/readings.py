@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from math import ceil
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,10 +18,18 @@ if TYPE_CHECKING:
     from motorbus.motion.loop.place import Place
 
 PATIENCE: Final = 5
-"""Cycles in a row in which an axis may be silent; in the next one the loop raises NoReply."""
+"""Cycles in a row in which an axis may be silent at least, or tell what cannot be believed, before it is an error."""
+SILENCE: Final = 0.3
+"""s for which it may be silent at least, as while axes are led: a servo that has missed a reply is left alone for a
+while, and a computer that is busy answers late. It is not ordered meanwhile."""
 NOBODY: Final[frozenset[str]] = frozenset()
 NOWHERE: Final[Mapping[str, float]] = MappingProxyType({})
 SURE: Final[Mapping[str, Quality]] = MappingProxyType({})
+
+
+def patience(rate: float) -> int:
+    """Cycles in a row in which an axis may be silent, at so many in a second; in the next one it is an error."""
+    return max(PATIENCE, ceil(SILENCE * rate) - 1)
 
 
 class LoopState:
@@ -100,7 +109,9 @@ def state_of(
     for name, quality in doubts.items():
         statistics.suspect[name] += quality is Quality.SUSPECT
     unheard = {place.name: place for place in places if place.silent}
-    silent = [name for name, place in unheard.items() if place.silent % (PATIENCE + 1) == 0]
+    lasting = patience(statistics.rate) + 1
+    limits = {name: PATIENCE + 1 if name in doubts else lasting for name in unheard}
+    silent = [name for name, place in unheard.items() if place.silent % limits[name] == 0]
     if silent:
         raise silence(silent, unheard[silent[0]].silent, unheard, at)
     heard = {name: place.heard for name, place in unheard.items()}

@@ -30,7 +30,7 @@ from motorbus.motion.loop.braking import Works, braked, latest, refusals
 from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
 from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
-from motorbus.motion.loop.readings import PATIENCE, LoopState, state_of
+from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState, state_of
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named
 
@@ -151,15 +151,16 @@ class Rounds:
         return (place for part in self.parts.values() for place in part.places.values())
 
     def _first_look(self) -> Works:
-        unheard = set(self.places)
-        for _ in range(PATIENCE + 1):
+        unheard, begun, looks = set(self.places), self.now, 0
+        while looks <= PATIENCE or self.now < begun + SILENCE:
+            looks += 1
             told = yield Abreast({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
             for bus, part in self.parts.items():
                 missing = part.take(told[bus])
                 unheard -= {place.name for place in part.places.values()} - set(missing)
             if not unheard:
                 return
-        raise silence(sorted(unheard), PATIENCE + 1, self.places, self.now)
+        raise silence(sorted(unheard), looks, self.places, self.now)
 
     # -- a round -------------------------------------------------------------------------------------------------------
 

@@ -41,18 +41,23 @@ class Canary:
     """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s);
     `fell` is true where it had torque from here when it came to be at fault, until it is given some again."""
 
-    __slots__ = ("_blank", "_restarts", "_stops", "at", "fell")
+    __slots__ = ("_before", "_blank", "_restarts", "_stops", "at", "fell")
 
     def __init__(self) -> None:
         self.at = -inf
         self.fell = False
+        self._before: int | None = None
         self._stops: int | None = None
         self._blank: bool | None = None
         self._restarts: int | None = None
 
-    def arm(self, stops: int) -> None:
-        """It has been given torque, when so many stops had left for it: from here on torque that is gone is a fault."""
-        self._stops, self._blank, self.fell = stops, None, False
+    def prepare(self, stops: int) -> None:
+        """It is about to be given torque; so many stops have left for it by now."""
+        self._before = stops
+
+    def arm(self) -> None:
+        """It has been given torque: from here on torque that is gone is a fault, unless it was stopped meanwhile."""
+        self._stops, self._blank, self.fell = self._before, None, False
 
     def disarm(self) -> None:
         """It was let go, or is at fault: what its torque does is no news."""
@@ -60,7 +65,7 @@ class Canary:
 
     def is_armed(self, stops: int) -> bool:
         """Whether it was given torque, and no stop has left for it since."""
-        return self._stops == stops
+        return self._stops is not None and self._stops == stops
 
     def take(self, health: Health, *, armed: bool, led: bool) -> str:
         """Judge how a device fares: "" or the reason of a fault. Each sample once.
@@ -117,9 +122,14 @@ def kept(axis: AxisVerbs) -> Operation[None]:
         raise error
 
 
+def expected(axis: AxisVerbs) -> None:
+    """It is about to be given torque from here. A stop that comes from now on explains why it has none."""
+    axis.canary.prepare(_stops(axis))
+
+
 def armed(axis: AxisVerbs) -> None:
-    """It has been given torque from here."""
-    axis.canary.arm(_stops(axis))
+    """It has been given torque from here, since it was `expected`."""
+    axis.canary.arm()
 
 
 def fault(axis: AxisVerbs, why: str) -> None:

@@ -20,7 +20,9 @@ from motorbus.families.feetech.driver.node import IMAGE, Node, checked_id
 from motorbus.families.feetech.driver.torque import LIMP, TORQUE_ENABLE
 from motorbus.families.feetech.table import Mode
 
-PROMISE: Final = "those that hold: goal := present position, or velocity 0, accepted; standstill was not verified"
+PROMISE: Final = (
+    "those that hold: goal := present position, or velocity 0, accepted; standstill was not verified"
+)
 """What it promises of these; where nothing but torque off is known to stop a servo, that is what it got."""
 COUNT: Final = PRESENT + 2
 """Registers 0 to 57, which say all: 0.7 ms on the wire at 1 Mbaud."""
