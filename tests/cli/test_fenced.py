@@ -72,7 +72,9 @@ def test_a_file_that_nobody_understands_bounds_nothing_and_says_so(run: Run, ben
     assert "bound nothing here" in ran.err
 
 
-def test_a_bus_that_is_not_in_the_file_has_the_limits_of_its_devices(run: Run, bench: Bench, arm: object) -> None:
+def test_a_bus_that_is_not_in_the_file_has_the_limits_of_its_devices(
+    run: Run, bench: Bench, arm: object
+) -> None:
     url = arm.url  # type: ignore[attr-defined]
     ran = run("write", f"{url}#1", "goal_position=340deg")
     assert (ran.code, ran.err) == (0, "")

@@ -6,7 +6,7 @@ left them. When it ends in any other way, each axis ends as its `exit` in the ma
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
 from msgspec import structs
@@ -16,7 +16,8 @@ from motorbus.cli import dry, faces
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.machine import machine
 from motorbus.cli.output import Bar
-from motorbus.cli.target import face, said, traced
+from motorbus.cli.target import face, said
+from motorbus.cli.traced import traced
 from motorbus.cli.wording import in_words_of_the_shell, shell_words
 from motorbus.core.operation import Progress
 from motorbus.errors import MotorbusError, RequestError
@@ -98,12 +99,12 @@ def robot(
     wanted = with_options(machine(), axes, options)
     hand = InHand(output)
     try:
-        with opened(wanted, axes, output, late=late, report=hand.heard) as hand.robot:
+        with ExitStack() as told, opened(wanted, axes, output, late=late, report=hand.heard) as hand.robot:
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
                 output.note(f"note: {shell_words(warning, bus=warning.partition(':')[0])}")
             for bus in hand.robot.buses.values():
-                traced(bus)
+                told.enter_context(traced(bus))
             yield hand
             for axis in hand.robot.axes.values():
                 axis.engaged = False

@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus import families
-from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli import faces
 from motorbus.cli.estops import with_estops
 from motorbus.cli.fenced import fenced
 from motorbus.cli.machine import addresses
+from motorbus.cli.traced import traced
 from motorbus.cli.wording import in_words_of_the_shell, shell_words
 from motorbus.core.operation import Progress
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
@@ -23,7 +23,6 @@ from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from motorbus.bus.face import BusFace
     from motorbus.bus.pump import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.cli.output import Output
@@ -113,10 +112,9 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
         if say is not None and (text := say(event)):
             output.note(f"note: {text}")
 
-    with session.open(bus, report=tell, **with_estops(bus, said(options))) as found:
+    with session.open(bus, report=tell, **with_estops(bus, said(options))) as found, traced(found):
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
-        traced(found)
         fenced(found, bus, output)
         for warning in found.warnings:
             output.note(f"note: {shell_words(warning, found.family, bus)}")
@@ -130,23 +128,9 @@ def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus
                 LOG.info("#%d: sent %d, ok %d, retries %d", node, counts.sent, counts.ok, counts.retries)
 
 
-def traced(bus: BusFace) -> None:
-    """With -vv, log all that is sent and delivered on this bus from here on."""
-    if LOG.isEnabledFor(logging.DEBUG):
-        bus.trace.add(_Told(0))
-
-
 def said(options: Mapping[str, str]) -> dict[str, str]:
     """Options of the bus string as they were said by flags: --id-format is id_format."""
     return {name.replace("-", "_"): value for name, value in options.items()}
-
-
-class _Told(Subscription[TraceRecord]):
-    """Logs every request and delivery at the moment it happens."""
-
-    def put(self, record: TraceRecord) -> None:
-        shown = record.data.hex(" ").upper() if isinstance(record.data, bytes) else record.data
-        LOG.debug("%s %s", record.direction, shown)
 
 
 def face(bus: Bus | DryBus, node: int) -> Any:

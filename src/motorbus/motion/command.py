@@ -204,7 +204,7 @@ def _lost(axis: AxisVerbs) -> Interrupted:
     return Interrupted(
         f"{axis.name}: the movement was ended by another order",
         cause="it was stopped, let go or told to move from elsewhere",
-        advice="the others of the movement were stopped; give the order again if it is still wanted",
+        advice="the others of the movement were told to stop; give the order again if it is still wanted",
         node=axis.spec.node,
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, isfinite
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from motorbus.core import units
 from motorbus.core.entry import shown
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 Device: TypeAlias = "tuple[float, float] | None"
 """The device's own lowest and highest position (rad of the device), None where it has or tells none."""
+
+SLOWEST: Final = 4.0
+"""Hz: a small goal is one period ahead, and a host that dies must not leave more than 0.25 s of travel."""
 
 
 class Bounds(NamedTuple):
@@ -208,3 +211,13 @@ def _key(found: Bounds) -> str:
         "the soft limits": "low and high of the axis",
         "the device": "the limit registers of the device",
     }.get(found.whose, "low and high of the axis, or the limit registers of the device")
+
+
+def refuse_slow(rate: float) -> None:
+    """Raise RequestError for a rate (Hz) at which the small goals of a loop would be too far ahead."""
+    if rate < SLOWEST:
+        raise RequestError(
+            f"a loop at {rate:.6g} Hz only looks: its goals would be {1 / rate:.3g} s ahead",
+            expected=f"{SLOWEST:g} Hz or more, for so far a motor may go whose host has died",
+            advice="take a higher rate to lead axes, or move() for a way of its own; nothing was sent",
+        )

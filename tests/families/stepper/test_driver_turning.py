@@ -80,7 +80,9 @@ def test_what_may_turn_refuses_until_its_time_is_over() -> None:
     node.memory.owed = True
     with pytest.raises(RequestError, match="may still run, so jog\\(\\) is refused") as told:
         looks(refuse_unless_idle(node, "jog()"), 1e6)
-    assert "a project that runs until it is stopped has none" in told.value.advice, "it may be waited for in vain"
+    assert "a project that runs until it is stopped has none" in told.value.advice, (
+        "it may be waited for in vain"
+    )
 
 
 def test_the_slowest_reading_counts_for_slowing_down_too() -> None:

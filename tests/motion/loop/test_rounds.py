@@ -325,3 +325,16 @@ def test_no_small_goal_runs_away_while_the_settings_of_another_servo_are_not_kno
         assert 0 <= gone(loop, "a1") < 2 * radians(90) / RATE
         servo.limits = known
         assert cycles(loop, 150).position == pytest.approx({"a1": 2.0, "c1": 0.7}, abs=0.02)
+
+
+def test_a_loop_that_is_too_slow_to_lead_only_looks() -> None:
+    with looping(arm="1-2", rate=3.9) as (_, loop, sims):
+        with pytest.raises(RequestError, match="only looks") as refused:
+            loop.goal["a1"] = 0.5
+        assert "4 Hz or more" in str(refused.value)
+        assert not cycles(loop, 2).missing
+        assert sims["arm"][1].memory["torque_enable"] == 0
+    with looping(arm="1-2", rate=4.0) as (_, loop, sims):
+        loop.goal["a1"] = 0.1
+        cycles(loop, 8)
+        assert sims["arm"][1].memory["torque_enable"] == 1

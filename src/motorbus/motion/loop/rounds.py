@@ -170,10 +170,11 @@ class Rounds:
         if place is None or type(goal) is not float:
             goal = self.check(name, goal)
             place = self.places[name]
-        place.asked = goal
         if not place.begun:
+            limits.refuse_slow(self.rate)
             place.claim = Command((place.axis,))
             self._fresh = True
+        place.asked = goal
 
     def check(self, name: str, goal: float) -> float:
         """Raise RequestError for an axis that is not in the loop, what is no number, and outside the `with`."""

@@ -27,7 +27,7 @@ def behind(
         cause=_cause(
             alarms, "something blocks it, the load is too heavy, or it is slower than max_velocity says"
         ),
-        advice="clear the way, move slower, or change the limits of the axis; all of the movement were stopped",
+        advice="clear the way, move slower, or change the limits of the axis; all of the movement were told to stop",
         node=spec.node,
     )
 
@@ -54,7 +54,7 @@ def not_there(
             [alarm for one in short for alarm in alarms[one.name]],
             "something blocks it, the load is too heavy, or its torque is bounded",
         ),
-        advice="clear the way, allow it more torque, or give a wider tolerance; all of the movement were stopped",
+        advice="clear the way, allow it more torque, or give a wider tolerance; all of the movement were told to stop",
         node=first.spec.node,
     )
 

@@ -25,6 +25,7 @@ from motorbus.errors import (
     RequestError,
     Stalled,
 )
+from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moving.forgiving import forgiven
 from motorbus.motion.moving.lagging import behind, not_there, silent
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
 
 USUAL: Final = 100.0
 """Hz at which axes are led where the wire carries twice as much."""
-SLOWEST: Final = 4.0
-"""Hz: a goal is one period ahead, and a host that dies must not leave more than 0.25 s of travel."""
 SHARE: Final = 0.5
 """Of what the wire carries: the rest is for others, and for a reply that has to be asked for again."""
 TOLERANCE: Final = 0.02
@@ -113,11 +112,11 @@ def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: flo
     cycle = (*train.goals(angles), *train.positions)
     highest = 1 / sum(bus.family.air_time(one, bus.rate) for one in cycle)
     if asked is None:
-        asked = min(USUAL, max(SHARE * highest, SLOWEST))
-    if not SLOWEST <= asked <= highest:
+        asked = min(USUAL, max(SHARE * highest, limits.SLOWEST))
+    if not limits.SLOWEST <= asked <= highest:
         raise RequestError(
             f"{asked:.6g} Hz is not possible here",
-            expected=f"{SLOWEST:g} Hz or more, for so far goals may be ahead of who dies, at most {highest:.4g} Hz",
+            expected=f"{limits.SLOWEST:g} Hz or more, so that a host that dies leaves no more; {highest:.4g} Hz at most",
             cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} of these",
             advice=f"take another, or a quicker line; {NOTHING}",
         )

@@ -216,7 +216,7 @@ def _overloaded(axis: AxisVerbs, strain: Strain, now: float) -> Overloaded:
             reason="heat",
             expected=f"below {bearable.hot:g} °C, and once it is too hot below {bearable.cool:g} °C again",
             cause="it holds or moves too much for too long, or its surroundings are hot",
-            advice=f"take the load off it and let it cool; all of the movement were stopped, and {keeps}",
+            advice=f"take the load off it and let it cool; all of the movement were told to stop, and {keeps}",
             node=spec.node,
         )
     since = 0.0 if strain.since is None else now - strain.since
@@ -226,6 +226,6 @@ def _overloaded(axis: AxisVerbs, strain: Strain, now: float) -> Overloaded:
         expected=f"less than {bearable.seconds:g} s of load {bearable.load:.0%} or {bearable.current:g} A while it is "
         f"more than {bearable.off:g} rad of its device off its goal",
         cause="something blocks it, or the load is too heavy",
-        advice=f"clear the way, or take the load off it; all of the movement were stopped, and {keeps}",
+        advice=f"clear the way, or take the load off it; all of the movement were told to stop, and {keeps}",
         node=spec.node,
     )
