@@ -116,7 +116,7 @@ def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: flo
     if not limits.SLOWEST <= asked <= highest:
         raise RequestError(
             f"{asked:.6g} Hz is not possible here",
-            expected=f"{limits.SLOWEST:g} Hz or more, so that a host that dies leaves no more; {highest:.4g} Hz at most",
+            expected=f"{limits.SLOWEST:g} Hz or more, so a host that dies leaves no more; {highest:.4g} Hz at most",
             cause=f"{bus.rate} bit/s carry no more cycles of {len(train.nodes)} of these",
             advice=f"take another, or a quicker line; {NOTHING}",
         )
