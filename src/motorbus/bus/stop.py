@@ -55,6 +55,13 @@ class Wish:
         self.fulfilled = Event()
 
 
+def _no_thread() -> LinkError:
+    return LinkError(
+        "the system gives no more threads, and what moves needs one that can stop it",
+        advice="end what holds so many threads; nothing was sent",
+    )
+
+
 class Stopper:
     """The emergency stop of one bus."""
 
@@ -71,12 +78,19 @@ class Stopper:
         self._closed = False
 
     def start(self) -> None:
-        """Have the stop thread ready; does nothing when it is, or where time is virtual."""
+        """Have the stop thread ready; does nothing when it is, or where time is virtual.
+
+        Raises LinkError where the system gives no more threads: nothing is sent then that might have to be stopped.
+        """
         with self._starting:
             if self._thread is None and not self.link.virtual and not self._closed:
-                self._pair = socket.socketpair()
-                self._thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
-                self._thread.start()
+                self._pair = self._pair or socket.socketpair()
+                thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
+                try:
+                    thread.start()
+                except RuntimeError as none:
+                    raise _no_thread() from none
+                self._thread = thread
                 self._ready.wait(PATIENCE)
                 atexit.register(self.close)  # a process that ends lets a stop that has begun come to its end
 
@@ -95,7 +109,10 @@ class Stopper:
             raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
         if self.link.virtual:
             return self.stop()
-        self.start()
+        try:
+            self.start()
+        except LinkError:  # no thread is to be had: whoever calls does the work
+            return self.stop()
         wish = Wish()
         self._wishes.append(wish)
         self.trigger()

@@ -137,3 +137,13 @@ def test_the_same_holds_on_an_event_loop() -> None:
     import asyncio
 
     asyncio.run(_moves())
+
+
+def test_axes_of_the_file_that_were_not_opened_are_guarded_too() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made, "a1") as robot:
+        other = robot.buses["arm"].family.devices.blocking(robot.buses["arm"], 2)
+        other.enable_torque()
+        with pytest.raises(LimitExceeded, match="a2"):
+            other.move(pi + 3.0, velocity=1.0)
+        assert sims["arm"][2].raw_position == 2048
+        other.move(pi + 0.1, velocity=1.0)

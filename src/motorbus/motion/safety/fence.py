@@ -12,6 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from motorbus.core.operation import Runnable
+from motorbus.errors import RequestError
 from motorbus.motion.reckoning import UNDER_WAY, Reckoning
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
@@ -29,6 +30,8 @@ def fence(body: Body) -> None:
         if isinstance(bus.admit, Gate):
             _watched(bus, bus.admit)
             bus.admit.attended, bus.admit.origin = True, body.origins[name]
+    for name, bus in body.buses.items():  # those of the file that were not opened are there all the same
+        enclose(bus, {one: spec for one, spec in body.machine.axes.items() if spec.bus == name})
     for axis in body.axes.values():
         gate = body.buses[axis.spec.bus].admit
         if isinstance(gate, Gate):
@@ -44,7 +47,10 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
         return
     _watched(bus, bus.admit)
     for name, spec in axes.items():
-        device = bus.family.devices.blocking(bus, spec.node)
+        try:
+            device = bus.family.devices.blocking(bus, spec.node)
+        except RequestError:  # an id that cannot be is nobody's
+            continue
         position = getattr(type(device), "position", None)
         ask = None if position is None else partial(position.function, device)
         bus.admit.guards[spec.node] = _guard(name, spec, ask)
