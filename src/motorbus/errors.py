@@ -136,8 +136,8 @@ class MotionError(MotorbusError):
 class Refused(MotionError):
     """Motion was refused before anything was sent: `reason` is one word for programs.
 
-    "limits", "step" (too far from where it is), "stale" or "suspect" (of the position by which it would be judged),
-    "fault", "lease" or "unattended".
+    "limits", "step" (too far from where it is), "velocity" (too far without one), "stale" or "suspect" (of the position
+    by which it would be judged), "fault", "lease" or "unattended".
     """
 
     unmoved = True

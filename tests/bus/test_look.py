@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Thread
 from typing import Any
 
 import pytest
 
+from motorbus.bus.look import questions
 from motorbus.bus.pump import Bus
 from motorbus.bus.run import LOOKS
 from motorbus.core.operation import Alone, Effect, Exchange, Operation, Runnable, Together
@@ -15,6 +17,28 @@ from motorbus.families.feetech import wire
 from tests.bus.responder import Responder, memory_bus, position, write
 
 GOAL = 42
+
+
+def test_nobody_else_sends_or_looks_meanwhile() -> None:
+    bus, _ = memory_bus()
+    free: list[bool] = []
+
+    def look(exchange: Exchange[Any]) -> Sequence[Runnable[Any]]:
+        def other() -> None:
+            free.append(bus.turns.lock.acquire(blocking=False))
+
+        thread = Thread(target=other)
+        thread.start()
+        thread.join()
+        return []
+
+    bus.turns.look = look
+    assert bus.run(order()) == 7  # by the short way
+    assert bus.run(iter(order())) == 7
+    assert free
+    assert not any(free)
+    bus.turns.look = None
+    assert questions(bus.turns, order()) == ()
 
 
 class Looking:

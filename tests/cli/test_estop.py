@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import motorbus
+from motorbus.bus import stop
 from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Bench, Run
 
@@ -268,3 +273,40 @@ def test_who_was_named_on_a_silent_bus_is_asked_before_everybody_else(bench: Ben
     assert ran.code == 6
     (stop,) = ran.document["buses"]
     assert (stop["acknowledged"], stop["silent"]) == ([37], [38])
+
+
+def test_ports_that_are_gone_end_it_as_they_end_a_stop(bench: Bench, run: Run) -> None:
+    text = bench.file.read_text(encoding="utf-8")
+    bench.file.write_text(re.sub(r'(address = "\w+:)[^"]*"', r'\1/dev/gone"', text), encoding="utf-8")
+    stopped = run("stop")
+    for words in (("estop",), ("estop", "arm")):
+        ran = run(*words)
+        assert ran.code == stopped.code == 3
+        assert "cut the power by hand" in ran.err
+
+
+def test_a_suspended_process_is_named_and_the_supply_is_what_is_left(
+    served: Simulated, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop, "request_estop", partial(stop.request_estop, timeout=0.2))
+    with program(WATCHING, served.bus) as process:
+        process.send_signal(signal.SIGSTOP)
+        try:
+            one, every = run("estop", served.bus), run("estop")
+        finally:
+            process.send_signal(signal.SIGCONT)
+    for ran in (one, every):
+        assert ran.code == 5
+        assert f"process {process.pid}" in ran.err
+        assert "cut the supply now" in ran.err
+
+
+@pytest.mark.parametrize("command", ["estop", "stop"])
+def test_who_is_not_read_any_more_ends_with_the_code_of_that(command: str) -> None:
+    """A pipe whose reader has gone before the first word."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    words = [sys.executable, "-m", "motorbus.cli", command, "feetech:sim,ids=1-3#1-3"]
+    ended = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=60)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (10, "")

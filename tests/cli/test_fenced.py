@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import pytest
 
+from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Bench, Run
+from tests.motion.machines import described
 
 
 def bounded(bench: Bench, *lines: str) -> None:
@@ -78,3 +83,29 @@ def test_a_bus_that_is_not_in_the_file_has_the_limits_of_its_devices(
     url = arm.url  # type: ignore[attr-defined]
     ran = run("write", f"{url}#1", "goal_position=340deg")
     assert (ran.code, ran.err) == (0, "")
+
+
+@pytest.fixture
+def real(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state_folder: Path, patient: None
+) -> Iterator[Simulated]:
+    """A servo on a pseudo-terminal, `arm` in the present folder, with more links to it; the file calls it a1."""
+    with Simulated("feetech", ids="1", link=tmp_path / "arm") as simulated:
+        (tmp_path / "by-id").mkdir()
+        (tmp_path / "by-id" / "usb-arm").symlink_to("../arm")
+        (tmp_path / "again").symlink_to(tmp_path / "by-id" / "usb-arm")
+        file = tmp_path / "motorbus.toml"
+        file.write_text(described({"arm": simulated.bus}, "1", "", False, {}, {}), encoding="utf-8")
+        monkeypatch.chdir(tmp_path)
+        yield simulated
+
+
+@pytest.mark.parametrize("spelling", ["arm", "./arm", "by-id/../arm", "by-id/usb-arm", "again", "{pty}"])
+def test_it_is_the_same_port_by_every_name(spelling: str, run: Run, real: Simulated, tmp_path: Path) -> None:
+    one = f"feetech:{spelling.format(pty=(tmp_path / 'arm').resolve())}#1"
+    ran = run("write", one, "goal_position=340deg", "--yes")
+    assert (ran.code, "a1" in ran.err, "outside" in ran.err) == (8, True, True), ran.err
+    ran = run("move", f"{one}=340deg", "--velocity", "1", "--yes")
+    assert (ran.code, "a1" in ran.err) == (8, True), ran.err
+    ran = run("write", one, "goal_velocity=10rpm", "goal_position=184deg", "--yes")
+    assert ran.code == 0, ran.err

@@ -76,7 +76,24 @@ def test_it_asks_before_an_axis_is_homed(run: Run, bench: Bench) -> None:
     assert (ran.code, "home lift: each moves until its switch is met" in ran.err) == (8, True)
 
 
-@pytest.mark.parametrize("words", ["", "a1", "all", "lift a9", "lift stage#1", "lift --velocity 1"])
+@pytest.mark.parametrize(
+    "words", ["", "a1", "all", "lift a9", "lift stage#1", "lift --velocity 1deg/s", "lift --velocity 0"]
+)
 def test_what_cannot_home_is_refused(words: str, run: Run, bench: Bench) -> None:
     ran = run("home", *words.split(), "--yes")
     assert (ran.code, ran.out, ran.err.count("error: ")) == (2, "", 1)
+
+
+def test_an_axis_homes_within_its_velocity(run: Run, bench: Bench) -> None:
+    """Its device is set to 100 RPM, which are 8.3 mm/s here; what is slower than that is borrowed for."""
+    text = bench.file.read_text(encoding="utf-8")
+    assert 'max_velocity = "20 mm/s"' in text
+    bench.file.write_text(
+        text.replace('max_velocity = "20 mm/s"', 'max_velocity = "5 mm/s"'), encoding="utf-8"
+    )
+    assert run("home", "lift", "--velocity", "6mm/s", "--yes").code == 8
+    for words in ((), ("--velocity", "4mm/s")):
+        ran = run("home", "lift", *words, "--yes", "--json")
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.document["axes"] == [{"name": "lift", "at": 0.0}]
+        assert run("move", "lift+=3mm").code == 0

@@ -132,6 +132,7 @@ def test_every_switch_that_nobody_has_settled_has_a_source_and_a_default_that_is
         assert not row["choices"] or row["default"] in row["choices"]
         assert row["source"] or row["name"] in (
             "baud",
+            "estop_hold",
             "ids",
             "model",
             "position",

@@ -35,6 +35,24 @@ def test_what_moves_it_or_gives_it_torque_is_refused_and_says_what_ends_that(
     assert run(*command.split()).code == 0
 
 
+@pytest.mark.parametrize("word", ["a1", "{one}"])
+@pytest.mark.parametrize("command", ["write {} goal_position=185deg", "torque on {}", "move {}=185deg --velocity 10deg/s"])
+def test_a_raw_write_and_an_address_walk_around_that_no_more_than_a_move(
+    command: str, word: str, bench: Bench, run: Run
+) -> None:
+    one = word.format(one=f"{bench.machine.buses['arm'].address}#1")
+    if command.startswith("move") and word == "a1":
+        command = "hold {}"
+    words = command.format(one).split()
+    noted(bench, INTENT)
+    told = run(*words)
+    assert told.code == Exit.UNSAFE, told.err
+    assert "untrusted: set_id() of" in told.err
+    assert "motorbus recover" in told.err
+    noted(bench, OUTCOME, outcome="taken back")
+    assert run(*words).code == 0
+
+
 def test_stop_and_torque_off_go(bench: Bench, run: Run) -> None:
     noted(bench, INTENT)
     assert run("stop", "a1").code == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Thread
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.session.signals import NAMES, Signals, ended
+from motorbus.session.signals import NAMES, Kept, Signals, interrupted, uncut
 from tests.motion.machines import machine
 
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
@@ -38,14 +39,14 @@ def test_there_is_one_that_tells_a_process_to_end_on_every_system() -> None:
 
 
 def test_it_takes_those_that_nobody_has_and_gives_them_back() -> None:
-    heard: list[int] = []
+    heard: list[object] = []
     with handled(signal.SIG_DFL):
-        signals = Signals(heard.append)
+        signals = Signals(lambda error, frame: heard.append(error.args[0]))
         signals.take()
         for number in ENDING:
             signal.raise_signal(number)
         signals.give_back()
-        assert heard == ENDING
+        assert heard == [128 + number for number in ENDING]
         assert now() == {signal.SIG_DFL}
         signals.give_back()
 
@@ -93,9 +94,72 @@ def test_a_robot_takes_none_before_its_with_and_has_none_after_it() -> None:
 
 @pytest.mark.parametrize("number", ENDING)
 def test_it_ends_as_the_shell_says(number: int) -> None:
-    with pytest.raises(SystemExit) as caught:
-        ended(number)
-    assert caught.value.code == 128 + number
+    with handled(signal.SIG_DFL), machine(arm="1") as (made, _):
+        with pytest.raises(SystemExit) as caught, Robot.of(made):
+            signal.raise_signal(number)
+        assert caught.value.code == 128 + number
+
+
+@contextmanager
+def ctrl_c(handler: Any) -> Iterator[None]:
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_python_s_own_handler_of_ctrl_c_is_stood_in_for_and_given_back() -> None:
+    with ctrl_c(signal.default_int_handler), machine(arm="1") as (made, _):
+        with Robot.of(made):
+            assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("own", [signal.SIG_IGN, signal.SIG_DFL, lambda *_: None])
+def test_no_other_handler_of_ctrl_c_is(own: Any) -> None:
+    with ctrl_c(own), machine(arm="1") as (made, _), Robot.of(made):
+        assert signal.getsignal(signal.SIGINT) is own
+
+
+def test_the_handler_of_an_asyncio_runner_stays() -> None:
+    async def main() -> None:
+        with machine(arm="1") as (made, _):
+            before = signal.getsignal(signal.SIGINT)
+            assert before is not signal.default_int_handler
+            async with AsyncRobot.of(made):
+                assert signal.getsignal(signal.SIGINT) is before
+            with Robot.of(made):
+                assert signal.getsignal(signal.SIGINT) is before
+
+    with ctrl_c(signal.default_int_handler):
+        asyncio.run(main())
+
+
+def test_what_falls_where_nothing_is_cut_off_is_kept_until_its_end() -> None:
+    class Ending:
+        _kept = Kept()
+        steps = 0
+
+        @uncut
+        def close(self) -> None:
+            for error in (KeyboardInterrupt(), SystemExit(143)):
+                interrupted(error, sys._getframe())
+                self.steps += 1
+            self._kept.end(None)
+
+        @uncut
+        def over(self) -> None:
+            interrupted(SystemExit(129), sys._getframe())
+
+    ending = Ending()
+    with pytest.raises(KeyboardInterrupt):
+        ending.close()
+    assert ending.steps == 2
+    with pytest.raises(SystemExit, match="129"):
+        ending.over()
 
 
 def test_a_task_of_an_event_loop_is_cancelled_leaves_its_machine_and_ends() -> None:

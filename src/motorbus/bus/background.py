@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
 from motorbus.bus.run import Run
+from motorbus.bus.ticket import Timer
 from motorbus.core.operation import Operation
 
 T = TypeVar("T")
@@ -34,6 +35,20 @@ class Background(Generic[T]):
         with self.turns.lock:
             self.turns.chores.append(self._chore)
 
+    def hurry(self) -> None:
+        """Where it pauses it goes on as soon as somebody pumps. From any thread."""
+        ticket = self.run.root.ticket
+        if isinstance(ticket, Timer):
+            ticket.deadline = self.link.now()
+
+    def drop(self) -> None:
+        """Where it pauses nobody carries it along any more; where it is at work it goes on, and ends by itself."""
+        with self.turns.lock:
+            ticket = self.run.root.ticket
+            if isinstance(ticket, Timer) and self._chore in self.turns.chores:
+                self.turns.chores.remove(self._chore)
+                self.turns.abandon(ticket)
+
     def carried(self) -> T:
         """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises."""
         while not self.run.advance():
@@ -42,5 +57,5 @@ class Background(Generic[T]):
 
     def _chore(self) -> None:
         """One step further; the caller holds the lock of the turns."""
-        if self.run.advance():
+        if self._chore in self.turns.chores and self.run.advance():
             self.turns.chores.remove(self._chore)

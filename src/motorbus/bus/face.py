@@ -11,7 +11,7 @@ from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop import StopOutcome, Stopper
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
-from motorbus.core.family import Family
+from motorbus.core.family import Family, Readdressed
 from motorbus.core.operation import Exchange, Journal, Notice
 from motorbus.link.base import Link
 
@@ -24,7 +24,8 @@ class BusFace:
     `admit` is asked before anything that moves a motor or switches torque is sent; without it such exchanges are
     refused. `report` gets the events of operations (progress, early results, journal records). `journal` gets the
     journal records before anybody else, whoever listens. `stop_socket` is where another process can ask for an
-    emergency stop. `warnings` are what the user ought to know about this bus.
+    emergency stop. `warnings` are what the user ought to know about this bus. `readdressed`, where somebody has set it,
+    hears before anybody else that a device is about to answer to another id.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class BusFace:
         self.admit = admit
         self.report = report
         self.journal = journal
+        self.readdressed: Callable[[Readdressed], None] | None = None
         self.warnings: tuple[str, ...] = tuple(link.warnings)
         self.turns = Turns(
             family,
@@ -67,12 +69,14 @@ class BusFace:
 
     def listener(self, report: Notify | None) -> Notify | None:
         """Who hears the events of an operation: `report`, or the bus's own listener; and the journal before them."""
-        told, journal = report or self.report, self.journal
-        if journal is None:
+        told, journal, readdressed = report or self.report, self.journal, self.readdressed
+        if journal is None and readdressed is None:
             return told
 
         def tell(event: object) -> None:
-            if isinstance(event, Journal):
+            if readdressed is not None and isinstance(event, Readdressed):
+                readdressed(event)
+            if journal is not None and isinstance(event, Journal):
                 journal(event)
             if told is not None:
                 told(event)

@@ -13,10 +13,12 @@ from typing import Any
 
 from motorbus.bus.ticket import Flight
 from motorbus.core.family import Family
-from motorbus.core.operation import ANY, Answer, Effect, Exchange, Rank
+from motorbus.core.goal import Stays
+from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Goal, Rank
 
 FRESH = 0.02  # s; an older position is not where a moving device is
 MOVING = (Effect.TORQUE, Effect.MOTION)
+ENDLESS = ("velocity", "load", "current")  # quantities that go on being obeyed until something else is ordered
 
 
 class Known(dict[int, Answer | None]):
@@ -25,7 +27,7 @@ class Known(dict[int, Answer | None]):
     `seen` has the last exchange that told where a node is, with its answer, also when it was ordered to move since.
     `rate` is the bit rate at which one was last heard. `frames` stop everybody known, without a position: they are
     made when a node becomes known, for the case that a stop cannot make new ones. `stopping` counts the stops that
-    have left, whomever they were for.
+    have left, whomever they were for; `accepts` those that a node has answered.
     """
 
     def __init__(self, family: Family, rate: int) -> None:
@@ -35,10 +37,15 @@ class Known(dict[int, Answer | None]):
         self.frames = family.stop({})
         self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
         self._stops: Counter[int | None] = Counter()  # those for everybody under None
+        self._accepted: Counter[int] = Counter()
+        self._given: dict[int, set[Due]] = {}  # what a node has answered of a stop that takes several exchanges
+        self._said: dict[int, Answer] = {}  # the answer to the last order of a node, while no other has left
         self.stopping = 0
 
     def heard(self, nodes: Sequence[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
         """These nodes have answered this exchange, and can be believed."""
+        if exchange.effect in MOVING:
+            self._said.update(dict.fromkeys(nodes, answer))
         if not exchange.tells_position:
             self.hear_all(nodes, None, rate)
             return
@@ -62,7 +69,7 @@ class Known(dict[int, Answer | None]):
     def order(self, exchange: Exchange[Any], rate: int) -> None:
         """An exchange leaves that may set something moving: whom it orders is known, and is not where it was."""
         ordered = [goal.node for goal in exchange.goals]
-        if ordered:
+        if ordered and exchange.rank is not Rank.STOP:
             self.hear_all(ordered, None, rate)
         if exchange.effect not in MOVING:
             return
@@ -72,6 +79,8 @@ class Known(dict[int, Answer | None]):
             return
         nodes = named(exchange) if exchange.replies else ordered
         for node in nodes or list(self):  # one that names nobody may move everybody
+            self._said.pop(node, None)
+            self._given.pop(node, None)
             if node in self:
                 self[node] = None
 
@@ -81,6 +90,45 @@ class Known(dict[int, Answer | None]):
             node: answer if answer is not None and now - answer.at < FRESH else None
             for node, answer in self.items()
         }
+
+    def accept(self, exchange: Exchange[Any], answer: Answer) -> None:
+        """This has been answered, and not refused: whom it has told to stop, or to rest, has accepted that.
+
+        An order that has left since has not been ended by it.
+        """
+        if exchange.effect not in MOVING or exchange.replies is ANY or not exchange.replies:
+            return
+        heard = [due for due in exchange.replies if self._said.get(due.node) is answer]
+        if exchange.rank is Rank.STOP:
+            for due in heard:
+                given = self._given.setdefault(due.node, set())
+                given.add(due)
+                if len(given) >= self._kinds(due.node):
+                    self.accepted(due.node)
+        elif exchange.later is None:
+            resting = {goal.node for goal in exchange.goals if rests(goal)}
+            for node in resting.intersection(due.node for due in heard):
+                self.accepted(node)
+
+    def accepted(self, node: int) -> None:
+        """It is certain that this node was told to stop."""
+        self._given.pop(node, None)
+        self._accepted[node] += 1
+
+    def accepts(self, node: int) -> int:
+        """How many stops this node has accepted. One that has left and was not answered is none of them."""
+        return self._accepted[node]
+
+    def _kinds(self, node: int) -> int:
+        """How many kinds of replies a node gives to all that stops it."""
+        dues = {
+            due
+            for frame in self.frames.exchanges
+            if frame.effect in MOVING and frame.replies is not ANY
+            for due in frame.replies
+            if due.node == node
+        }
+        return max(1, len(dues))
 
     def stops(self, node: int) -> int:
         """How many stops have left for this node, those for everybody included."""
@@ -93,6 +141,11 @@ def rest_of(flight: Flight, family: Family, rate: int, now: float) -> float:
         return family.air_time(flight.exchange, rate)
     request: Exchange[Answer] = Exchange(flight.exchange.request)
     return max(0.0, flight.sent_at + family.air_time(request, rate) - now)
+
+
+def rests(goal: Goal) -> bool:
+    """Whether whoever obeys this goal goes on no more."""
+    return goal.stays is Stays.STILL or (goal.quantity in ENDLESS and not goal.value)
 
 
 def named(exchange: Exchange[Any]) -> set[int]:

@@ -10,8 +10,9 @@ from functools import cached_property
 from typing import Any, Self, TypeVar
 
 from motorbus.bus.face import BusFace
+from motorbus.bus.look import questions
 from motorbus.bus.relay import Relay
-from motorbus.bus.run import Notify, Run
+from motorbus.bus.run import Notify, Run, taken
 from motorbus.bus.ticket import Flight
 from motorbus.core.operation import Exchange, Runnable
 
@@ -31,7 +32,7 @@ class Bus(BusFace):
         Raises whatever the operation raises; KeyboardInterrupt after the operation has cleaned up.
         """
         if isinstance(operation, Exchange) and not (
-            operation.effect and self.turns.look and self.turns.look(operation)
+            operation.effect and questions(self.turns, operation)
         ):
             return self._exchange(operation)
         relay = self.relay
@@ -62,7 +63,7 @@ class Bus(BusFace):
                 self.turns.abandon(flight)
             raise
         answer: Any = flight.result()
-        return answer if exchange.read is None else exchange.read(answer)
+        return taken(self.turns, exchange, answer)
 
     def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""

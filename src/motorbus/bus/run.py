@@ -12,6 +12,7 @@ from math import inf
 from typing import Any, Generic, TypeVar
 
 from motorbus.bus import verdict
+from motorbus.bus.look import questions
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.operation import (
@@ -134,10 +135,10 @@ class Run(Generic[T]):
         if isinstance(ticket, Claim):
             branch.claimed = True
             return None, None
-        if not isinstance(ticket, Flight) or ticket.exchange.read is None:
+        if not isinstance(ticket, Flight):
             return ticket.value, None
         try:
-            return ticket.exchange.read(ticket.value), None
+            return taken(self.turns, ticket.exchange, ticket.value), None
         except Exception as error:  # the driver's own verdict on the answer belongs to the driver's generator
             return None, error
 
@@ -171,8 +172,7 @@ class Run(Generic[T]):
 
     def _must_look(self, branch: Branch, wish: Exchange[Any]) -> bool:
         """Whether something must be asked before this order can be judged."""
-        look = self.turns.look
-        return look is not None and not branch.looked and wish.effect in GATED and bool(look(wish))
+        return not branch.looked and wish.effect in GATED and bool(questions(self.turns, wish))
 
     def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune) -> Ticket:
         if isinstance(wish, Exchange):
@@ -293,10 +293,19 @@ class Run(Generic[T]):
         return value
 
 
+def taken(turns: Turns, exchange: Exchange[T], answer: Any) -> Any:
+    """What the driver reads from an answer; one that it does not take for a refusal says that a stop is accepted."""
+    value = answer if exchange.read is None else exchange.read(answer)
+    if exchange.effect in GATED:
+        with turns.lock:
+            turns.known.accept(exchange, answer)
+    return value
+
+
 def _looked(turns: Turns, wish: Exchange[T]) -> Operation[T]:
     """Ask what must be known before this order can be judged, once more where the answer is doubtful, then give it."""
     for _ in range(LOOKS):
-        for question in turns.look(wish) if turns.look is not None else ():
+        for question in questions(turns, wish):
             yield from outcome(question)
     return (yield from wish)
 

@@ -178,7 +178,11 @@ class Stopper:
                 asking.remove(flight)
                 limit = self._submit(self._following(flight), flights, limit)
         missing = [flight for flight in flights if not self._settled(flight)]
-        acknowledged += _obeyed(flights, missing, acknowledged)
+        obeyed = _obeyed(flights, missing, acknowledged)
+        acknowledged += obeyed
+        with self.turns.lock:
+            for node in obeyed:
+                self.turns.known.accepted(node)
         again = [flight.exchange for flight in missing if not isinstance(flight.error, LinkLost)]
         while _answered(again) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then

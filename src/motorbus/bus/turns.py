@@ -208,9 +208,8 @@ class Turns(Air):
         return request
 
     def _may_go(self, ticket: Flight | Retune) -> bool:
-        if isinstance(ticket, Retune):
-            return self._has_turn(ticket) and not self._flying
-        return self._has_turn(ticket) and ticket.exchange.lane not in self._flying
+        busy = bool(self._flying) if isinstance(ticket, Retune) else ticket.exchange.lane in self._flying
+        return self._has_turn(ticket) and not busy
 
     def _awaits_silence(self, ticket: Flight | Retune) -> bool:
         """A change of rate waits until nothing flies, so nothing behind it in its queue may take off before it."""
@@ -243,7 +242,10 @@ class Turns(Air):
         self._settle(ticket, before, error)
 
     def _admitted(self, exchange: Exchange[Any]) -> None:
-        if exchange.effect not in GATED or exchange.rank is Rank.STOP:
+        plain = (
+            exchange.later is None or self.admit is None
+        )  # what waits replaces what waited: the gate must know
+        if (exchange.effect not in GATED and plain) or exchange.rank is Rank.STOP:
             return
         if self.admit is None:
             raise RequestError(

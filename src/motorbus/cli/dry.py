@@ -10,6 +10,7 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from motorbus.bus.look import questions
 from motorbus.cli import faces
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
@@ -144,9 +145,10 @@ class DryBus:
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
-        for question in self.turns.look(exchange) if self.turns.look is not None else ():
+        for question in questions(self.turns, exchange):
             self._bus.run(question)
-        self.admit(exchange)
+        with self.turns.lock:
+            self.admit(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
             self._written.add(_EVERYONE)

@@ -14,14 +14,15 @@ from motorbus.cli.output import Output
 from motorbus.cli.rough import beside_others, forgiving, readable, together, understood
 from motorbus.cli.target import Target, everyone, opened, said, target, targets
 from motorbus.core.operation import Effect
-from motorbus.errors import MotorbusError, NoReply, PortNotFound, RequestError
+from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
 
     from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
     from motorbus.core.family import Family
+    from motorbus.link.refusal import Owner
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
@@ -41,8 +42,9 @@ its event loop hangs, and stays stopped until that process says reset(). A bus
 that nobody holds is opened and stopped from here; the stop reaches everyone,
 but only devices that are named (BUS#1-6), or known because they answered
 before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
-some did, 5 when nobody did. A port that a foreign program holds cannot be
-reached: the error names that program. Without BUS, every bus that a motorbus
+some did, 5 when nobody did, or the process that holds the bus does not answer,
+3 where the ports are gone. A port that a foreign program holds cannot be
+reached: the error names that program, and the code is 4. Without BUS, every bus that a motorbus
 process of yours holds is stopped, and those of the machine file if there is
 one. By its names, a group or an axis stops its whole buses. A line of the file
 that cannot be understood keeps no other bus from being stopped: exit code 6.
@@ -82,15 +84,16 @@ def estop(
         unclear = {**meant.unclear, **unclear}
         if bus and not wanted:
             raise together(list(unclear.values()))
+        failures: list[MotorbusError] = []
         stops = (
-            _stop_each(wanted, options, output, unclear)
+            _stop_each(wanted, options, output, failures)
             if bus
-            else _stop_all(wanted, options, output, unclear)
+            else _stop_all(wanted, options, output, unclear, failures)
         )
         output.document("motorbus.estop/1", {"buses": stops})
         for one in stops:
             output.text("\n  ".join(_lines(one)))
-        return _verdict(stops, unclear)
+        return _verdict(stops, unclear, failures)
 
 
 class Wanted(NamedTuple):
@@ -161,7 +164,7 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
         return _stop_ourselves(wanted, options, output)
     owner = PortLock(port).owner()
     try:
-        outcome = _ask(port)
+        outcome = _ask(port, owner)
     except PortNotFound:
         return _stop_ourselves(wanted, options, output)
     unheard = {*outcome.silent, *wanted.nodes} - {*outcome.acknowledged}
@@ -170,11 +173,28 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
     return _facts(wanted.bus, by, outcome._replace(silent=tuple(sorted(unheard))), note)
 
 
-def _ask(port: str) -> StopOutcome:
+def _ask(port: str, owner: Owner | None) -> StopOutcome:
+    """Let whoever holds this port stop it. Raises PortNotFound for nobody, NoReply for a process that is not heard."""
     from motorbus.bus.stop import request_estop
     from motorbus.link.lock import socket_path
 
-    return request_estop(socket_path(port))
+    try:
+        return request_estop(socket_path(port))
+    except PortNotFound:
+        raise
+    except LinkError as error:
+        raise _unheard(port, owner, error) from error
+
+
+def _unheard(port: str, owner: Owner | None, error: LinkError) -> NoReply:
+    who = "the process" if owner is None else f"process {owner.pid} ({owner.program})"
+    ends = "" if owner is None else f"; `kill -KILL {owner.pid}` gives the port back, then estop again"
+    return NoReply(
+        f"{who} that holds {port} does not answer, so nobody knows whether it has stopped anything",
+        expected="what came of the stop",
+        cause=f"it is suspended, or hangs where nothing of it runs: {error.summary}",
+        advice=f"cut the supply now{ends}",
+    )
 
 
 def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
@@ -235,22 +255,25 @@ def _confirms(opening: Bus, node: int) -> bool:
 
 
 def _stop_each(
-    wanted: list[Wanted], options: dict[str, str], output: Output, unclear: Collection[str]
+    wanted: list[Wanted], options: dict[str, str], output: Output, failures: list[MotorbusError]
 ) -> list[dict[str, Any]]:
-    """Several buses one after the other; one that is out of reach keeps nobody waiting."""
-    if len(wanted) == 1 and not unclear:
-        return [_stop(wanted[0], options, output)]
+    """Several buses one after the other; one that is out of reach keeps nobody waiting, and is told in `failures`."""
     stops = []
     for one in wanted:
         try:
             stops.append(_stop(one, options, output))
         except MotorbusError as error:
+            failures.append(error)
             stops.append(_failed(one.bus, "this process", error))
     return stops
 
 
 def _stop_all(
-    wanted: list[Wanted], options: dict[str, str], output: Output, unclear: Mapping[str, RequestError]
+    wanted: list[Wanted],
+    options: dict[str, str],
+    output: Output,
+    unclear: Mapping[str, RequestError],
+    failures: list[MotorbusError],
 ) -> list[dict[str, Any]]:
     """Every bus that a motorbus process holds, then those of the machine file that none of them holds."""
     from motorbus.link.lock import holders, real_name
@@ -261,13 +284,14 @@ def _stop_all(
         held.add(real_name(owner.port))
         by = f"process {owner.pid} ({owner.program})"
         try:
-            stops.append(_facts(owner.port, by, _ask(owner.port)))
+            stops.append(_facts(owner.port, by, _ask(owner.port, owner)))
         except MotorbusError as error:
+            failures.append(error)
             stops.append(_failed(owner.port, by, error))
     mine = [one for one in wanted if _port(one.bus, options) not in held]
     if not stops and not mine:
         raise together([*unclear.values(), _nothing_to_stop()])
-    return stops + (_stop_each(mine, options, output, [*unclear, *held]) if mine else [])
+    return stops + _stop_each(mine, options, output, failures)
 
 
 def _nothing_to_stop() -> RequestError:
@@ -314,17 +338,28 @@ def _list(nodes: list[int], nothing: str = "none") -> str:
     return ", ".join(f"#{node}" for node in nodes) or nothing
 
 
-def _verdict(stops: list[dict[str, Any]], unclear: Mapping[str, RequestError]) -> Exit:
+def _verdict(
+    stops: list[dict[str, Any]], unclear: Mapping[str, RequestError], failures: list[MotorbusError]
+) -> Exit:
     lost = beside_others(list(unclear.values()))
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
     missing = [one for one in stops if not one["error"] and (one["silent"] or not one["acknowledged"])]
     silent = [f"{one['bus']}: no acknowledgement from {_list(one['silent'], 'anybody')}" for one in missing]
     told = "; ".join([*failed, *silent, *(error.summary for error in lost)])
     if failed and len(failed) == len(stops):
-        raise MotorbusError(told)
+        raise _all_failed(failures, told)
     if not any(one["acknowledged"] for one in stops):
         raise NoReply(told, advice=BY_HAND)
     if told:
         by_hand = [BY_HAND] if failed or silent else []
         raise Partial(told, advice="; ".join(dict.fromkeys([*by_hand, *(error.advice for error in lost)])))
     return Exit.OK
+
+
+def _all_failed(failures: list[MotorbusError], told: str) -> MotorbusError:
+    """The first of the errors, whose exit code it is as with `motorbus stop`, and in its summary all that happened."""
+    first = failures[0]
+    first.summary = told if len(failures) > 1 else first.summary
+    if not isinstance(first, RequestError) and "cut " not in first.advice:
+        first.advice = f"{first.advice}; {BY_HAND}" if first.advice else BY_HAND
+    return first

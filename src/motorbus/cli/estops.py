@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from motorbus.cli.line import same_line
 from motorbus.cli.machine import machine_file
 from motorbus.errors import RequestError
 
@@ -30,8 +31,7 @@ def with_estops(address: str, options: Mapping[str, object]) -> dict[str, object
     try:
         machine = file.machine
         for name, spec in machine.buses.items():
-            there = parse_address(spec.address)
-            if (there.family, there.port) == (here.family, here.port):
+            if same_line(spec.address, address):
                 for option, held in estop_options(machine, name).items():
                     said = found.get(option, here.options.get(option))
                     found[option] = f"{said}+{held}" if said else held

@@ -9,6 +9,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from motorbus.cli.line import same_line
 from motorbus.cli.machine import machine_file, shown
 from motorbus.errors import RequestError
 
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 
 def fenced(bus: BusFace, address: str, output: Output) -> None:
-    """Set the bounds of the axes that the machine file has on this bus; nothing is sent.
+    """Set the bounds of the axes that the machine file has on this bus, and put those of them at fault whose guarded
+    change was cut off; nothing is sent.
 
     A file that cannot be understood bounds nothing. That is said, and hinders nobody who works on a device.
     """
@@ -33,13 +35,14 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
         output.note(f"note: {shown(file.path)} cannot be understood, so its limits bound nothing here")
         return
     from motorbus.motion.safety.fence import enclose
+    from motorbus.session.faults import distrust_on
 
-    line = _line(address)
-    there = {name for name, spec in machine.buses.items() if _line(spec.address) == line}
+    there = {name for name, spec in machine.buses.items() if same_line(spec.address, address)}
     for name, spec in machine.axes.items():
         with suppress(RequestError):  # an id that cannot be bounds nobody, and stops no stop
             if spec.bus in there:
                 enclose(bus, {name: spec})
+    distrust_on(bus)
 
 
 def pace(bus: BusFace, nodes: Iterable[int]) -> float | None:
@@ -47,11 +50,3 @@ def pace(bus: BusFace, nodes: Iterable[int]) -> float | None:
     guards = getattr(bus.admit, "guards", {})
     speeds = [guards[node].bounds.speed for node in nodes if node in guards]
     return min(speeds, default=None)
-
-
-def _line(address: str) -> tuple[str, str]:
-    """What tells one bus from another: its family and its port, however it is opened."""
-    from motorbus.session import parse_address
-
-    found = parse_address(address)
-    return found.family, found.port

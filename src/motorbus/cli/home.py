@@ -8,13 +8,14 @@ from cyclopts import App, Parameter
 
 from motorbus.cli.acting import acted
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import axes_named, is_name
+from motorbus.cli.machine import axes_named, is_name, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
 from motorbus.cli.robot import able, place, rehearse, robot
 from motorbus.cli.target import device, offers, opened, target
 from motorbus.core import units
 from motorbus.errors import RequestError
+from motorbus.motion.machine.model import VELOCITY
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -33,11 +34,14 @@ until its input 5 is active. If that is active beforehand, it stands on the
 switch or the switch is stuck, and nothing moves.
 
 Axes of a machine file are homed together, those of several buses at the same
-time. Nothing is remembered: `motorbus move --home` homes and goes on.
+time, and none faster than its max_velocity: where its device is set to more,
+project 1 is borrowed for a lower speed. An axis without a max_velocity in the
+file has a low one. Nothing is remembered: `motorbus move --home` homes and goes on.
 
 Examples:
 
     motorbus home lift --deadline 20s
+    motorbus home lift --velocity 5mm/s
     motorbus home stepper:/dev/ttyUSB0
     motorbus home stepper:/dev/ttyUSB0 --deadline 20s --velocity 30rpm --yes
     motorbus home stepper:/dev/ttyUSB0 --dry-run
@@ -64,7 +68,7 @@ def home(
     deadline
         How long it may take, as 20s; as the family says when left out.
     velocity
-        How fast, in rad/s or as 30rpm; as the device is set when left out.
+        How fast, in rad/s or as 30rpm, of a linear axis in m/s or as 5mm/s; as the device is set when left out.
     yes
         Do not ask before.
     options
@@ -119,9 +123,10 @@ def _axes(
 ) -> Exit:
     """Axes of the machine file, all at the same time."""
     names = axes_named(words)
-    seconds = units.parse(deadline, "time") if deadline else None
-    if velocity:
-        raise RequestError("axes home as fast as their devices are set to", expected="no --velocity")
+    how = {
+        "deadline": units.parse(deadline, "time") if deadline else None,
+        "velocity": _pace(names, velocity),
+    }
     for name in names:
         if not hasattr((family := target(name).family).devices.blocking, "home"):
             raise RequestError(
@@ -133,17 +138,30 @@ def _axes(
         for name in names:
             able(hand, name, "home")
         if dry_run:
-            rehearse(hand, names, lambda axis: axis.home(deadline=seconds))
+            rehearse(hand, names, lambda axis: axis.home(**how))
             return Exit.OK
         what = f"home {', '.join(names)}: each moves until its switch is met, as far as that takes"
         if not yes:
-            rehearse(hand, names, lambda axis: axis.home(deadline=seconds), show=False)
+            rehearse(hand, names, lambda axis: axis.home(**how), show=False)
         output.consent(what, yes=yes)
         with hand.working("homing"), hand.robot.attended():
-            found = hand.robot.home(names, deadline=seconds)
+            found = hand.robot.home(names, **how)
         rows = [(name, place(hand.robot, name, at)) for name, at in found.items()]
     output.document(
         "motorbus.home.axes/1", {"axes": [{"name": name, "at": at} for name, at in found.items()]}
     )
     output.table("", ["axis", ">at its switch"], rows)
     return Exit.OK
+
+
+def _pace(names: list[str], velocity: str) -> float | None:
+    """How fast they shall home (rad/s, m/s). Raises RequestError for what no velocity of them all can be."""
+    kinds = {VELOCITY.of(machine().axes[name].linear) for name in names}
+    paces = [units.parse(velocity, kind) for kind in kinds] if velocity else []
+    if len(paces) > 1:
+        raise RequestError(
+            "one velocity for axes that turn and axes that are linear",
+            expected="axes of one kind",
+            advice="home them one after the other; nothing was sent",
+        )
+    return paces[0] if paces else None

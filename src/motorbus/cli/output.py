@@ -155,10 +155,14 @@ class Bar:
 
 
 def console(file: TextIO) -> Console:
-    """A rich console on this stream; rich itself obeys NO_COLOR."""
+    """A rich console on this stream; rich itself obeys NO_COLOR. Raises BrokenPipeError when nobody reads any more."""
     from rich.console import Console
 
-    return Console(file=file, highlight=False, width=None if file.isatty() else _NO_WRAP)
+    class Heard(Console):
+        def on_broken_pipe(self) -> None:  # rich would end the program here, with an exit code of its own
+            raise
+
+    return Heard(file=file, highlight=False, width=None if file.isatty() else _NO_WRAP)
 
 
 def _cell(value: object) -> Any:

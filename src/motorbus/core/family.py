@@ -75,6 +75,16 @@ class Found(NamedTuple):
     identity: Identity | None
 
 
+class Readdressed(NamedTuple):
+    """An event for `Report`: what is told to the id `new` is from now on, or soon, told to the device of `node`, too.
+
+    `node` is None where nobody knows which device that is. It is told before anything of that is written.
+    """
+
+    node: int | None
+    new: int
+
+
 class Quality(Enum):
     """How far a sample can be trusted."""
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from enum import Enum, IntEnum
 from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
+from motorbus.core.goal import Goal as Goal
+from motorbus.core.goal import Later
 from motorbus.errors import MotorbusError
 
 T = TypeVar("T")
@@ -94,21 +96,6 @@ EVERY_LANE: Final = -1
 `ANY`: it takes each that nobody else awaits, on whatever lane it comes."""
 
 
-class Goal(NamedTuple):
-    """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
-
-    `quantity` is position (rad) or relative (rad); velocity (rad/s), load (fraction) or current (A), which are obeyed
-    until something else is ordered; or what only bounds a movement: speed (rad/s), cap (A), time (a share of the
-    longest). A limit that is not known is None, and the gate refuses what it cannot judge.
-    """
-
-    node: int
-    quantity: str
-    value: float
-    low: float | None = None
-    high: float | None = None
-
-
 class Reply(NamedTuple):
     """A frame that answers some request. `key` tells which, `data` is the whole frame or the CAN data field."""
 
@@ -169,6 +156,7 @@ class Exchange(Generic[T_co]):
     `rank`        who goes first
     `effect`      the greatest effect of the rows it writes
     `goals`       what it orders, per node, for the gate
+    `later`       its goals wait where it brings them, or it lets those begin that wait; None: neither
     `timeout`     how long the device may think
     `repeatable`  sending it twice does no more than sending it once
     `tells_position`  the replies begin with the present position, so stop can hold it. As a function it says where that
@@ -184,6 +172,7 @@ class Exchange(Generic[T_co]):
         "effect",
         "goals",
         "lane",
+        "later",
         "other",
         "rank",
         "read",
@@ -209,6 +198,7 @@ class Exchange(Generic[T_co]):
         repeatable: bool = False,
         tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
         refusal: Refusal | None = None,
+        later: Later | None = None,
         other: Callable[[], Exchange[T_co]] | None = None,
     ) -> None:
         self.request: Final = request
@@ -222,6 +212,7 @@ class Exchange(Generic[T_co]):
         self.repeatable: Final = repeatable
         self.tells_position: Final = tells_position
         self.refusal: Final = refusal
+        self.later: Final = later
         self.other: Final = other
 
     def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:

@@ -21,7 +21,8 @@ from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place,
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import Canary
 from motorbus.motion.safety.gate import blamed
-from motorbus.motion.safety.track import Track
+from motorbus.motion.safety.track import Track, believed
+from motorbus.motion.safety.turning import Resting
 from motorbus.motion.several import named, names
 
 if TYPE_CHECKING:
@@ -99,8 +100,8 @@ class AxisVerbs:
     is true once it was given torque or moved from here, until it is let go: then its exit policy counts. `under_way` is
     true from the beginning of a movement until that has come to its end. `reckoning` is there where the device does not
     tell where it is. `orders` counts what it was told from here, to move, to hold, to stop or to let go: by that
-    whoever leads it sees whether somebody else has told it something since. `track` judges its samples (rad of the
-    device).
+    whoever leads it sees whether somebody else has told it something since. `track` judges what is told of its
+    position from here (rad of the device); the guard at the gate of its bus judges by what the bus has heard.
     """
 
     def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: Able) -> None:
@@ -287,8 +288,12 @@ def _judged(axis: AxisVerbs) -> Operation[tuple[State, Quality]]:
 
 
 def position(axis: AxisVerbs) -> Operation[float]:
-    """Where it is, as its device measures it (rad, m)."""
-    return axis.spec.from_device((yield from axis.able["position"](axis.device)))
+    """Where it is, as its device measures it (rad, m).
+
+    A place to which no motor can have come so quickly is told only where a second reading agrees: see `believed`.
+    """
+    angle = yield from believed(axis.track, lambda: axis.able["position"](axis.device))
+    return axis.spec.from_device(angle)
 
 
 def velocity(axis: AxisVerbs) -> Operation[float]:
@@ -328,12 +333,14 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
 
     Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits; Interrupted
     when somebody lets it go, stops it or moves it meanwhile: then no torque comes behind that; Refused while it is at
-    fault.
+    fault; Faulted where it had torque from here and its device has not kept it.
     """
     canary.check(axis)
-    canary.expected(axis)
     axis.orders += 1
     command = Command([axis])
+    yield from canary.unbroken(axis)
+    command.check()
+    canary.expected(axis)
     axis.engaged = True
     try:
         yield from command.watched(_given_torque(axis))
@@ -361,7 +368,9 @@ def cap(axis: AxisVerbs) -> Operation[None]:
 def disable_torque(axis: AxisVerbs) -> Operation[None]:
     """Limp, whatever alarms there are. Raises as the device's own verb when nobody knows whether it is."""
     axis.orders = order = axis.orders + 1
+    resting = Resting(axis)
     yield from axis.able["disable_torque"](axis.device)
+    resting.certain()
     if axis.orders == order:  # else somebody has told it something since, and may have given it torque
         axis.engaged = axis.under_way = False
 
@@ -369,7 +378,9 @@ def disable_torque(axis: AxisVerbs) -> Operation[None]:
 def stop(axis: AxisVerbs) -> Operation[Enum]:
     """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
     axis.orders = order = axis.orders + 1
+    resting = Resting(axis)
     promise: Enum = yield from axis.able["stop"](axis.device)
+    resting.certain()
     if axis.orders == order:  # else it is the next movement already, which this was not said to
         axis.accepted_stop()
     return promise

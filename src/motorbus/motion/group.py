@@ -91,12 +91,17 @@ def hold(body: Body, names: Names = None) -> Abreast[None]:
     return _each(body, body.chosen(names), one.hold, _nothing)
 
 
-def home(body: Body, names: Names = None, *, deadline: float | None = None) -> Abreast[dict[str, float]]:
+def home(
+    body: Body, names: Names = None, *, deadline: float | None = None, velocity: float | None = None
+) -> Abreast[dict[str, float]]:
     """Send each that has a switch to go to there, at most for so long (s); gives where each is then (rad, m).
 
+    The `velocity` (rad/s, m/s) is that of each; None: as its device is set, or `max_velocity` where that is less.
     Raises RequestError when none of them has one, else what one of them raised, when all have ended.
     """
-    return _each(body, _able(body, names, "home"), partial(reckoning.home, deadline=deadline), dict)
+    return _each(
+        body, _able(body, names, "home"), partial(reckoning.home, deadline=deadline, velocity=velocity), dict
+    )
 
 
 def _each(

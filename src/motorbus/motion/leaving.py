@@ -1,19 +1,19 @@
 """How a machine is left when a program ends, however that comes: hold, torque off, park, or leave it alone.
 
 Only axes that were given torque or moved from here are concerned, and each does what the machine file says of it. What
-moves is stopped first, whatever happens to some; then what is to be limp lets go; parking comes last, for it takes its
-time. An interruption while this goes on takes the parking away; stops and letting go are gone on with. What it cuts off
-on a bus has its clean-up there, and that a further one cuts short too: a device whose settings were borrowed for a
-movement may keep them until `recover`. Blocking and async robots carry out the same steps, so they are said as what
-comes next.
+moves is stopped first, whatever happens to some; then what is to be limp lets go, once it was seen to rest or half a
+second has passed; parking comes last, for it takes its time. An interruption while this goes on takes the looking and
+the parking away; stops and letting go are gone on with. What it cuts off on a bus has its clean-up there, and that a
+further one cuts short too: a device whose settings were borrowed for a movement may keep them until `recover`. Blocking
+and async robots carry out the same steps, so they are said as what comes next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from collections.abc import Callable, Container, Iterable, Mapping
+from typing import Any, Final, TypeAlias
 
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Operation, outcome
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
 from motorbus.motion import capabilities as one
 from motorbus.motion.abreast import Abreast
@@ -21,10 +21,15 @@ from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.moving.verbs import park
 from motorbus.motion.safety.gate import Gate
-from motorbus.motion.several import Act, errors_of, gathered, insisted, of_each
+from motorbus.motion.safety.standstill import Rest, watched
+from motorbus.motion.several import Act, Told, errors_of, everyone, gathered, insisted, of_each
 
 TRIES: Final = 3
 """How often a step is begun again that an interruption took away before it had visited everyone."""
+PATIENCE: Final = 0.5
+"""s for which what was stopped is looked at, at most, before it is let go."""
+
+How: TypeAlias = "Callable[[list[AxisVerbs], Act[Any]], Operation[Told]]"
 
 
 class Leaving:
@@ -47,18 +52,21 @@ class Leaving:
         self._tries: dict[str, int] = {}
         self._parks: list[list[str]] | None = None
         self._parking: list[str] = []
+        self._hurried = False
 
     def work(self) -> Abreast[Any] | None:
         """What to do next; None when all is done."""
         return (
             self._visit("stop", self._to_stop(), one.stop)
+            or self._visit("look", self._to_look_at(), self._looked, everyone)
             or self._visit("let go", self._to_let_go(), one.disable_torque)
             or self._park()
             or self._visit("stop again", self._to_stop_again(), one.stop)
         )
 
     def hurry(self) -> None:
-        """Somebody does not want to wait: nothing is parked any more."""
+        """Somebody does not want to wait: nothing is looked at or parked any more."""
+        self._hurried = True
         waiting = [self._parked()] if self._parks is None else self._parks
         skipped = [name for names in [self._parking, *waiting] for name in names if name not in self.errors]
         if skipped:
@@ -82,13 +90,18 @@ class Leaving:
 
     def _to_stop(self) -> list[str]:
         """Those under way. After an emergency stop nothing moves, and a goal would be refused."""
-        moving = [name for name, axis in self._axes.items() if axis.under_way or goes_on(axis)]
+        moving = [name for name, axis in self._axes.items() if moves(axis)]
         latched = [name for name in moving if self._latched(name)]
         if latched and not self._tries:
             self.said.append(
                 f"{', '.join(latched)}: not stopped once more, for the emergency stop is still in force"
             )
         return [name for name in moving if name not in latched]
+
+    def _to_look_at(self) -> list[str]:
+        """Who was stopped, and is to be limp: what is let go while it moves goes on by its own weight."""
+        stopped = [name for name in self._to_let_go() if ("stop", name) in self._visited]
+        return [] if self._hurried else [name for name in stopped if name not in self.errors]
 
     def _to_let_go(self) -> list[str]:
         return [name for name, axis in self._axes.items() if axis.spec.exit == "torque_off"]
@@ -104,7 +117,13 @@ class Leaving:
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
-    def _visit(self, step: str, names: Iterable[str], act: Act[Any]) -> Abreast[Any] | None:
+    def _looked(self, axis: AxisVerbs) -> Operation[None]:
+        if (yield from _rest(axis)) is not Rest.STOPPED:
+            self.said.append(f"{axis.name}: not seen to rest before it was let go")
+
+    def _visit(
+        self, step: str, names: Iterable[str], act: Act[Any], how: How = insisted
+    ) -> Abreast[Any] | None:
         """Do it to each of these who has not been visited in this step; None when there is none left."""
         axes = {name: self._axes[name] for name in names if (step, name) not in self._visited}
         if not axes or self._tries.get(step, 0) >= TRIES:
@@ -117,9 +136,7 @@ class Leaving:
             self._visited.update((step, name) for name in told)
             self.errors.update(errors_of(told))
 
-        return Abreast(
-            {bus: insisted(there, self._noting(step, act)) for bus, there in parts.items()}, combine
-        )
+        return Abreast({bus: how(there, self._noting(step, act)) for bus, there in parts.items()}, combine)
 
     def _noting(self, step: str, act: Act[Any]) -> Act[Any]:
         """The same, which counts as visited as soon as it has ended, even when an interruption takes the result."""
@@ -176,25 +193,41 @@ def _fell(axis: AxisVerbs) -> bool:
     return axis.canary.fell and axis.spec.exit == "torque_off"
 
 
+def _rest(axis: AxisVerbs) -> Operation[Rest]:
+    """Whether an axis that was stopped rests; raises nothing, for it is let go all the same."""
+    if "position" not in axis.able:
+        return Rest.UNSEEN
+    told = yield from outcome(watched(lambda: axis.able["position"](axis.device), PATIENCE))
+    return Rest.UNSEEN if isinstance(told, MotorbusError) else told[0]
+
+
 # -- without its holder ------------------------------------------------------------------------------------------------
 
 
-def given_up(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
+def given_up(
+    axes: Iterable[AxisVerbs], again: Container[str] = ()
+) -> Operation[dict[str, MotorbusError]]:
     """The axes of one bus when the lease is lost: what moves is stopped, then what is to be limp lets go.
 
     What moves is stopped whatever its `exit` says, `leave` included: nobody is there any more. Nothing is parked, for
     that would be a movement; who would be parked stays where it stops. After an emergency stop nothing is to be done.
-    Gives the errors by name; every axis is visited.
+    Those whose names are in `again` are stopped as well. Gives the errors by name; every axis is visited.
     """
     there = [axis for axis in axes if not axis.bus.turns.latched]
-    told = yield from insisted([axis for axis in there if axis.under_way or goes_on(axis)], one.stop)
+    told = yield from insisted([axis for axis in there if moves(axis) or axis.name in again], one.stop)
     limp = [axis for axis in there if axis.engaged and axis.spec.exit == "torque_off"]
     return errors_of(told) | errors_of((yield from insisted(limp, one.disable_torque)))
 
 
 def stopped_going_on(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
     """Those axes of one bus that were told to go on without an end are told to stop. Gives the errors by name."""
-    return errors_of((yield from insisted([axis for axis in axes if goes_on(axis)], one.stop)))
+    there = [axis for axis in axes if goes_on(axis) and not axis.bus.turns.latched]
+    return errors_of((yield from insisted(there, one.stop)))
+
+
+def moves(axis: AxisVerbs) -> bool:
+    """Whether it was ordered to move, and has not come to its end as far as anybody knows."""
+    return axis.under_way or goes_on(axis)
 
 
 def goes_on(axis: AxisVerbs) -> bool:

@@ -49,19 +49,24 @@ class Movement:
 
 
 class Reckoning:
-    """Where one axis is, by dead reckoning: `position` in rad or m, None while that is not known, and then `why`."""
+    """Where one axis is, by dead reckoning: `position` in rad or m, None while that is not known, and then `why`.
+
+    `departed` is where the movement began that is under way, by which what is ordered on its way is judged; None where
+    that is not known, or none is under way.
+    """
 
     def __init__(self) -> None:
         self.position: float | None = None
+        self.departed: float | None = None
         self.why = NEVER_SAID
 
     def declare(self, position: float) -> None:
         """It stands there, as somebody knows who has seen it."""
-        self.position, self.why = position, ""
+        self.position, self.why, self.departed = position, "", None
 
     def forget(self, why: str) -> None:
         """Nobody knows any more where it is, and this is why."""
-        self.position, self.why = None, why
+        self.position, self.why, self.departed = None, why, None
 
     def depart(self) -> Place:
         """A movement begins: gives where it was. Until that has come to its end nothing is known.
@@ -70,11 +75,13 @@ class Reckoning:
         """
         before = (None, CUT_SHORT) if self.why == UNDER_WAY else (self.position, self.why)
         self.forget(UNDER_WAY)
+        self.departed = before[0]
         return before
 
     def arrive(self, place: Place) -> None:
         """The movement came to its end, or was refused before anything was sent: it is there."""
         self.position, self.why = place
+        self.departed = None
 
     def known(self, name: str) -> float:
         """Where it is. Raises NotHomed, with the reason, while that is not known."""
@@ -167,13 +174,19 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
     return (yield from _gone(axis, axis.able["jog"](axis.device, velocity * axis.spec.ratio, seconds), way))
 
 
-def home(axis: AxisVerbs, *, deadline: float | None = None) -> Operation[float]:
+def home(
+    axis: AxisVerbs, *, deadline: float | None = None, velocity: float | None = None
+) -> Operation[float]:
     """Go to the switch of the axis, at most for so long (s; None: what is usual there). Returns where that is (rad, m).
 
-    From then on it is known where the axis stands, *estimated*: its device is at its angle 0 there. Raises NotHomed
-    when the switch did not come; else as the device's own verb.
+    The `velocity` is in rad/s or m/s, above 0; None is that which is set in the device, or `max_velocity` where that is
+    less. From then on it is known where the axis stands, *estimated*: its device is at its angle 0 there. Raises
+    NotHomed when the switch did not come; LimitExceeded for a velocity above that of the axis; else as the device's own
+    verb.
     """
-    options = {} if deadline is None else {"deadline": deadline}
+    options = {"at_most" if velocity is None else "velocity": _rate(axis, velocity)}
+    if deadline is not None:
+        options["deadline"] = deadline
     place = axis.spec.from_device(0.0)
     yield from journey(axis, axis.able["home"](axis.device, **options), lambda *_: (place, ""))
     return place

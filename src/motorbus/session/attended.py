@@ -7,111 +7,30 @@
         hand.beat()
 
 Endless motion, which only its stop ends, is refused unless somebody attends, and does not outlive that. A lease that is
-lost stops what moves, whatever the program does then: a thread sees to it while it sleeps or its event loop hangs, and
-where time is virtual whoever lets it pass. It needs this process. One that is killed, or frozen for good, stops
+lost stops what moves, whatever the program does then: a `Sentry` sees to it, in threads of its own while the program
+sleeps or its event loop hangs, and where time is virtual along with whoever lets it pass. It needs this process. One that is killed, or frozen for good, stops
 nothing, and what turns without an end goes on turning.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from threading import Event, Thread
 from types import TracebackType
 from typing import Any, Final, Self
 
-from motorbus.bus.background import Background
 from motorbus.core.operation import Operation, Pause, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
-from motorbus.motion.leaving import given_up, stopped_going_on
+from motorbus.motion.leaving import stopped_going_on
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.motion.several import errors_of, gathered
-from motorbus.session.buses import LOG
+from motorbus.session.sentry import Sentry
 
 WHO: Final = "this program"
-IDLE: Final = 4
-"""So often in the time that a lease lasts it is looked at while nobody holds it."""
 LOOK: Final = 0.02
 """s between two looks at whether all that moved has been told to stop."""
-
-
-class Sentry:
-    """Sees to it that what moves on a machine is stopped when this lease is lost, and tells what went wrong then.
-
-    `errors` by the names of the axes. Every bus is stopped by itself, so that a dead one delays no other.
-    """
-
-    def __init__(self, body: Body, lease: Lease) -> None:
-        self.errors: dict[str, MotorbusError] = {}
-        self._body = body
-        self._lease = lease
-        self._over = Event()
-        self._given_up: set[str] = set()
-
-    def start(self) -> None:
-        """From now on: in a thread of its own where time is real, else carried along by whoever pumps."""
-        real = [name for name, bus in self._body.buses.items() if not bus.link.virtual]
-        for name, bus in self._body.buses.items():
-            if bus.link.virtual:
-                Background(bus, self._watching(name)).along()
-        if real:
-            Thread(target=self._watch, args=(real,), name="motorbus lease", daemon=True).start()
-
-    def end(self) -> None:
-        """The lease counts no longer."""
-        self._over.set()
-
-    def busy(self, bus: str) -> bool:
-        """Whether the lease is lost, and what moves on this bus is not told to stop yet."""
-        return self._lost and bus not in self._given_up
-
-    @property
-    def _lost(self) -> bool:
-        lost = self._lease.standing(self._body.now) is Standing.LOST
-        if not lost:
-            self._given_up.clear()
-        return lost
-
-    @property
-    def _left(self) -> float:
-        """s until it is to be looked at again."""
-        lasts = self._lease.lasts or 0.0
-        held = self._lease.standing(self._body.now) is Standing.HELD
-        return max(self._lease.until - self._body.now, 0.0) + 1e-6 if held else lasts / IDLE
-
-    def _watching(self, bus: str) -> Operation[None]:
-        while not self._over.is_set():
-            if self.busy(bus):
-                yield from self._giving_up(bus)
-            yield from outcome(iter(Pause(self._left)))
-
-    def _giving_up(self, bus: str) -> Operation[None]:
-        axes = [axis for axis in self._body.axes.values() if axis.spec.bus == bus]
-        errors = yield from given_up(axes)
-        self.errors.update(errors)
-        self._given_up.add(bus)
-        for name, error in errors.items():
-            LOG.warning("%s: the lease was lost, and it may go on: %s", name, error.summary)
-
-    def _watch(self, buses: list[str]) -> None:
-        while not self._over.wait(self._left):
-            late = [name for name in buses if self.busy(name)]
-            threads = [Thread(target=self._carry_out, args=(name,), daemon=True) for name in late]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
-
-    def _carry_out(self, bus: str) -> None:
-        try:
-            Background(self._body.buses[bus], self._giving_up(bus)).carried()
-        except (
-            Exception
-        ) as error:  # the port is gone: the other buses are stopped all the same, and this one is told
-            self._given_up.add(bus)
-            LOG.warning("%s: the lease was lost, and nothing could be stopped: %s", bus, error)
 
 
 class Leased(Body):
@@ -137,7 +56,7 @@ class Leased(Body):
         for bus in self.buses.values():
             if isinstance(bus.admit, Gate):
                 bus.admit.lease = lease
-        if lease is not None and lease.lasts is not None and self.buses:
+        if lease is not None and self.buses:
             self._sentry = Sentry(self, lease)
             self._sentry.start()
 

@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from motorbus.bus.face import BusFace
 from motorbus.core.operation import READABLE
 from motorbus.errors import MotorbusError, Refused, RequestError
 from motorbus.journal import Change
 from motorbus.motion.body import Body
 from motorbus.motion.safety import canary
+from motorbus.motion.safety.gate import Gate
 from motorbus.session.keeping import unfinished
 
 
@@ -44,17 +46,41 @@ def distrust(body: Body) -> None:
     for axis in body.axes.values():
         if text := _in_doubt(body, axis):
             canary.fault(axis, text)
+    for bus in body.buses.values():
+        distrust_on(bus)
+
+
+def distrust_on(bus: BusFace) -> None:
+    """The same for the devices of a bus over which there are guards: by the old id and by the new one of the change,
+    whether an axis has that or not. Nothing is sent."""
+    gate, change = bus.admit, _doubtful(bus)
+    if change is None or not isinstance(gate, Gate):
+        return
+    concerned = _concerned(change)
+    if concerned & gate.guards.keys():
+        for node in concerned:
+            gate.faults.setdefault(node, _told(change, f"{change.bus}#{change.node}"))
 
 
 def _in_doubt(body: Body, axis: Any) -> str:
     """Why the device of this axis is not to be trusted; "" when it is."""
+    change = _doubtful(body.buses[axis.spec.bus])
+    if change is None or axis.spec.node not in _concerned(change):
+        return ""
+    return _told(change, axis.spec.device)
+
+
+def _doubtful(bus: BusFace) -> Change | None:
+    """The change that was cut off on this bus, where nobody knows what it has left."""
     try:
-        change = unfinished(body.buses[axis.spec.bus])
+        change = unfinished(bus)
     except MotorbusError:  # a later version wrote the journal; the bus has a warning for that
-        return ""
-    if change is None or change.facts.get(READABLE) or axis.spec.node not in _concerned(change):
-        return ""
-    what = change.what or f"{change.verb}() of {axis.spec.device}"
+        return None
+    return None if change is None or change.facts.get(READABLE) else change
+
+
+def _told(change: Change, device: str) -> str:
+    what = change.what or f"{change.verb}() of {device}"
     return f"{canary.UNTRUSTED}{what} did not come to its end; `motorbus recover {change.bus}` ends it"
 
 

@@ -25,7 +25,7 @@ from motorbus.bus.pump import Bus
 from motorbus.bus.stop import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import group
-from motorbus.motion.abreast import Led, LedAsync, together
+from motorbus.motion.abreast import Abreast, Led, LedAsync, together
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.budget import budget
@@ -43,7 +43,7 @@ from motorbus.session.attended import Leased, awaiting_attended, blocking_attend
 from motorbus.session.buses import LOG
 from motorbus.session.faults import clear, distrust, faults
 from motorbus.session.plan import Plan, loaded
-from motorbus.session.signals import Cancelling, Signals, ended
+from motorbus.session.signals import Cancelling, Kept, Signals, cut, interrupted, uncut
 from motorbus.session.stopping import estop, latch, reset, trigger
 
 Notify = Callable[[object], None]
@@ -152,8 +152,12 @@ class RobotVerbs(Leased):
         try:
             self._told(leaving, others)
         finally:
-            if self.when_left is not None:
-                self.when_left(leaving, others)
+            self._shown(leaving, others)
+
+    @cut
+    def _shown(self, leaving: Leaving, others: BaseException | None) -> None:
+        if self.when_left is not None:
+            self.when_left(leaving, others)
 
     def _told(self, leaving: Leaving, others: BaseException | None) -> None:
         """As an error, or as a note of what is being raised already."""
@@ -184,7 +188,8 @@ class Robot(RobotVerbs, Led):
         self._ports = tuple(buses.values())
         self._exits = ExitStack()
         self._leaving: Leaving | None = None
-        self._signals = Signals(ended)
+        self._kept = Kept()
+        self._signals = Signals(interrupted, python=True)
 
     @classmethod
     def load(
@@ -220,6 +225,7 @@ class Robot(RobotVerbs, Led):
         axis: Axis = super().axis(name)
         return axis
 
+    @uncut
     def close(self) -> None:
         """Leave the machine as its file says, and give the ports back. Calling it again does nothing.
 
@@ -232,6 +238,7 @@ class Robot(RobotVerbs, Led):
         self._signals.take()
         return self
 
+    @uncut
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -243,12 +250,12 @@ class Robot(RobotVerbs, Led):
         first: BaseException | None = None
         try:
             self._lay_down()
-            first = self._leave()
+            first = self._leave(None)
             if self._leaving is not None:
                 self._ended(self._leaving, others or first)
         finally:
             try:
-                self._leave()  # nothing is left to do, unless a Ctrl-C fell between two of these lines
+                first = self._leave(first)  # nothing is left, unless a Ctrl-C fell between two of these lines
                 self._exits.close()
             finally:
                 for bus in self._ports:
@@ -256,12 +263,10 @@ class Robot(RobotVerbs, Led):
                 self._shut = CLOSED
                 self._retire()
                 self._signals.give_back()
-        if first is not None:
-            raise first
+                self._kept.end(first)
 
-    def _leave(self) -> BaseException | None:
-        """Carry out all of it; the first interruption that came meanwhile."""
-        first: BaseException | None = None
+    def _leave(self, first: BaseException | None) -> BaseException | None:
+        """Carry out all of it; the first interruption that came up to its end."""
         caught: BaseException | None = None
         while True:
             try:
@@ -270,14 +275,20 @@ class Robot(RobotVerbs, Led):
                     first = first or caught
                     leaving.hurry()
                     caught = None
+                self._kept.release()
                 work = leaving.work()
                 if work is None:
                     return first
-                self.conductor.run(work)
+                self._carry_out(work)
             except MotorbusError as error:
                 leaving.failed(error)
             except BaseException as interruption:  # a second Ctrl-C: less waiting, and nobody is left out
                 caught = interruption
+
+    @cut
+    def _carry_out(self, work: Abreast[Any]) -> None:
+        self._kept.release()  # who fell between the one above and here shortens this, too
+        self.conductor.run(work)
 
 
 class AsyncRobot(RobotVerbs, LedAsync):

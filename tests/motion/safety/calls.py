@@ -1,14 +1,15 @@
 """Calls by chance on a machine of three families, and what must become of each.
 
 A `Caller` draws them from a seeded source: verbs of the robot, of axes and of devices, raw writes by name, writes of
-groups, broadcasts, orders that were kept and are run again, trajectories, loops; goals near and far, turns away, NaN,
-infinite, huge, no numbers at all. Before each it is reckoned by hand whether the goal is surely allowed (it must reach
+groups, broadcasts, orders that were kept and are run again; goals near and far, turns away, NaN, infinite, huge, no
+numbers at all. What leads axes is in `courses`, and what else may be the matter in `matters`. Before each it is reckoned by hand whether the goal is surely allowed (it must reach
 the wire), surely not (it must be refused), or too close to say (it must not be wrong).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
 from math import inf, isfinite, nan, pi, radians
 from random import Random
 from typing import Any, NamedTuple
@@ -17,7 +18,6 @@ from motorbus.core.operation import Operation, Together, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.families.kst import broadcast_position
-from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.motion.safety.decoders import COUNT, TENTH, FeetechWitness, KstWitness, Witness
@@ -32,8 +32,18 @@ SLACK = 0.0031
 """rad by which a decoded target may be beyond: half a count of the coarsest servo, see `guard.ROUNDED`."""
 SURELY = 0.02
 """rad from every bound from which on nobody can be in doubt."""
+STAYS = 0.004
+"""rad of a goal from where a device is, up to which that is an order to stay: two counts, or two tenths of a degree."""
 FRESH = 0.5
 """s; an older reading is not used, and the bus looks again."""
+Spot = tuple[str, int]
+"""A device: its bus and its node."""
+TURN = radians(90)
+"""rad/s that an axis of these may turn."""
+UNIT = 0.08
+"""rad/s by which a decoded speed may be beyond: a unit of 0.732 RPM."""
+WHEEL = 3
+"""The servo of the bus `arm` that turns without an end; it is no part of `BOUNDS`."""
 ODD = (
     nan,
     inf,
@@ -68,7 +78,7 @@ def _bound(name: str, zero: float) -> Bound:
     return Bound(name, min(ends), max(ends), radians(float(row["max_step"].split()[0])))
 
 
-BOUNDS: dict[tuple[str, int], Bound] = {
+BOUNDS: dict[Spot, Bound] = {
     ("arm", 1): _bound("a1", pi),
     ("arm", 2): _bound("a2", pi),
     ("can", 0x25): _bound("c1", 0.0),
@@ -77,24 +87,36 @@ BOUNDS: dict[tuple[str, int], Bound] = {
 
 
 class Call(NamedTuple):
-    """One call: what it is, and the places (rad of the device) by device to which it must lead when all are allowed."""
+    """One call: what it is, and the places (rad of the device) by device to which it must lead when all are allowed.
+
+    `each`: each goal is an order of its own, and `do` gives what came of each. `led`: small goals lead there, so only
+    the limits count, and nobody moves when one of them is refused. `barred` are those to whom no goal and no torque
+    may go meanwhile, `attended` says that wheels may turn, and `once` that it means nothing a second time.
+    """
 
     what: str
     do: Callable[[], object]
-    wants: dict[tuple[str, int], object]
-    each: bool = False  # each goal is an order of its own, and `do` gives what came of each
+    wants: Mapping[Spot, object]
+    each: bool = False
+    led: bool = False
+    barred: Collection[Spot] = ()
+    attended: bool = False
+    once: bool = False
 
 
 class Tally:
-    """How many calls had to pass and did, had to be refused and were, and were too close to say; frames judged."""
+    """How many calls had to pass and did, had to be refused and were (by what they are), and were too close to say;
+    and how much of what was on the wires was judged."""
 
     def __init__(self) -> None:
-        self.passed = self.refused = self.close = self.targets = 0
+        self.passed: Counter[str] = Counter()
+        self.refused: Counter[str] = Counter()
+        self.close = self.targets = self.speeds = 0
 
     def __str__(self) -> str:
         return (
-            f"{self.passed} passed, {self.refused} refused, {self.close} too close to say or no single order; "
-            f"{self.targets} targets on the wires"
+            f"{self.passed.total()} passed, {self.refused.total()} refused, {self.close} too close to say or no order; "
+            f"{self.targets} targets and {self.speeds} speeds on the wires"
         )
 
 
@@ -111,25 +133,25 @@ class Caller:
 
     # -- where devices are ---------------------------------------------------------------------------------------------
 
-    def device(self, spot: tuple[str, int]) -> Any:
+    def device(self, spot: Spot) -> Any:
         """The verbs of a device, as a program has them that knows nothing of axes."""
         return self.robot[BOUNDS[spot].axis].device
 
-    def here(self, spot: tuple[str, int]) -> float:
+    def here(self, spot: Spot) -> float:
         """Where a device was heard to be last, or is when that was a while ago and the bus will look again (rad)."""
         wire = self.wires[spot[0]]
         return wire.heard[spot[1]] if self.age(spot) < FRESH else self.really(spot)
 
-    def really(self, spot: tuple[str, int]) -> float:
+    def really(self, spot: Spot) -> float:
         """Where it is, whoever was told."""
         node: Any = self.sims[spot[0]][spot[1]]
         return float(node.raw_position) * (COUNT if spot[0] == "arm" else TENTH)
 
-    def age(self, spot: tuple[str, int]) -> float:
+    def age(self, spot: Spot) -> float:
         """s since it was heard."""
         return self.robot.buses[spot[0]].link.now() - self.wires[spot[0]].heard_at[spot[1]]
 
-    def goal(self, spot: tuple[str, int]) -> object:
+    def goal(self, spot: Spot) -> object:
         """Somewhere: near, far, at a limit, turns away, or nowhere."""
         bound, here, chance = BOUNDS[spot], self.here(spot), self.chance
         kind = chance.randrange(10)
@@ -145,33 +167,40 @@ class Caller:
             return here + chance.choice((-1, 1)) * (bound.step + chance.uniform(-0.01, 0.01))
         return min(max(here + chance.uniform(-1.1, 1.1) * bound.step, bound.low - 0.05), bound.high + 0.05)
 
-    def verdict(self, spot: tuple[str, int], goal: object) -> bool | None:
-        """Whether this goal must reach the device; None where that is too close to say."""
-        bound, here = BOUNDS[spot], self.here(spot)
-        if (
-            isinstance(goal, bool)
-            or not isinstance(goal, int | float)
-            or abs(goal) > 1e300
-            or not isfinite(goal)
-        ):
-            return False
+    def verdict(self, spot: Spot, goal: object) -> bool | None:
+        """Whether this goal must reach the device at once; None where that is too close to say."""
+        inside, bound = self.within(spot, goal), BOUNDS[spot]
+        if inside is not True or not isinstance(goal, int | float):
+            return inside
         if abs(self.age(spot) - FRESH) < 0.02:
             return None
-        beyond = max(bound.low - goal, goal - bound.high, abs(goal - here) - bound.step)
+        beyond = abs(goal - self.here(spot)) - bound.step
+        return None if abs(beyond) < SURELY else beyond < 0
+
+    def within(self, spot: Spot, goal: object) -> bool | None:
+        """Whether this is a place within the limits of the device; None where that is too close to say."""
+        if isinstance(goal, bool) or not isinstance(goal, int | float):
+            return False
+        if abs(goal) > 1e300 or not isfinite(goal):
+            return False
+        bound = BOUNDS[spot]
+        beyond = max(bound.low - goal, goal - bound.high)
         return None if abs(beyond) < SURELY else beyond < 0
 
     # -- the calls -----------------------------------------------------------------------------------------------------
 
     def draw(self) -> Call:
         """The next call."""
-        kinds = (
+        return self.chance.choice(self.kinds())()
+
+    def kinds(self) -> list[Callable[[], Call]]:
+        """What there is to draw from, as often as it is to be drawn."""
+        return [
             *[self.move] * 20, *[self.write] * 20, *[self.group] * 12, *[self.broadcast] * 4, *[self.two] * 12,
             *[self.again] * 10, *[self.rest] * 8, *[self.wait] * 10, *[self.reg_write] * 3,
-            self.lead, self.replay, self.loop,
-        )  # fmt: skip
-        return self.chance.choice(kinds)()
+        ]  # fmt: skip
 
-    def spot(self, bus: str = "") -> tuple[str, int]:
+    def spot(self, bus: str = "") -> Spot:
         """A device, of this bus if one is named."""
         return self.chance.choice([one for one in BOUNDS if bus in ("", one[0])])
 
@@ -230,10 +259,10 @@ class Caller:
 
         return Call("two", lambda: bus.run(self._both(wants)), wants, each=True)
 
-    def _both(self, wants: dict[tuple[str, int], object]) -> Operation[object]:
+    def _both(self, wants: dict[Spot, object]) -> Operation[object]:
         return (yield from Together([outcome(self._write(spot, goal)) for spot, goal in wants.items()]))
 
-    def _write(self, spot: tuple[str, int], goal: object) -> Operation[object]:
+    def _write(self, spot: Spot, goal: object) -> Operation[object]:
         device = self.device(spot)
         return (yield from type(device).write.function(device, goal_position=goal))
 
@@ -262,42 +291,14 @@ class Caller:
 
         return Call("wait", passes, {})
 
-    def lead(self) -> Call:
-        """A movement of several axes, led by small goals."""
-        goals = {bound.axis: self.chance.uniform(-1.2, 1.2) for bound in BOUNDS.values()}
-        some = dict(self.chance.sample(sorted(goals.items()), self.chance.randint(1, 3)))
-        return Call("robot.move", lambda: self.robot.move(some), {})
-
-    def replay(self) -> Call:
-        """A trajectory, within the limits or not."""
-        name, far = self.chance.choice(("a1", "c1")), self.chance.uniform(-0.9, 0.9)
-        places = [far * step / 20 for step in range(21)]
-        made = Trajectory([0.05 * step for step in range(21)], {name: places})
-        return Call("robot.replay", lambda: self.robot.replay(made), {})
-
-    def loop(self) -> Call:
-        """A few cycles with whatever goals."""
-        direct = self.chance.random() < 0.5
-
-        def cycles() -> None:
-            with self.robot.loop(rate=50, axes=["a1", "c1"], direct=direct) as loop:
-                for state in loop:
-                    for name in ("a1", "c1"):
-                        goal = self.chance.choice((nan, inf, 0.01, -0.02, 2.0, state.position[name] + 0.01))
-                        loop.goal[name] = goal
-                    if state.number >= 3:
-                        break
-
-        return Call("loop", cycles, {})
-
     # -- what became of them -------------------------------------------------------------------------------------------
 
     def make(self, call: Call) -> None:
         """Make a call and judge it."""
         self.freshen()
-        verdicts = [self.verdict(spot, goal) for spot, goal in call.wants.items()]
+        verdicts = self.verdicts(call)
         for wire in self.wires.values():
-            wire.targets.clear()
+            wire.forget()
         refused: Exception | None = None
         told: Any = None
         try:
@@ -311,13 +312,27 @@ class Caller:
                 self._judge_call(call._replace(wants={spot: goal}), [verdict], failure)
         else:
             self._judge_call(call, verdicts, refused)
-        if self.chance.random() < 0.1:
+        if not (call.led or call.once) and self.chance.random() < 0.1:
             self.kept = [*self.kept[-20:], call]
+
+    def verdicts(self, call: Call) -> list[bool | None]:
+        """Whether each goal must reach its device, as things stand."""
+        of = self.within if call.led else self.verdict
+        return [of(spot, goal) for spot, goal in call.wants.items()]
 
     def freshen(self) -> None:
         """As often as not somebody has just looked where all are; else the bus has to look by itself."""
         if self.chance.random() < 0.5:
             self.robot.positions()
+
+    def ordered(self, spot: Spot) -> list[float]:
+        """Where the wire has ordered a device to go in this call (rad)."""
+        return [one.to for one in self.wires[spot[0]].targets if one.node == spot[1]]
+
+    def led_away(self, spot: Spot) -> bool:
+        """Whether it was ordered to go anywhere in this call, and not only to stay where it is."""
+        targets = (one for one in self.wires[spot[0]].targets if one.node == spot[1])
+        return any(one.heard is None or abs(one.to - one.heard) > STAYS for one in targets)
 
     def _judge_wires(self, call: Call) -> None:
         for spot, bound in BOUNDS.items():
@@ -327,20 +342,29 @@ class Caller:
                     assert target.heard is not None, (call.what, target)
                     assert bound.low - SLACK <= target.to <= bound.high + SLACK, (call.what, target, bound)
                     assert abs(target.to - target.heard) <= bound.step + SLACK, (call.what, target, bound)
+        for speed in self.wires["arm"].speeds:
+            self.tally.speeds += 1
+            assert abs(speed.to) <= TURN + UNIT, (call.what, speed)
+            assert speed.node != WHEEL or call.attended or not speed.to, (call.what, speed)
+        for bus, node in call.barred:
+            assert not self.led_away((bus, node)), (call.what, bus, node, self.wires[bus].targets)
+            assert node not in self.wires[bus].powered, (call.what, bus, node)
 
     def _judge_call(self, call: Call, verdicts: list[bool | None], refused: Exception | None) -> None:
-        if not verdicts or None in verdicts:
+        if not verdicts or (None in verdicts and not call.barred):
             self.tally.close += 1
-        elif all(verdicts):
+        elif all(verdicts) and not call.barred:
             assert refused is None, (call.what, call.wants, refused)
             for spot, goal in call.wants.items():
-                ordered = [one.to for one in self.wires[spot[0]].targets if one.node == spot[1]]
                 assert isinstance(goal, int | float)
-                assert any(abs(one - goal) <= SLACK for one in ordered), (call.what, goal, ordered)
-            self.tally.passed += 1
+                ordered = self.ordered(spot)
+                assert any(abs(one - goal) <= SLACK for one in ordered), (call.what, goal, ordered[-3:])
+            self.tally.passed[call.what] += 1
         else:
             assert refused is not None, (call.what, call.wants)
-            self.tally.refused += 1
+            if call.led:
+                assert not [spot for spot in call.wants if self.ordered(spot)], (call.what, call.wants)
+            self.tally.refused[call.what] += 1
 
 
 def drawn(caller: Caller, count: int) -> Iterator[Call]:

@@ -16,8 +16,10 @@ from motorbus.link.base import Delivery, PerfectLine, Side
 
 COUNT = 2 * pi / 4096  # an STS3215
 TENTH = radians(0.1)  # a KST servo
-PRESENT, GOAL = 56, 42
-WRITE, REG_WRITE, SYNC_WRITE, READ, SYNC_READ = 3, 4, 0x83, 2, 0x82
+SPEED = COUNT  # rad/s of one unit: a step each second
+PRESENT, GOAL, VELOCITY, TORQUE = 56, 42, 46, 40
+WRITE, REG_WRITE, SYNC_WRITE, READ, SYNC_READ, ACTION = 3, 4, 0x83, 2, 0x82, 5
+EVERYONE = 0xFE
 
 
 class Target(NamedTuple):
@@ -28,13 +30,31 @@ class Target(NamedTuple):
     heard: float | None
 
 
+class Speed(NamedTuple):
+    """A velocity (rad/s, with its sign), or a bound of one, that a frame orders."""
+
+    node: int
+    to: float
+
+
 class Witness(PerfectLine):
-    """A wire that only carries, and listens."""
+    """A wire that only carries, and listens.
+
+    `speeds` and who was `powered`, given torque, are noted as `targets` are. `waiting` has by node what a servo was
+    handed over for the next ACTION: the first register and the bytes. It is noted when that comes, a place also before.
+    """
 
     def __init__(self) -> None:
         self.targets: list[Target] = []
+        self.speeds: list[Speed] = []
+        self.powered: set[int] = set()
+        self.waiting: dict[int, tuple[int, bytes]] = {}
         self.heard: dict[int, float] = {}
         self.heard_at: dict[int, float] = {}
+
+    def forget(self) -> None:
+        """Begin anew to note what is ordered; where devices are, and what waits, is kept."""
+        self.targets, self.speeds, self.powered = [], [], set()
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         if sender is Side.HOST:
@@ -68,12 +88,31 @@ class FeetechWitness(Witness):
             self._asked[node] = rest[0], rest[1]
         elif instruction == SYNC_READ:
             self._asked.update(dict.fromkeys(rest[2:], (rest[0], rest[1])))
-        elif instruction in (WRITE, REG_WRITE):
-            yield from _goal(node, rest[0], rest[1:])
+        elif instruction == WRITE:
+            yield from self._written(node, rest[0], rest[1:])
+        elif instruction == REG_WRITE:
+            self.waiting[node] = rest[0], rest[1:]
+            yield from self.place(node)
+        elif instruction == ACTION:
+            for one in list(self.waiting) if node == EVERYONE else [node]:
+                if one in self.waiting:
+                    yield from self._written(one, *self.waiting.pop(one))
         elif instruction == SYNC_WRITE:
             size = rest[1]
             for start in range(2, len(rest), size + 1):
-                yield from _goal(rest[start], rest[0], rest[start + 1 : start + 1 + size])
+                yield from self._written(rest[start], rest[0], rest[start + 1 : start + 1 + size])
+
+    def _written(self, node: int, address: int, data: bytes) -> Iterator[tuple[int, float]]:
+        """What these bytes from this register on order."""
+        self.speeds += (Speed(node, _signed(two) * SPEED) for two in _two(VELOCITY, address, data))
+        if 0 <= TORQUE - address < len(data) and data[TORQUE - address]:
+            self.powered.add(node)
+        yield from ((node, _signed(two) * COUNT) for two in _two(GOAL, address, data))
+
+    def place(self, node: int) -> Iterator[tuple[int, float]]:
+        """Where it would go at an ACTION, if anywhere."""
+        if node in self.waiting:
+            yield from ((node, _signed(two) * COUNT) for two in _two(GOAL, *self.waiting[node]))
 
     def told(self, data: Data) -> Iterator[tuple[int, float]]:
         assert isinstance(data, bytes)
@@ -87,10 +126,11 @@ class FeetechWitness(Witness):
             data = data[4 + length :]
 
 
-def _goal(node: int, address: int, data: bytes) -> Iterator[tuple[int, float]]:
-    at = GOAL - address
+def _two(register: int, address: int, data: bytes) -> Iterator[bytes]:
+    """The two bytes of this register, if they are among these."""
+    at = register - address
     if at >= 0 and at + 2 <= len(data):
-        yield node, _signed(data[at : at + 2]) * COUNT
+        yield data[at : at + 2]
 
 
 def _signed(two: bytes) -> int:

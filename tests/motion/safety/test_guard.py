@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import Goal
 from motorbus.errors import LimitExceeded, Refused
-from motorbus.motion.safety.guard import ROUNDED, UNIT, Bounds, Guard
+from motorbus.motion.limits import SLOWEST
+from motorbus.motion.moving.stream import FAR, LAG
+from motorbus.motion.safety.guard import LATE, NEAR, ROUNDED, UNIT, Bounds, Guard
 
 BOUNDS = Bounds(-1.0, 2.0, 0.5, 3.0)
 
@@ -68,7 +72,7 @@ def test_who_stands_outside_may_come_back_and_not_go_farther() -> None:
 
 
 def test_of_who_does_not_tell_where_it_is_only_the_way_is_judged() -> None:
-    guard = guarded(None, BOUNDS._replace(step=5.0), measures=False)
+    guard = guarded(None, BOUNDS._replace(step=5.0, speed=inf), measures=False)
     guard.check_known(7, 99.0)
     assert passes(guard, way(-3.0))
     assert not passes(guard, way(3.1))
@@ -118,3 +122,25 @@ def test_a_way_is_judged_as_the_place_that_it_leads_to(here: float, by: float) -
         passes(guarded(here), way(by)) == passes(guarded(here), place(here + by))
         or abs(abs(by) - BOUNDS.step) < 2 * ROUNDED
     )
+
+
+@pytest.mark.parametrize(("speed", "far"), [(0.1, 0.18), (1.0, 0.9)])
+def test_what_comes_without_a_speed_leads_no_farther_than_goals_of_one_that_is_led(
+    speed: float, far: float
+) -> None:
+    guard = guarded(bounds=Bounds(speed=speed))
+    for goal in (place(far), place(-far), way(far)):
+        guard.check_goal(goal)
+    assert guard.is_fine(far, 10.0)
+    assert not guard.is_fine(far + 2 * ROUNDED, 10.0)
+    for goal in (place(far + 2 * ROUNDED), way(-far - 2 * ROUNDED)):
+        with pytest.raises(LimitExceeded, match="comes without a velocity, so .* as fast as it can") as caught:
+            guard.check_goal(goal)
+        assert (caught.value.reason, caught.value.node) == ("velocity", 7)
+        assert "nothing was sent" in str(caught.value)
+        guard.check_goal(goal, paced=True)
+
+
+def test_who_is_led_as_slowly_and_lags_as_far_as_he_may_is_not_ordered_too_far() -> None:
+    assert LATE == pytest.approx(LAG + 2 / SLOWEST)
+    assert NEAR == FAR

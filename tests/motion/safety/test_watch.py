@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Data, Exchange
+from motorbus.core.operation import Data, Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import DeviceError, Faulted, MotorbusError, NoReply, Overloaded, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.canary import HEALTH
@@ -68,7 +68,7 @@ def test_each_is_asked_once_in_a_quarter_of_a_second_one_at_a_time() -> None:
             wanted = watch.due(at)
             if wanted is not None:
                 asked.append((whom(wanted), at - start))
-                watch.take(EASY, {}, at)
+                watch.take(whom(wanted), EASY, {}, at)
         assert {node for node, _ in asked} == {1, 2, 3}
         for node in (1, 2, 3):
             moments = [at for who, at in asked if who == node]
@@ -104,7 +104,7 @@ def test_on_a_slow_line_it_takes_a_tenth_of_the_wire_and_no_more() -> None:
             wanted = watch.due(start + cycle * 0.01)
             if wanted is not None:
                 spent += bus.family.air_time(wanted, 9600)
-                watch.take(EASY, {}, start + cycle * 0.01)
+                watch.take(whom(wanted), EASY, {}, start + cycle * 0.01)
         bus.turns.rate = 1_000_000
         assert 0.5 * SHARE < spent / 10.0 < 1.1 * SHARE
 
@@ -133,7 +133,7 @@ def test_an_answer_that_is_lost_is_forgiven_and_who_cannot_tell_is_left_out(
     with watched("1") as (watch, robot):
         at = now(robot) + HEALTH
         assert watch.due(at) is not None
-        watch.take(lost, {}, at)
+        watch.take(1, lost, {}, at)
         assert watch.due(at) is None
         assert (watch.due(at + 2 * HEALTH) is not None) is again
 
@@ -147,7 +147,7 @@ def push(
     """So often, a quarter of a second apart, servo 1 tells that it pushes hard; its goal is at 3.5 rad."""
     for number in range(1, times + 1):
         at = start + number * HEALTH
-        watch.take(Health(State(at, load=0.95, **felt), True, False), {1: 3.5}, at, places or {})
+        watch.take(1, Health(State(at, load=0.95, **felt), True, False), {1: 3.5}, at, places or {})
 
 
 def test_who_pushes_for_too_long_off_his_goal_is_overloaded_and_the_words_say_all() -> None:
@@ -176,9 +176,35 @@ def test_who_is_not_guarded_pushes_as_he_likes_and_is_at_fault_all_the_same() ->
         at = now(robot) + 10.0
         push(watch, now(robot), 20, position=3.0, temperature=90.0)
         with pytest.raises(Faulted):
-            watch.take(Health(State(at), False, True), {}, at)
+            watch.take(1, Health(State(at), False, True), {}, at)
         assert set(robot.faults) == {"a1"}
         assert watch.due(at + 100.0) is None
+
+
+@pytest.mark.parametrize("limp", [1, 2])
+@pytest.mark.parametrize("begun", [0, 2])
+def test_each_is_judged_by_its_own_answer_also_where_two_are_asked_at_a_time(limp: int, begun: int) -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        bus, (first, second) = robot.buses["arm"], robot.axes.values()
+        watch = Watch(bus, [first, second])
+        bus.run(watch.begin([first, second]))
+        bus.run(iter(Pause(2.0)))
+        wanted = watch.due(now(robot))
+        assert wanted is not None
+        other = second if whom(wanted) == first.spec.node else first
+        sims["arm"][limp].memory["torque_enable"] = 0
+
+        def examined() -> Operation[None]:
+            for _ in range(begun):  # then the other one has been asked by now
+                yield from Pause(0)
+            yield from watch.examine(other)
+
+        bus.run(iter(Together([outcome(watch.asking()), outcome(examined())])))
+        assert set(robot.faults) <= {f"a{limp}"}
+        bus.run(iter(Pause(2.0)))
+        bus.run(outcome(watch.asking()))  # whose turn came up meanwhile
+        assert set(robot.faults) == {f"a{limp}"}
 
 
 # -- while axes are led ------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from motorbus.core.operation import ANY, Answer, Exchange, Rank, Together
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound
-from motorbus.families.feetech.driver.group import sync_writes
+from motorbus.families.feetech.driver.group import sync_writes, written_all
 from motorbus.families.feetech.driver.motion import move_block, way
 
 if TYPE_CHECKING:
@@ -51,8 +51,7 @@ def _move_together(
         yield from ask_bound(servo, servo.table)
         block = move_block(servo, servo.table, goal, velocity, acceleration)
         blocks.append(block._replace(under=servo.settings))
-    for exchange in sync_writes(servos, blocks):
-        yield from exchange
+    yield from written_all(list(sync_writes(servos, blocks)))
     if wait:
         arrivals = []
         for servo, goal in zip(servos, goals, strict=True):

@@ -152,7 +152,7 @@ def run_once(
 
 def _move_question(bus: Bus) -> str:
     one = face(bus, 1)
-    (goal,) = of_move(one, one.read_project(1).project)
+    goal, *_ = of_move(one, one.read_project(1).project)
     return "" if abs(goal.value) <= FAR else f"move by {units.show(goal.value, 'position')}"
 
 

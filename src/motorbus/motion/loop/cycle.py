@@ -278,6 +278,8 @@ class Part:
         command = _claimed(fresh)
         train = yield from train_of(self.bus, axes)
         try:
+            for axis in axes:
+                yield from canary.unbroken(axis)
             command.depart()
             angles = yield from _begun(train, command, self.watch)
         except Faulted:

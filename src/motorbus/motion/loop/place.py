@@ -19,6 +19,7 @@ from motorbus.motion.clamping import Clamped, Policy, kept
 from motorbus.motion.limits import Device, shown_rate
 from motorbus.motion.machine.model import ROUNDING, VELOCITY
 from motorbus.motion.profile import Follower, Limits, follower
+from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Place:
         "_follower",
         "_high",
         "_jerk",
+        "_lead",
         "_low",
         "_passed",
         "_policy",
@@ -96,7 +98,8 @@ class Place:
         self._device: Final = device
         self._low: Final = found.low - slack
         self._high: Final = found.high + slack
-        self._far: Final = inf if spec.max_step is None else spec.max_step * (1 + ROUNDING)
+        self._lead: Final = spec.max_velocity * LATE + NEAR / abs(spec.ratio)
+        self._far: Final = min(inf if spec.max_step is None else spec.max_step, self._lead) * (1 + ROUNDING)
         self.period: Final = period
         self._way: Final = spec.max_velocity * period * (1 + ROUNDING) + ROUNDING
         self._direct: Final = direct
@@ -222,7 +225,7 @@ class Place:
         if way > self._way * periods:
             raise self._too_fast(asked, since, periods)
         if far > self._far:
-            limits.check_step(self.name, self.axis.spec, asked, self.position)
+            raise self._too_far(asked)
 
     def step(self, periods: int) -> float:
         """The angle of its device (rad) to be ordered `periods` after the last one.
@@ -249,15 +252,30 @@ class Place:
         return self.zero + self.sent * self.ratio
 
     def _held_back(self, way: Follower, asked: float) -> None:
+        error = self._too_far(asked)
+        assert self.sent is not None
+        way.reset(self.sent)
+        self.asked = self._passed = self.sent
+        error.cause = "something holds it back, or nobody has heard for a while where it is"
+        error.advice = f"look what that is; it stays at its last goal, {self.axis.spec.show(self.sent)}"
+        raise error
+
+    def _too_far(self, asked: float) -> LimitExceeded:
+        """The error for a goal that is too far from where it is measured to be, for `max_step` or for its velocity."""
+        name, spec = self.name, self.axis.spec
         try:
-            limits.check_step(self.name, self.axis.spec, asked, self.position)
+            limits.check_step(name, spec, asked, self.position)
         except LimitExceeded as error:
-            assert self.sent is not None
-            way.reset(self.sent)
-            self.asked = self._passed = self.sent
-            error.cause = "something holds it back, or nobody has heard for a while where it is"
-            error.advice = f"look what that is; it stays at its last goal, {self.axis.spec.show(self.sent)}"
-            raise
+            return error
+        far, most = spec.show(abs(asked - self.position)), spec.show(self._lead)
+        return LimitExceeded(
+            f"{name}: the goal {spec.show(asked)} is {far} from {spec.show(self.position)}, where it is, and what is "
+            f"led at {shown_rate(spec, VELOCITY, spec.max_velocity)} at most is never ordered farther than {most}",
+            reason="velocity",
+            expected=f"a goal within {most} of {spec.show(self.position)}",
+            cause="something holds it back, or it is slower than max_velocity says",
+            advice="look what that is; nothing was sent",
+        )
 
     def rest(self) -> None:
         """It has stood still, or nothing was sent: where it follows, it goes on from where it was told to be last."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from motorbus.errors import NoReply, Stalled
+from motorbus.errors import Interrupted, NoReply, Stalled
 from motorbus.motion.safety.canary import PROTECTIVE
 
 if TYPE_CHECKING:
@@ -66,6 +66,15 @@ def silent(axis: AxisVerbs, seconds: float) -> NoReply:
         cause="its cable, its supply, or another device in between",
         advice="look at the cable and the supply; all of the movement were told to stop",
         node=axis.spec.node,
+    )
+
+
+def held_up(seconds: float) -> Interrupted:
+    """The error for a program that has not said where to go for so long (s)."""
+    return Interrupted(
+        f"nobody was told where to go for {seconds:.2f} s, so the movement ends where they stopped",
+        cause="this program was held up: stopped, swapped out, or on a computer that is far too busy",
+        advice="give the order again if it is still wanted; all of the movement were told to stop",
     )
 
 

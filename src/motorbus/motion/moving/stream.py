@@ -28,7 +28,7 @@ from motorbus.errors import (
 from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moving.forgiving import forgiven
-from motorbus.motion.moving.lagging import behind, not_there, silent
+from motorbus.motion.moving.lagging import behind, held_up, not_there, silent
 from motorbus.motion.moving.moved import STILL, Cycles, Track
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.safety.watch import Watch
@@ -45,6 +45,8 @@ TOLERANCE: Final = 0.02
 """rad of the device, a little more than a degree: under load a servo stays off its goal."""
 SETTLE: Final = 1.0
 """s after the end of the course within which an axis must be in position."""
+HELD_UP: Final = 0.5
+"""s between two goals after which nobody is led on: the next one would be far ahead of where the axes stopped."""
 LAG: Final = 0.3
 """s that an axis may be behind, at the highest speed of its course: slower servos need another max_velocity."""
 FAR: Final = 0.1
@@ -236,6 +238,8 @@ class Stream:
                 return
             reached = yield from self._next(slot)
             self._skipped += reached - slot - 1
+            if (gap := (reached - slot) * self._grid.period) > HELD_UP:
+                raise held_up(gap)
             slot = reached
 
     def _look(self) -> Operation[None]:
@@ -263,7 +267,7 @@ class Stream:
         try:
             yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
         except LimitExceeded as error:
-            if error.reason == "step" and error.node in self._axes:
+            if error.reason in ("step", "velocity") and error.node in self._axes:
                 raise (yield from self._stalled(self._axes[error.node])) from error
             raise
         except Interrupted:

@@ -91,7 +91,7 @@ class Canary:
 
 def looked_at(axis: AxisVerbs, health: Health, *, led: bool = False) -> Faulted | None:
     """Judge a sample of an axis; when that shows a fault the axis is at fault from here on, and this is the error."""
-    armed = axis.engaged and axis.canary.is_armed(_stops(axis))
+    armed = holds(axis)
     reason = axis.canary.take(health, armed=armed, led=led)
     if not reason or not (armed or axis.engaged or axis.under_way):
         return None
@@ -112,8 +112,22 @@ def looked_after(axis: AxisVerbs, now: float) -> Operation[None]:
         yield from Report(FaultNoted(axis.name, why(axis)))
 
 
+def unbroken(axis: AxisVerbs) -> Operation[None]:
+    """Of an axis that is to get torque: raise Faulted where it had some from here, and its device has not kept it.
+
+    One that was given none from here, or was let go since, is not asked.
+    """
+    if holds(axis):
+        yield from kept(axis)
+
+
+def holds(axis: AxisVerbs) -> bool:
+    """Whether it was given torque from here, and nothing has left since that may have let it go."""
+    return axis.engaged and axis.canary.is_armed(_stops(axis))
+
+
 def kept(axis: AxisVerbs) -> Operation[None]:
-    """Of an axis that has just been told to hold: raise Faulted where its device has not kept its torque."""
+    """Of an axis that was told to hold: raise Faulted where its device has not kept its torque."""
     if "health" not in axis.able:
         return
     found = yield from outcome(axis.able["health"](axis.device))

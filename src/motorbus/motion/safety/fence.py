@@ -15,10 +15,11 @@ from motorbus.core.operation import Runnable
 from motorbus.errors import RequestError
 from motorbus.motion.reckoning import UNDER_WAY, Reckoning
 from motorbus.motion.safety.gate import Gate
-from motorbus.motion.safety.guard import Bounds, Guard
+from motorbus.motion.safety.guard import Bounds, Guard, untold
 
 if TYPE_CHECKING:
     from motorbus.bus.face import BusFace
+    from motorbus.core.family import Readdressed
     from motorbus.motion.body import Body
     from motorbus.motion.capabilities import AxisVerbs
     from motorbus.motion.machine import AxisSpec
@@ -48,17 +49,42 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
     _watched(bus, bus.admit)
     for name, spec in axes.items():
         try:
-            device = bus.family.devices.blocking(bus, spec.node)
+            ask = _asking(bus, spec.node)
         except RequestError:  # an id that cannot be is nobody's
             continue
-        position = getattr(type(device), "position", None)
-        ask = None if position is None else partial(position.function, device)
         bus.admit.guards[spec.node] = _guard(name, spec, ask)
 
 
 def _watched(bus: BusFace, gate: Gate) -> None:
-    gate.watch(bus.turns.known.seen, bus.link.now, bus.turns.known.stops)
+    gate.watch(bus.turns.known.seen, bus.link.now, bus.turns.known.stops, bus.turns.known.accepts)
     bus.turns.look = gate.look
+    bus.readdressed = partial(follow, bus, gate)
+
+
+def follow(bus: BusFace, gate: Gate, event: Readdressed) -> None:
+    """A device is about to answer to another id: its guard holds, and its fault counts, under that one as well.
+
+    An id that the machine file has bounds for keeps those. Where nobody knows which device it is, it may be any.
+    """
+    known = [node for node in gate.guards if event.node in (None, node)]
+    for node in known[:1]:
+        if event.new not in gate.guards:
+            gate.guards[event.new] = _moved(bus, gate.guards[node], event.new)
+        if node in gate.faults:
+            gate.faults.setdefault(event.new, gate.faults[node])
+
+
+def _moved(bus: BusFace, guard: Guard, node: int) -> Guard:
+    """The guard of a device that has another id now."""
+    ask = None if guard.track is None else _asking(bus, node)
+    return Guard(guard.name, guard.bounds, measures=ask is not None, ask=ask, show=guard.show)
+
+
+def _asking(bus: BusFace, node: int) -> Callable[[], Runnable[Any]] | None:
+    """What asks a device of this bus where it is; None where devices of its family do not tell."""
+    device = bus.family.devices.blocking(bus, node)
+    position = getattr(type(device), "position", None)
+    return None if position is None else partial(position.function, device)
 
 
 def guard(axis: AxisVerbs) -> Guard:
@@ -66,27 +92,49 @@ def guard(axis: AxisVerbs) -> Guard:
     position = axis.able.get("position")
     if position is None and axis.reckoning is not None:
         return _reckoned(axis, axis.reckoning)
-    return _guard(axis.name, axis.spec, None if position is None else partial(position, axis.device))
+    ask = None if position is None else partial(position, axis.device)
+    return _guard(axis.name, axis.spec, ask, partial(_ordered, axis))
 
 
 def _reckoned(axis: AxisVerbs, reckoning: Reckoning) -> Guard:
     """Of an axis whose device does not tell where it is: what is reckoned counts, until somebody else moves it."""
 
     def here() -> float | None:
-        return None if reckoning.position is None else axis.spec.to_device(reckoning.position)
+        place = reckoning.departed if reckoning.position is None else reckoning.position
+        return None if place is None else axis.spec.to_device(place)
 
     def leaves() -> None:
         if reckoning.why != UNDER_WAY:
             reckoning.forget("its device was ordered to move by itself, and not as an axis")
 
     return Guard(
-        axis.name, bounds(axis.spec), measures=False, reckons=here, leaves=leaves, show=_shown(axis.spec)
+        axis.name,
+        bounds(axis.spec),
+        measures=False,
+        reckons=here,
+        leaves=leaves,
+        ordered=partial(_ordered, axis),
+        show=_shown(axis.spec),
     )
 
 
-def _guard(name: str, spec: AxisSpec, ask: Callable[[], Runnable[Any]] | None) -> Guard:
+def _ordered(axis: AxisVerbs, moves: bool) -> None:
+    """Its device was ordered something, maybe by itself: it is left as the file says, and stopped with all that moves.
+
+    Of what was ordered by itself nobody tells when it has come to its end: it is under way until it is stopped.
+    """
+    axis.engaged = True
+    axis.under_way = axis.under_way or moves
+
+
+def _guard(
+    name: str,
+    spec: AxisSpec,
+    ask: Callable[[], Runnable[Any]] | None,
+    ordered: Callable[[bool], None] = untold,
+) -> Guard:
     """A guard over a device that tells where it is when it is asked so; None: it cannot be asked."""
-    return Guard(name, bounds(spec), measures=ask is not None, ask=ask, show=_shown(spec))
+    return Guard(name, bounds(spec), measures=ask is not None, ask=ask, ordered=ordered, show=_shown(spec))
 
 
 def _shown(spec: AxisSpec) -> Callable[[float], str]:

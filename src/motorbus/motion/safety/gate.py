@@ -16,10 +16,13 @@ from copy import copy
 from math import inf, isfinite
 from typing import Any, Final
 
+from motorbus.core.goal import Later, Stays
 from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused
 from motorbus.motion.safety.guard import Guard
 from motorbus.motion.safety.lease import Lease
+from motorbus.motion.safety.turning import Turning
+from motorbus.motion.safety.waiting import Handed, Waiting
 
 ROUNDING = 1e-9  # relative; a limit converted to its unit and back still admits itself
 
@@ -42,27 +45,37 @@ class Gate:
         self.lease: Lease | None = None
         self.attended = False
         self.origin = 0.0
-        self._turning: dict[int, int] = {}
+        self.turning = Turning()
+        self._tells = True
+        self._waiting = Waiting()
         self._stops: Stops = _none
         self._seen: Seen = {}
         self._now: Callable[[], float] = _never
         self._answer: Answer | None = None
         self._places: Mapping[int, float] = {}
 
-    def watch(self, seen: Seen, now: Callable[[], float], stops: Stops | None = None) -> None:
+    def watch(
+        self,
+        seen: Seen,
+        now: Callable[[], float],
+        stops: Stops | None = None,
+        accepted: Stops | None = None,
+    ) -> None:
         """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s), `stops`
-        how many stops have left for a node."""
+        how many stops have left for a node, `accepted` how many it has accepted."""
         self._seen, self._now, self._stops = seen, now, stops or self._stops
+        self.turning.accepted = accepted or self.turning.accepted
 
     def rehearsing(self) -> Gate:
         """A gate that judges as this one, for orders that nobody is going to send: nobody has to attend those."""
         found = copy(self)
-        found.attended, found._turning = False, {}
+        found._tells = False
+        found.attended, found.turning, found._waiting = False, Turning(), self._waiting.copy()
         return found
 
     def goes_on(self, node: int) -> bool:
-        """Whether it was told to go on without an end, as far as this gate knows, and nothing else since."""
-        return self._turning.get(node) == self._stops(node)
+        """Whether it was told to go on without an end, as far as this gate knows, and has accepted no stop since."""
+        return self.turning.goes_on(node)
 
     def loss(self) -> Refused | None:
         """The error for a lease that is lost; None where it is not, or there is none."""
@@ -73,11 +86,16 @@ class Gate:
 
         Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
         """
-        if exchange.effect is not Effect.MOTION or not self.guards or exchange.rank is Rank.STOP:
+        goals = exchange.goals
+        if exchange.later is not None and exchange.later.begins:
+            goals = _goals(self._waiting.of(exchange.later))
+        elif exchange.effect is not Effect.MOTION:
+            return []
+        if not self.guards or exchange.rank is Rank.STOP:
             return []
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
-        for goal in self._of_everyone(exchange.goals) if everyone else exchange.goals:
+        for goal in self._of_everyone(goals) if everyone else goals:
             guard = self.guards.get(goal.node)
             if guard is None or guard.track is None or guard.ask is None or not _goes(goal):
                 continue
@@ -87,11 +105,23 @@ class Gate:
         return list(found.values())
 
     def __call__(self, exchange: Exchange[Any]) -> None:
-        effect = exchange.effect
-        if exchange.rank is Rank.STOP or effect < Effect.TORQUE:
+        later = exchange.later
+        if exchange.rank is Rank.STOP or (later is None and exchange.effect < Effect.TORQUE):
             return
-        goals = exchange.goals
-        if effect is Effect.MOTION and not goals:
+        if later is None:
+            self._judge(exchange, exchange.goals)
+        elif later.begins:
+            self._judge(exchange, self._begun(exchange, later))
+            self._waiting.begin(later)
+        else:
+            if exchange.effect >= Effect.TORQUE:
+                self._judge(exchange, exchange.goals, obeyed=False)
+            if later.node is not None:
+                self._waiting.take(later, exchange.goals, self._stops(later.node))
+
+    def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
+        """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
+        if exchange.effect is Effect.MOTION and not goals:
             raise LimitExceeded(
                 "this write moves a motor and does not say where to",
                 sent=exchange.request,
@@ -99,11 +129,11 @@ class Gate:
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for goal in goals:
-            _, _, value, low, high = goal
+            _, _, value, low, high, _ = goal
             if low is None or high is None or not -inf < low <= value <= high < inf:
                 _check(goal)
         if self.faults or self.lease is not None:
-            self._check_standing(exchange)
+            self._check_standing(exchange, goals)
         if self.guards or self.attended:
             now = self._now()
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
@@ -113,19 +143,43 @@ class Gate:
                     if goal.quantity == "position" and guard.is_fine(goal.value, now):
                         continue
                 if not _stays(goal):
-                    self._check_guarded(guard, goal, now)
-                    if guard is not None:
-                        guard.leaves()
-                elif self._turning:
-                    self._turning.pop(goal.node, None)
+                    self._check_guarded(guard, goal, now, goals)
+                    if guard is not None and obeyed:
+                        self._leaves(guard, goal)
+
+        if self._tells and obeyed:
+            for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
+                if goal.node in self.guards:
+                    _tell(self.guards[goal.node], goal)
+
+    def _leaves(self, guard: Guard, goal: Goal) -> None:
+        """It is told to move: whoever reckons where it is must know, and whether this goes on without an end."""
+        guard.leaves()
+        if goal.quantity in ENDLESS and goal.value:
+            self.turning.begins(goal.node)
+
+    # -- what waited -------------------------------------------------------------------------------------------------
+
+    def _begun(self, exchange: Exchange[Any], later: Later) -> tuple[Goal, ...]:
+        """The goals that begin. Where anything bounds what may move it must be known what that is, and wanted still."""
+        if not (self.guards or self.faults or self.attended or self.lease is not None):
+            return exchange.goals
+        found = self._waiting.of(later)
+        if found is None:
+            raise _nothing_known(later)
+        for one in found:
+            node = one.later.node
+            if node is not None and one.goals and self._stops(node) > one.stops:
+                raise _stopped_since(node)
+        return _goals(found)
 
     # -- whether anything may move -----------------------------------------------------------------------------------
 
-    def _check_standing(self, exchange: Exchange[Any]) -> None:
-        goals = exchange.goals
-        if goals and all(map(_stays, goals)):
+    def _check_standing(self, exchange: Exchange[Any], goals: tuple[Goal, ...]) -> None:
+        if goals and all(goal.stays is Stays.STILL for goal in goals):
             return
-        for node in _named(exchange) if self.faults else ():
+        everyone = exchange.lane == EVERY_LANE
+        for node in () if not self.faults else list(self.faults) if everyone else _named(exchange, goals):
             if node in self.faults:
                 raise Refused(
                     f"node {node} is at fault: {self.faults[node]}",
@@ -138,7 +192,7 @@ class Gate:
 
     # -- guards --------------------------------------------------------------------------------------------------------
 
-    def _check_guarded(self, guard: Guard | None, goal: Goal, now: float) -> None:
+    def _check_guarded(self, guard: Guard | None, goal: Goal, now: float, all_: tuple[Goal, ...]) -> None:
         endless = goal.quantity in ENDLESS
         if endless and goal.value:
             self._check_attended(goal, now)
@@ -148,11 +202,7 @@ class Gate:
             guard.check_speed(goal)
         elif goal.quantity in PLACES:
             guard.check_known(goal.node, now)
-            guard.check_goal(goal)
-        if endless:
-            self._turning.pop(goal.node, None)
-            if goal.value:
-                self._turning[goal.node] = self._stops(goal.node)
+            guard.check_goal(goal, paced=_paced(goal.node, all_))
 
     def _of_everyone(self, goals: tuple[Goal, ...]) -> tuple[Goal, ...]:
         """What an order for everyone says to those with a guard as well whom it does not name: it moves them too."""
@@ -176,7 +226,6 @@ class Gate:
         if found is None or guard.track is None or found[1] is guard.answer:
             return
         exchange, answer = found
-        guard.answer = answer
         if answer is not self._answer:
             where = exchange.tells_position
             self._places = {} if isinstance(where, bool) else where(answer)
@@ -184,6 +233,9 @@ class Gate:
         place = self._places.get(node)
         if place is not None:
             guard.track.take(place, answer.at)
+        guard.answer = (
+            answer  # last, so that an interrupt between these lines leaves it to be taken in once more
+        )
 
 
 PLACES: Final = ("position", "relative")
@@ -193,8 +245,23 @@ ENDLESS: Final = ("velocity", "load", "current")
 
 
 def _stays(goal: Goal) -> bool:
-    """It is told to stay where it stands, or to rest: such a goal brings its own limits, and is always allowed."""
-    return goal.low == goal.value == goal.high
+    """It is told to stay where it stands, or to rest: no guard has anything against that. What its numbers are says
+    nothing: a device may have one place only that it allows."""
+    return goal.stays is not None
+
+
+def _paced(node: int, goals: Iterable[Goal]) -> bool:
+    """Whether what is ordered of it says how fast it goes there at most, and no time by which it is to be there."""
+    told = {goal.quantity for goal in goals if goal.node == node and (goal.quantity != "time" or goal.value)}
+    return "speed" in told and "time" not in told
+
+
+def _tell(guard: Guard, goal: Goal) -> None:
+    """Whoever has set the guard is to know that this was ordered. What only bounds a movement moves nothing."""
+    if goal.stays is Stays.ON:
+        guard.ordered(False)
+    elif not _stays(goal) and (goal.quantity in PLACES or (goal.quantity in ENDLESS and goal.value)):
+        guard.ordered(True)
 
 
 def _goes(goal: Goal) -> bool:
@@ -235,12 +302,40 @@ def _never() -> float:
     return inf
 
 
-def _named(exchange: Exchange[Any]) -> set[int]:
+def _named(exchange: Exchange[Any], goals: tuple[Goal, ...]) -> set[int]:
     """Whom it orders something, and who answers it."""
-    nodes = {goal.node for goal in exchange.goals}
+    nodes = {goal.node for goal in goals}
+    if exchange.later is not None and exchange.later.node is not None:
+        nodes.add(exchange.later.node)
     if isinstance(exchange.replies, tuple):
         nodes |= {due.node for due in exchange.replies}
     return nodes
+
+
+def _goals(handed: Iterable[Handed] | None) -> tuple[Goal, ...]:
+    return tuple(goal for one in handed or () for goal in one.goals)
+
+
+def _nothing_known(later: Later) -> Refused:
+    whom = "anybody on this bus" if later.node is None else f"node {later.node}"
+    return Refused(
+        f"nothing is known to wait in {whom}, so nobody can tell what would begin",
+        reason="unknown",
+        expected="something that was handed over since this bus was opened",
+        cause="it was carried out already, or an earlier program handed it over",
+        advice="hand it over again, which replaces what waits, then let it begin; nothing was sent",
+        node=later.node,
+    )
+
+
+def _stopped_since(node: int) -> Refused:
+    return Refused(
+        f"node {node} was stopped after something had been handed over to it, which waits there still and would begin",
+        reason="stopped",
+        expected="no stop between the two",
+        advice="hand it over again, which replaces what waits; nothing was sent",
+        node=node,
+    )
 
 
 def _check(goal: Goal) -> None:

@@ -19,6 +19,14 @@ NOISE: Final = 1e-9
 """rad that are noise of binary arithmetic."""
 UNIT: Final = 0.08
 """rad/s by which a speed may be beyond: it was rounded up to the next unit, 0.732 RPM at the coarsest."""
+LATE: Final = 0.8
+"""s of its greatest speed that an order without a speed may lead from where a device is measured to be.
+
+So far goals are ahead where a device is led. It may be behind by 0.3 s (`moving.stream.LAG`), its last reading was taken
+one period ago, and the goal is for one period from now: 0.25 s each where goals are slowest (`motion.limits.SLOWEST`).
+"""
+NEAR: Final = 0.1
+"""rad that it may lead besides, whatever its speed: how far one that is led may be off (`moving.stream.FAR`)."""
 
 
 def _unknown() -> float | None:
@@ -30,14 +38,27 @@ def _nobody() -> None:
     """What it means for an account that nobody keeps."""
 
 
+def untold(_: bool) -> None:
+    """Nobody wants to know what it was ordered."""
+
+
 class Bounds(NamedTuple):
     """`low` and `high` position (rad of the device), the farthest `step` from where it is measured to be (rad) and the
-    greatest `speed` (rad/s); infinite where nobody bounds it."""
+    greatest `speed` (rad/s); infinite where nobody bounds it.
+
+    What brings no speed is obeyed as fast as the device can. So it leads no farther than `lead` (rad) from where it is
+    measured to be: that is where goals are for one that is led at its greatest speed.
+    """
 
     low: float = -inf
     high: float = inf
     step: float = inf
     speed: float = inf
+
+    @property
+    def lead(self) -> float:
+        """How far (rad) an order may lead that brings no speed."""
+        return self.speed * LATE + NEAR
 
 
 class Guard:
@@ -46,7 +67,8 @@ class Guard:
     `ask` reads its position, so that a bus can look before it gives an order; `show` words an angle of the device;
     `answer` is the last one of the bus that was taken in here.
     `track` is None where the device does not tell where it is. Then `reckons` gives where it is by dead reckoning (rad
-    of the device; None: nobody knows), and `leaves` is called when it was ordered to move, whoever did that.
+    of the device; None: nobody knows), and `leaves` is called when it was ordered to move, whoever did that. `ordered` is
+    called of each device when it was ordered to move (true) or only given torque, whoever did that.
     """
 
     def __init__(
@@ -58,12 +80,14 @@ class Guard:
         ask: Callable[[], Runnable[Any]] | None = None,
         reckons: Callable[[], float | None] = _unknown,
         leaves: Callable[[], None] = _nobody,
+        ordered: Callable[[bool], None] = untold,
         show: Callable[[float], str] = "{:.4g} rad".format,
     ) -> None:
         self.name: Final = name
         self.bounds: Final = bounds
         self.ask: Final = ask
         self.leaves: Final = leaves
+        self.ordered: Final = ordered
         self.show: Final = show
         self._reckons: Final = reckons
         self.track: Final = Track() if measures else None
@@ -71,6 +95,8 @@ class Guard:
         self._low: Final = bounds.low - ROUNDED
         self._high: Final = bounds.high + ROUNDED
         self._step: Final = bounds.step + ROUNDED
+        self._lead: Final = bounds.lead + ROUNDED
+        self._near: Final = min(self._step, self._lead)
 
     def is_fine(self, to: float, now: float) -> bool:
         """Whether this place is surely allowed: the quick way of most goals; what is not is looked at more closely."""
@@ -78,7 +104,7 @@ class Guard:
         if track is None or track.why_not(now):
             return False
         sample = track.sample
-        return sample is not None and self._low <= to <= self._high and abs(to - sample.value) <= self._step
+        return sample is not None and self._low <= to <= self._high and abs(to - sample.value) <= self._near
 
     def check_known(self, node: int, now: float) -> None:
         """Raise Refused unless it is known where the device is, by a reading that is fresh and can be believed."""
@@ -88,8 +114,11 @@ class Guard:
             f"{self.name}: {self._told(why, now)}, so it must not be moved", node=node, **_EXPECTED[why]
         )
 
-    def check_goal(self, goal: Goal) -> None:
-        """Raise LimitExceeded for a position, or a way, that leads out of the bounds or is too far for one step."""
+    def check_goal(self, goal: Goal, *, paced: bool = False) -> None:
+        """Raise LimitExceeded for a position, or a way, that leads out of the bounds or is too far for one step.
+
+        Where nothing that comes with it bounds its speed it is not `paced`, and leads no farther than `Bounds.lead`.
+        """
         low, high, step, _ = self.bounds
         here = self._here()
         relative = goal.quantity == "relative"
@@ -108,6 +137,8 @@ class Guard:
                 "go there in smaller steps, or by a move of the axis",
                 "step",
             )
+        if way > self._lead and not paced:
+            raise self._unpaced(goal, way)
 
     def _here(self) -> float | None:
         """Where it is, as far as that is known (rad of the device)."""
@@ -134,6 +165,16 @@ class Guard:
                 f"{abs(goal.value):.4g} rad/s of its device is above {self.bounds.speed:.4g} rad/s",
                 "be slower; where none was said, say a velocity",
             )
+
+    def _unpaced(self, goal: Goal, way: float) -> LimitExceeded:
+        lead, speed = self.bounds.lead, self.bounds.speed
+        return self._refused(
+            goal,
+            f"this is {way:.4g} rad of its device from where it is, and comes without a velocity, so its device would "
+            f"go there as fast as it can; so ordered it may go {lead:.4g} rad, for it may do {speed:.4g} rad/s",
+            "say a velocity with it, where its device takes one, or move the axis: it is led there",
+            "velocity",
+        )
 
     def _told(self, why: str, now: float) -> str:
         if why == "unseen":

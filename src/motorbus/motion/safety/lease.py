@@ -10,6 +10,7 @@ Endless motion, which only its stop ends, needs one who *attends*: he sees the m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from math import inf, isfinite
 from typing import Final
@@ -32,7 +33,8 @@ class Lease:
     """The right to move, which one holder has at a time. It `lasts` so long (s) after each heartbeat.
 
     With None it does not run out: that is for a holder who is this very program, for when that is gone it sends
-    nothing. One that is `needed` lets nothing move while nobody holds it.
+    nothing. One that is `needed` lets nothing move while nobody holds it. `losses` counts how often it was lost. Whoever
+    is among the `watchers` is called when its holder said something but that he is there, and when it was reset.
     """
 
     def __init__(self, lasts: float | None = LASTS, *, needed: bool = True) -> None:
@@ -41,6 +43,8 @@ class Lease:
         self.lasts: Final = lasts
         self.needed: Final = needed
         self.holder = ""
+        self.losses = 0
+        self.watchers: Final[list[Callable[[], None]]] = []
         self._attended = False
         self._until = 0.0
         self._now = 0.0
@@ -53,6 +57,7 @@ class Lease:
         self._now = max(self._now, now)
         if self.holder and self._now > self._until:
             self._lost, self.holder, self._attended = self.holder, "", False
+            self.losses += 1
         if self._lost:
             return Standing.LOST
         return Standing.HELD if self.holder else Standing.FREE
@@ -107,6 +112,7 @@ class Lease:
             )
         self.holder, self._attended = holder, attended
         self._prolong()
+        self._tell()
 
     def beat(self, holder: str, now: float) -> None:
         """The holder is still there. Raises Refused when it is not, or no longer, the holder."""
@@ -119,6 +125,7 @@ class Lease:
         """The holder attends from now on, or no longer. Raises as `beat`; it counts as one."""
         self.beat(holder, now)
         self._attended = attended
+        self._tell()
 
     def release(self, holder: str, now: float) -> None:
         """The holder gives it back; nothing is lost by that. Raises as `beat`."""
@@ -126,11 +133,17 @@ class Lease:
             raise self._is_lost()
         self._check_holder(holder)
         self.holder, self._attended = "", False
+        self._tell()
 
     def reset(self, now: float) -> None:
         """Somebody says that a machine whose lease was lost may move again. The lease is free then."""
         self.standing(now)
         self._lost = ""
+        self._tell()
+
+    def _tell(self) -> None:
+        for watcher in tuple(self.watchers):
+            watcher()
 
     def _prolong(self) -> None:
         self._until = inf if self.lasts is None else self._now + self.lasts

@@ -8,10 +8,13 @@ longer where the device is, and asks again before he moves it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Quality
+from motorbus.core.operation import Operation, Pause, Runnable
+from motorbus.errors import WireError
 
 FASTEST: Final = 20.0
 """rad/s, when nobody says how fast a device can be: 60 degrees in 0.05 s, and no maker of these servos claims that."""
@@ -22,6 +25,8 @@ TREMBLING: Final = 0.01
 FRESH: Final = 0.5
 """s for which a reading counts as fresh, whoever took it: as long as a lease, and longer than whoever leads axes waits
 for one that is silent (0.3 s), so that he says who is."""
+READINGS: Final = 3
+"""How often a position is read that cannot be believed, before its reader gives up."""
 
 
 class Sample(NamedTuple):
@@ -108,3 +113,21 @@ class Track:
         if isfinite(value) or self._doubt is None:
             self._doubt = sample
         return sample
+
+
+def believed(track: Track, ask: Callable[[], Runnable[float]]) -> Operation[float]:
+    """Ask a device where it is (rad), and again where that cannot be, until two readings agree.
+
+    Raises WireError when three readings cannot be believed.
+    """
+    found: list[float] = []
+    while len(found) < READINGS:
+        found.append((yield from ask()))
+        if track.take(found[-1], (yield from Pause(0))).quality is not Quality.SUSPECT:
+            return found[-1]
+    raise WireError(
+        f"its readings do not agree: {', '.join(f'{one:.4g}' for one in found)} rad of its device",
+        expected="a place to which a motor can have come since the reading before",
+        cause="a fault on the line, a servo that lost its supply and counts anew, or a sensor that fails",
+        advice="see to that before it is moved",
+    )

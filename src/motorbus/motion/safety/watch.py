@@ -69,7 +69,7 @@ class Watch:
             self._strains[node] = Strain() if axis.spec.guard else None
             self._turns.appendleft(node)
             told = yield from outcome(axis.able["health"](axis.device))
-            yield from self._took(told, NOBODY, (yield from Pause(0)))
+            yield from self._took(node, told, NOBODY, (yield from Pause(0)))
 
     def dismiss(self, node: int) -> None:
         """It is led no more, and asked no more."""
@@ -106,18 +106,20 @@ class Watch:
 
     def take(
         self,
+        node: int,
         told: Health | MotorbusError,
         goals: Mapping[int, float],
         now: float,
         places: Mapping[int, float] = NOBODY,
     ) -> None:
-        """What came of that which was due. `goals` and `places`: where each was told to be and was heard last (rad of
-        its device), so far as that is known.
+        """What came of asking this node. `goals` and `places`: where each was told to be and was heard last (rad of
+        its device), so far as that is known. One that was dismissed meanwhile is judged no more.
 
         Raises Faulted for a device that has restarted or let go: its axis is at fault then. Raises Overloaded for one
         that pushes too hard for too long, or is too hot; that changes nothing.
         """
-        node = self._turns[0]
+        if node not in self._strains:
+            return
         axis, strain = self._axes[node], self._strains[node]
         self._passed(node, now, HEALTH * SHARE if isinstance(told, MotorbusError) else self._cost(node))
         if isinstance(told, MotorbusError):
@@ -148,8 +150,9 @@ class Watch:
         """Ask who is due, if anybody is, and judge the answer; raises as `take`."""
         wanted = self.due((yield from Pause(0)), slack)
         if wanted is not None:
+            node = self._turns[0]  # whose turn it is when the answer comes may be another's
             told = yield from outcome(wanted)
-            yield from self._took(told, goals, (yield from Pause(0)), places)
+            yield from self._took(node, told, goals, (yield from Pause(0)), places)
 
     def examine(self, axis: AxisVerbs) -> Operation[None]:
         """Ask this one at once, for it does not do as it was told. Raises as `take` what is the matter with it."""
@@ -158,18 +161,18 @@ class Watch:
             self._turns.remove(node)
             self._turns.appendleft(node)
             told = yield from outcome(axis.able["health"](axis.device))
-            yield from self._took(told, NOBODY, (yield from Pause(0)))
+            yield from self._took(node, told, NOBODY, (yield from Pause(0)))
 
     def _took(
         self,
+        node: int,
         told: Health | MotorbusError,
         goals: Mapping[int, float],
         now: float,
         places: Mapping[int, float] = NOBODY,
     ) -> Operation[None]:
-        node = self._turns[0]
         try:
-            self.take(told, goals, now, places)
+            self.take(node, told, goals, now, places)
         except Faulted:
             axis = self._axes[node]
             yield from Report(canary.FaultNoted(axis.name, canary.why(axis)))
@@ -179,7 +182,8 @@ class Watch:
 
     def _passed(self, node: int, now: float, cost: float) -> None:
         """It was asked, which took so much of the wire (s)."""
-        self._turns.rotate(-1)
+        self._turns.remove(node)
+        self._turns.append(node)
         self._last[node] = now
         self._free = now + cost / SHARE
         self._plan()

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value
+from motorbus.core.goal import Later
 from motorbus.core.operation import Alone, Operation, afterwards, outcome
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech import wire
@@ -143,4 +144,5 @@ def _harmless(share: _Share) -> Operation[None]:
     """Put in its place what does nothing. Said again when it is not acknowledged, for twice is as good as once."""
     block = Block(share.table["lock"].address, _CLOSED)
     request = wire.reg_write(share.node.node, block.address, block.data)
-    yield from acknowledged(share.node, request, block, refusal=lambda _: None)
+    later = Later(share.node.node)
+    yield from acknowledged(share.node, request, block, refusal=lambda _: None, later=later)

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
 from motorbus.core.entry import Table
+from motorbus.core.goal import Later
 from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
 from motorbus.errors import OutcomeUnknown
 from motorbus.families.feetech import wire
@@ -98,7 +99,8 @@ def _harmless(node: Node, pending: int) -> Operation[None]:
     """See that no REG WRITE waits that would do more than switch torque off."""
     if (yield from read_block(node, pending, 1, bytes, timeout=Timeout.STORE)) != _IDLE:
         request = wire.reg_write(node.node, LIMP.address, LIMP.data)
-        yield from acknowledged(node, request, Block(LIMP.address, LIMP.data), rank=Rank.CONFIGURATION)
+        block = Block(LIMP.address, LIMP.data)
+        yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, later=Later(node.node))
 
 
 def still_open(node: Node, lock: int) -> Operation[None]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Final, NamedTuple, TypeVar
 
+from motorbus.core.goal import Later
 from motorbus.core.operation import (
     Answer,
     Due,
@@ -129,6 +130,7 @@ def acknowledged(
     timeout: Timeout = Timeout.REPLY,
     refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
+    later: Later | None = None,
 ) -> Exchange[None]:
     """A request that is answered by nothing but an acknowledgement; by silence at status return level 0.
 
@@ -138,6 +140,8 @@ def acknowledged(
     def read(answer: Answer) -> None:
         for reply in answer.replies:
             node.heard(reply.data[4], answer.at)
+        if later is not None:
+            later.done = True
         after()
 
     answers = node.settings is None or node.settings.answers_writes
@@ -151,6 +155,7 @@ def acknowledged(
         timeout=timeout,
         repeatable=block is not None and block.repeatable,
         refusal=refusal or changed_since([(node, block.under if block else None)]),
+        later=later,
     )
 
 
@@ -187,9 +192,16 @@ def unanswered(
     rank: Rank = Rank.CONTROL,
     refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
+    later: Later | None = None,
 ) -> Exchange[None]:
     """A request to several servos, which none of them answers."""
-    return Exchange(request, (), lambda _: after(), rank=rank, effect=effect, goals=goals, refusal=refusal)
+
+    def read(_: Answer) -> None:
+        if later is not None:
+            later.done = True
+        after()
+
+    return Exchange(request, (), read, rank=rank, effect=effect, goals=goals, refusal=refusal, later=later)
 
 
 def write_block(

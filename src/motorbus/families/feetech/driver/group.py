@@ -214,7 +214,8 @@ def sync_write(
     One packet serves up to 83 servos with two bytes each; more are split, and so are servos in whose maps the registers
     lie elsewhere; then it is not simultaneous. Maps and byte orders may be mixed otherwise. Nobody acknowledges a SYNC
     WRITE: follow it with sync_read() when it matters. All or nothing: raises NoReply or DeviceError, with nothing
-    written, when a servo that must be asked first is silent or unknown.
+    written, when a servo that must be asked first is silent or unknown; and the goals of all packets are judged before
+    the first one leaves. What ends it between two packets, as a stop, has a note that says who was written to.
     """
     for orders in values.values():
         check_values(orders)
@@ -227,30 +228,48 @@ def sync_write(
         _block(node, orders)._replace(under=node.settings)
         for node, orders in zip(nodes, values.values(), strict=True)
     ]
-    for exchange in sync_writes(nodes, blocks):
-        yield from exchange
+    yield from written_all(list(sync_writes(nodes, blocks)))
+
+
+def written_all(exchanges: Sequence[Exchange[None]]) -> Operation[None]:
+    """These one after the other; an error of a later one is told with a note that the first ones have left."""
+    for sent, exchange in enumerate(exchanges):
+        try:
+            yield from exchange
+        except MotorbusError as error:
+            if sent:
+                error.add_note(f"{sent} of {len(exchanges)} packets had left before this one")
+            raise
 
 
 def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
     """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many.
 
-    One is not sent once a servo that it is for has other settings than when it was made.
+    One is not sent once a servo that it or a later one is for has other settings than when it was made; and each is
+    judged by the goals of the later ones besides, so that the first does not leave when the last is refused.
     """
+    parts = list(_parts(nodes, blocks))
+    for index, part in enumerate(parts):
+        left = [one for later in parts[index:] for one in later]
+        goals: tuple[Goal, ...] = tuple(goal for _, block in left for goal in block.goals)
+        items = [(node.node, block.data) for node, block in part]
+        yield unanswered(
+            wire.sync_write(part[0][1].address, items),
+            max(block.effect for _, block in left),
+            goals,
+            refusal=changed_since([(node, block.under) for node, block in left]),
+        )
+
+
+def _parts(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[list[tuple[Node, Block]]]:
+    """What one packet carries, of all packets."""
     places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
     for node, block in zip(nodes, blocks, strict=True):
         places.setdefault((block.address, len(block.data)), []).append((node, block))
-    for (address, size), group in places.items():
+    for (_, size), group in places.items():
         capacity = wire.sync_write_capacity(size)
         for start in range(0, len(group), capacity):
-            part = group[start : start + capacity]
-            goals: tuple[Goal, ...] = tuple(goal for _, block in part for goal in block.goals)
-            effect = max(block.effect for _, block in part)
-            yield unanswered(
-                wire.sync_write(address, [(node.node, block.data) for node, block in part]),
-                effect,
-                goals,
-                refusal=changed_since([(node, block.under) for node, block in part]),
-            )
+            yield group[start : start + capacity]
 
 
 def _refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Value]]) -> None:

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Rank
+from motorbus.core.goal import Goal, Stays
+from motorbus.core.operation import Answer, Due, Exchange, Rank
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block
@@ -82,14 +83,16 @@ def resting(number: int, image: bytes) -> Block:
         return LIMP
     if settings.mode is Mode.VELOCITY:
         row = table["goal_velocity"]
-        return Block(row.address, row.encode(0), row.effect, (Goal(number, "velocity", 0.0, 0.0, 0.0),))
+        goal = Goal(number, "velocity", 0.0, 0.0, 0.0, Stays.STILL)
+        return Block(row.address, row.encode(0), row.effect, (goal,))
     if settings.mode is not Mode.POSITION or (settings.many_turns and not settings.accumulates):
         return LIMP
     row = table["goal_position"]
     told = table["present_position"].decode(image[PRESENT:COUNT])
     raw = max(row.low, min(told, row.high))  # beyond what any goal can be it can only come back
     here = float(node.value(row, raw))
-    return Block(row.address, row.encode(raw), row.effect, (Goal(number, "position", here, here, here),))
+    goal = Goal(number, "position", here, here, here, Stays.STILL)
+    return Block(row.address, row.encode(raw), row.effect, (goal,))
 
 
 def _image(node: int, answer: Answer | None) -> bytes | None:

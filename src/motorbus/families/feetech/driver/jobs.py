@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.entry import Table
+from motorbus.core.family import Readdressed
 from motorbus.core.operation import OUTCOME, REACHED, Effect, Journal, Operation, Report
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
@@ -165,14 +166,21 @@ class Course:
         """Record that this state is reached; with a place, of which of both the value is meant."""
         word = state if place is None else f"{state} {self.job.value(place)}"
         facts = {} if self.reached else self.job.facts()
+        if not self.reached:
+            yield from self._readdressed()
         self.reached.append(word)
         yield from Report(Journal(self.job.verb, word, facts))
 
     def resume(self, state: str) -> Operation[None]:
         """The same for whoever takes it up again, maybe on a bus whose journal knows nothing of it: all is told."""
         facts = {**self.job.facts(), REACHED: list(self.reached)}
+        yield from self._readdressed()
         self.reached.append(state)
         yield from Report(Journal(self.job.verb, state, facts))
+
+    def _readdressed(self) -> Operation[None]:
+        if self.job.new.id != self.job.old.id:
+            yield from Report(Readdressed(self.job.old.id, self.job.new.id))
 
     def end(self, outcome: str) -> Operation[None]:
         """Record how it ended: "new" or "old"."""

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from motorbus.core.family import Stop
+from motorbus.core.goal import torque_off
 from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Timeout
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.holding import PROMISE, holds
@@ -117,9 +118,14 @@ def _everyone() -> Exchange[Answer]:
 def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Answer]]:
     """Torque off to these and to nobody else, as many frames as that takes; nobody answers."""
     for start in range(0, len(nodes), AT_ONCE):
-        items = [(node, LIMP.data) for node in nodes[start : start + AT_ONCE]]
+        ids = nodes[start : start + AT_ONCE]
         yield Exchange(
-            wire.sync_write(LIMP.address, items), (), rank=Rank.STOP, effect=LIMP.effect, repeatable=True
+            wire.sync_write(LIMP.address, [(node, LIMP.data) for node in ids]),
+            (),
+            rank=Rank.STOP,
+            effect=LIMP.effect,
+            goals=tuple(map(torque_off, ids)),
+            repeatable=True,
         )
 
 

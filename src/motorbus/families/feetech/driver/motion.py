@@ -12,6 +12,7 @@ from enum import Enum
 from typing import Final
 
 from motorbus.core.entry import Table, is_number, shown
+from motorbus.core.goal import torque_on
 from motorbus.core.operation import Effect, Operation, outcome
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
@@ -90,7 +91,7 @@ def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
     if mode is None:
         raise unknown_mode(node)
     if mode is Mode.STEP:
-        yield from confirmed(node, ON)
+        yield from confirmed(node, ON._replace(goals=(torque_on(node.node),)))
     else:
         block = yield from beginning(node, table, mode, jump)
         yield from ordered(node, table, block)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
+from motorbus.core.goal import Later
 from motorbus.core.operation import Effect, Exchange, Operation, Refusal, Runnable, Stops
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
@@ -179,7 +180,7 @@ def to_hand_over(node: Node, table: Table, values: Mapping[str, Value]) -> Block
 def hand_over(node: Node, table: Table, block: Block) -> Operation[None]:
     """REG WRITE one block, and see that it was taken. Raises OutcomeUnknown when nobody knows."""
     request = wire.reg_write(node.node, block.address, block.data)
-    exchange = acknowledged(node, request, block, refusal=_handed_over(node, block))
+    exchange = acknowledged(node, request, block, refusal=_handed_over(node, block), later=Later(node.node))
     yield from exchange
     if not exchange.replies:
         yield from _pending(node, table, exchange)
@@ -237,6 +238,7 @@ def action(node: Node) -> Runnable[None]:
         _released([node]),
         refusal=_still_wanted([node]),
         after=lambda: _carried_out([node]),
+        later=Later(node.node, begins=True),
     )
     return exchange if exchange.replies else _seen(node, node.table, exchange)
 
@@ -277,12 +279,13 @@ def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
         block.goals,
         refusal=_still_wanted(nodes),
         after=lambda: _carried_out(nodes),
+        later=Later(None, begins=True),
     )
 
 
 def _released(nodes: Sequence[Node]) -> Block:
-    """What ACTION lets go. Goals handed over by others are not known; the gate has seen them at REG WRITE, if it
-    was asked, and ACTION is then no more than torque: leave to go for a goal."""
+    """What ACTION lets go, as far as it was handed over here. What others handed over on this bus the gate knows and
+    judges besides; ACTION is then no more than torque here: leave to go for a goal."""
     goals = tuple(goal for node in nodes if node.pending is not None for goal in node.pending.goals)
     return Block(0, b"", Effect.MOTION if goals else Effect.TORQUE, goals, repeatable=False)
 

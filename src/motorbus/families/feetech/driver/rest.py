@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.entry import Table, is_number, shown
+from motorbus.core.goal import Stays
 from motorbus.core.operation import Goal, Operation
 from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
@@ -86,7 +87,8 @@ def switched_on(block: Block, found: bytes = bytes(_COMMANDS)) -> Block:
     the packet for it would stay limp.
     """
     between = found[1 : block.address - TORQUE_ENABLE]
-    return block._replace(address=TORQUE_ENABLE, data=_ON + between + block.data)
+    goals = tuple(goal._replace(stays=Stays.ON) if goal.stays else goal for goal in block.goals)
+    return block._replace(address=TORQUE_ENABLE, data=_ON + between + block.data, goals=goals)
 
 
 def _commands(node: Node) -> Operation[bytes]:
@@ -153,7 +155,10 @@ def held_within(node: Node, table: Table, jump: float) -> Operation[Block]:
     _still(node, settings)
     raw = yield from _stands(node, table)
     _know_the_turn(node, raw, jump)
-    block = _hold(node, table, _within(node, table, raw, jump))
+    there = _within(node, table, raw, jump)
+    block = _hold(node, table, there)
+    if there != raw:  # it goes there, so it is judged as any other that goes
+        block = block._replace(goals=(Goal(node.node, "position", block.goals[0].value, *node.limits),))
     if _stays_put(node, table, found):
         return switched_on(block._replace(data=block.data + burst(node, table, None, None)), found)
     return switched_on(with_bound(node, table, block), found)
@@ -198,7 +203,7 @@ def at_rest(node: Node, table: Table, mode: Mode) -> Block:
     if not name:
         raise unpublished_duty(node)
     row = table[name]
-    goal = Goal(node.node, _QUANTITY[mode], 0.0, 0.0, 0.0)
+    goal = Goal(node.node, _QUANTITY[mode], 0.0, 0.0, 0.0, Stays.STILL)
     return Block(row.address, row.encode(0), row.effect, (goal,))
 
 
@@ -239,7 +244,7 @@ def _hold(node: Node, table: Table, raw: int) -> Block:
     """Goal := this position. Staying where it stands is inside any limits, so the goal brings its own."""
     row = table["goal_position"]
     value = node.value(row, raw)
-    goal = Goal(node.node, "position", value, value, value)
+    goal = Goal(node.node, "position", value, value, value, Stays.STILL)
     return Block(row.address, row.encode(raw), row.effect, (goal,))
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from motorbus.core.entry import Entry, Table
-from motorbus.core.operation import Effect, Operation, Tune
+from motorbus.core.family import Readdressed
+from motorbus.core.operation import Effect, Operation, Report, Tune
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -56,6 +57,7 @@ def set_second_id(node: Node, new: int, *, force: bool = False, among: Sequence[
     if new != node.node and not force:
         refuse_taken(Place(new, (yield from Tune(0))), (yield from whoever(new)))
     yield from others_than(node, asked, (node.node,) if force else (new, node.node))
+    yield from Report(Readdressed(node.node, new))
     yield from eeprom.store(node, table, [Block(row.address, row.encode(new), Effect.PERSISTENT)])
     return new
 

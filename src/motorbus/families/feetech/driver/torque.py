@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
+from motorbus.core.goal import torque_off
 from motorbus.core.operation import Effect, Exchange, Operation, Rank, afterwards, outcome
 from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.families.feetech import wire
@@ -20,6 +21,11 @@ LIMP: Final = Block(TORQUE_ENABLE, b"\0", Effect.TORQUE)
 _TRIES: Final = 3
 
 
+def limp(node: int) -> Block:
+    """Torque off for this servo, by name: whoever does not answer would be taken for everybody."""
+    return LIMP._replace(goals=(torque_off(node),))
+
+
 def disable_torque(node: Node) -> Operation[None]:
     """Torque off: the servo goes limp. Alarms do not matter; said up to three times until it is acknowledged.
 
@@ -28,7 +34,7 @@ def disable_torque(node: Node) -> Operation[None]:
     """
     doubt: MotorbusError | None = None
     for _ in range(_TRIES):
-        exchange = write_block(node, LIMP, rank=Rank.STOP)
+        exchange = write_block(node, limp(node.node), rank=Rank.STOP)
         try:
             yield from exchange
             if not exchange.replies:
@@ -72,5 +78,6 @@ def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
     """SYNC WRITE torque off to these, as many frames as it takes; nobody answers."""
     capacity = wire.sync_write_capacity(len(LIMP.data))
     for start in range(0, len(nodes), capacity):
-        items = [(node.node, LIMP.data) for node in nodes[start : start + capacity]]
-        yield unanswered(wire.sync_write(LIMP.address, items), LIMP.effect, rank=Rank.STOP)
+        ids = [node.node for node in nodes[start : start + capacity]]
+        request = wire.sync_write(LIMP.address, [(number, LIMP.data) for number in ids])
+        yield unanswered(request, LIMP.effect, tuple(map(torque_off, ids)), rank=Rank.STOP)

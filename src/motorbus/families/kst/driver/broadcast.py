@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from motorbus.core.entry import Entry, Value
+from motorbus.core.family import Readdressed
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
@@ -98,7 +99,7 @@ def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> O
         for extended in sorted(dialect.formats):
             frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
             yield from Exchange[Answer](
-                frame, (), lane=EVERY_LANE, rank=Rank.CONTROL, effect=Effect.TORQUE, goals=goals
+                frame, (), lane=EVERY_LANE, rank=Rank.CONTROL, effect=Effect.MOTION, goals=goals
             )
             yield from Report(Started(wire.EVERYONE, frame))
     return (yield from _written(dialect, row, raw, goals))
@@ -129,6 +130,7 @@ def broadcast_node_id(
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
+    yield from Report(Readdressed(None, new))
     return (yield from Alone(_written(dialect, dialect.profile.table["node_id"], new)))
 
 

@@ -8,8 +8,8 @@ guides through all of it. Source: KST CAN protocol manual, commands 1, 2, 4 and 
 from __future__ import annotations
 
 from motorbus.core.entry import Entry
-from motorbus.core.family import Identity
-from motorbus.core.operation import Alone, Operation, Rank, outcome
+from motorbus.core.family import Identity, Readdressed
+from motorbus.core.operation import Alone, Operation, Rank, Report, outcome
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
@@ -108,6 +108,7 @@ def _free(new: Node, old: Node) -> Operation[None]:
 def write_node_id(node: Node, new: int) -> Operation[None]:
     """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
     row = node.table["node_id"]
+    yield from Report(Readdressed(node.node, new))
     yield from order(node, row, new, rank=Rank.CONFIGURATION)
     found = yield from _if_told(node, row)
     if found not in (

@@ -12,7 +12,8 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, changed
-from motorbus.core.operation import CanFrame, Effect, Exchange, Goal, Operation, Rank, Report
+from motorbus.core.goal import Goal, Stays, torque_on
+from motorbus.core.operation import CanFrame, Effect, Exchange, Operation, Rank, Report
 from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
@@ -83,24 +84,26 @@ def send_goal(node: Node, goal: Goal) -> Operation[None]:
     lost its supply has forgotten it, and it costs a short frame."""
     row = node.table["goal_position"]
     if node.dialect.must_start:
-        yield from started(node)
+        yield from started(node, goal)
     yield from order(node, row, node.raw(row, goal.value), (goal,))
 
 
-def started(node: Node) -> Operation[None]:
-    """Start this servo and say so."""
-    exchange = start_exchange(node, True)
+def started(node: Node, goal: Goal | None = None) -> Operation[None]:
+    """Start this servo and say so; where that is for a goal, the start is refused if the goal would be."""
+    exchange = start_exchange(node, True, goal)
     assert isinstance(exchange.request, CanFrame)
     yield from exchange
     yield from Report(Started(node.node, exchange.request))
 
 
-def start_exchange(node: Node, on: bool) -> Exchange[None]:
-    """Start or stop, in the form of this bus; nobody answers. Where it lets a servo move, it counts as torque."""
+def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[None]:
+    """Start or stop, in the form of this bus; nobody answers. Where it lets a servo move, it counts as torque; with the
+    `goal` that it is started for, as motion."""
     form = node.dialect.nmt
     frame = wire.encode_start(form, node.node, on, extended=node.dialect.extended(node.node))
-    effect = Effect.TORQUE if form == "standard" else Effect.NONE
-    return Exchange(frame, (), lambda _: None, lane=node.node, rank=Rank.CONTROL, effect=effect)
+    effect = Effect.NONE if form != "standard" else Effect.MOTION if goal else Effect.TORQUE
+    goals = () if form != "standard" or not on else (goal or torque_on(node.node),)
+    return Exchange(frame, (), lambda _: None, lane=node.node, rank=Rank.CONTROL, effect=effect, goals=goals)
 
 
 def stop(node: Node) -> Operation[Promise]:
@@ -123,7 +126,8 @@ def stop(node: Node) -> Operation[Promise]:
 def _hold(node: Node, row: Entry, raw: int) -> Operation[None]:
     """Target := this place, also when it lies beyond the range, for there it stands; the goal brings its own limits."""
     value = float(row.to_value(raw))
-    yield from order(node, beyond(row), raw, (Goal(node.node, "position", value, value, value),))
+    goal = Goal(node.node, "position", value, value, value, Stays.STILL)
+    yield from order(node, beyond(row), raw, (goal,))
 
 
 def beyond(row: Entry) -> Entry:

@@ -9,7 +9,7 @@ That the controller counts from 0 where it has met the switch, and that it stops
 
 from __future__ import annotations
 
-from math import tau
+from math import floor, inf, tau
 from typing import Final, NamedTuple
 
 from motorbus.core.operation import Operation, Pause, Progress, Report
@@ -29,6 +29,8 @@ LONGEST: Final = 600.0
 """s that anybody may say."""
 READS: Final = 2
 """How often in a row input 5 must read active to be believed."""
+EXACT: Final = 1e-9
+"""Relative; a whole RPM that was said in rad/s and comes back a hair below itself still is that RPM."""
 TOLD: Final = 0.25
 """s between two reports of progress."""
 
@@ -47,11 +49,14 @@ class Homed(NamedTuple):
         return f"{found}; {self.promise.value}"
 
 
-def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = None) -> Operation[Homed]:
+def home(
+    node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, at_most: float | None = None
+) -> Operation[Homed]:
     """Turn in reverse until input 5 is active, at most for so long (s, up to 600), then stop: always.
 
     The speed is that of step 1 of project 1; with a `velocity` (rad/s, above 0, in whole RPM) project 1 is borrowed for
-    it as for `move_by`. Reports `Progress` in ms.
+    it as for `move_by`. Where nobody says one and step 1 is faster than `at_most` (rad/s), project 1 is borrowed as
+    well, for the greatest whole RPM that is not above it. Reports `Progress` in ms.
 
     When it returns the motor stands at the switch, *estimated*: that it stops there at once is an assumption, else it
     is beyond. An error that is `unmoved` has moved nothing; after any other nobody knows where it stands.
@@ -62,20 +67,30 @@ def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = Non
     the motor may be turning, and the error says so; whatever reading an input raises.
     """
     within(deadline, LONGEST, "deadline")
-    rpm = None if velocity is None else whole_rpm(finite(velocity, "velocity"))
+    said = None if velocity is None else whole_rpm(finite(velocity, "velocity"))
+    most = inf if at_most is None else finite(at_most, "at_most")
     watch = Watch(node)
 
     def wanted(project: Project) -> Operation[Project]:
         yield from _refuse_active(node)
+        rpm = said
         if rpm is None:
             refuse_unless_turning(node, project, "home")
-            return project
+            if project.step(1).speed * tau / 60 <= most:
+                return project
+            rpm = _not_above(most)
         return paced((yield from grounded(node, project, "home", rpm)), rpm, None)
 
     def motion(project: Project) -> Operation[Homed]:
         return (yield from _until_active(node, project, deadline, watch))
 
     return (yield from honest(watch, borrowed(node, "home", wanted, motion)))
+
+
+def _not_above(most: float) -> int:
+    """The greatest whole RPM that is not above this velocity (rad/s). Raises RequestError below 1 RPM."""
+    rpm = floor(most * 60 / tau * (1 + EXACT))
+    return rpm if rpm > 0 else whole_rpm(most)
 
 
 def _refuse_active(node: Node) -> Operation[None]:

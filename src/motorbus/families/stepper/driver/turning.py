@@ -13,7 +13,7 @@ every error the position is not known, but for those that are `unmoved`: the ord
 from __future__ import annotations
 
 from dataclasses import replace
-from math import ceil, inf
+from math import ceil, inf, isfinite
 from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
@@ -180,10 +180,7 @@ def refuse_unless_idle(node: Node, what: str) -> Operation[None]:
         expected="its notice, or an accepted stop" if node.memory.owed else "its time, or an accepted stop",
         cause="a busy controller ignores such an order, a stop ends whatever turns, and a notice does not say whose "
         "end it tells",
-        advice="say stop() first, or wait for the notice: a project that runs until it is stopped has none"
-        "; nothing was sent"
-        if node.memory.owed
-        else f"wait {ceil(10 * (node.memory.turning - now)) / 10:g} s more, or say stop() first; nothing was sent",
+        advice=_until_idle(node, now),
         node=node.node,
     )
 
@@ -225,3 +222,15 @@ def _is_finite(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return -float_info.max <= value <= float_info.max
+
+
+def _until_idle(node: Node, now: float) -> str:
+    """What to do until nothing turns any more."""
+    left = node.memory.turning - now
+    if node.memory.owed:
+        how = "say stop() first, or wait for the notice: a project that runs until it is stopped has none"
+    elif isfinite(left):
+        how = f"wait {ceil(10 * left) / 10:g} s more, or say stop() first"
+    else:
+        how = "say stop() first: nobody knows how long it turns"
+    return f"{how}; nothing was sent"
