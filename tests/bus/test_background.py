@@ -80,3 +80,44 @@ def test_an_emergency_stop_does_not_end_it() -> None:
         bus.run(iter(Pause(1.0)))
         assert one.run.root.finished
         assert len(found) == 3
+
+
+def test_a_pause_of_it_can_be_ended() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+        one = Background(bus, twice(bus, 1, found))
+        one.hurry()
+        one.along()
+        bus.run(iter(Pause(0.1)))
+        assert len(found) == 1
+        one.hurry()
+        bus.run(iter(Pause(0.1)))
+        assert len(found) == 2
+
+
+def test_it_can_be_dropped_before_it_has_begun_and_where_it_pauses() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+        for told in (0, 1):
+            one = Background(bus, twice(bus, 1, found))
+            one.along()
+            if told:
+                bus.run(iter(Pause(0.1)))
+            one.drop()
+            one.drop()
+            bus.run(iter(Pause(5.0)))
+            assert (len(found), bus.turns.chores) == (told, [])
+
+
+def test_where_it_is_at_work_it_goes_on_when_it_is_dropped() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+
+        def asked() -> Operation[None]:
+            one.drop()
+            found.append((yield from Servo.position.function(Servo(bus, 1))))
+
+        one: Background[None] = Background(bus, asked())
+        one.along()
+        bus.run(iter(Pause(1.0)))
+        assert (len(found), bus.turns.chores) == (1, [])

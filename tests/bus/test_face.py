@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from motorbus.bus.face import BusFace
-from motorbus.core.operation import Effect, Exchange
+from motorbus.core.family import Readdressed
+from motorbus.core.operation import Effect, Exchange, Operation, Report
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -47,3 +48,19 @@ def test_a_refused_motion_does_not_wake_the_stop_thread() -> None:
     assert isinstance(bus, BusFace)
     assert bus.stopper._thread is None
     bus.close()
+
+
+def test_who_wants_to_hears_first_that_a_device_is_about_to_answer_to_another_id() -> None:
+    bus, _ = memory_bus()
+    heard: list[object] = []
+    event, other = Readdressed(1, 7), Readdressed(None, 9)
+
+    def tells(what: object) -> Operation[None]:
+        yield from Report(what)
+
+    bus.run(tells(event))  # nobody listens
+    bus.readdressed = lambda told: heard.append(("first", told))
+    bus.run(tells(event))
+    bus.run(tells(other), report=heard.append)
+    bus.run(tells("something else"))
+    assert heard == [("first", event), ("first", other), other]

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from motorbus.bus.known import FRESH, Known, withdraws
-from motorbus.core.operation import Answer, CanFrame, Effect, Exchange, Rank, Reply
+from motorbus.core.goal import Later, Stays
+from motorbus.core.operation import Answer, CanFrame, Effect, Exchange, Goal, Rank, Reply
 from tests.bus.lanes import RATE, Lanes, move, read, said
 
 
@@ -86,6 +87,55 @@ def test_how_often_each_was_stopped_is_counted(known: Known) -> None:
     assert (known.stops(1), known.stops(2)) == (1, 0)
     known.order(Exchange(CanFrame(0x600, bytes(8)), effect=Effect.TORQUE, rank=Rank.STOP), RATE)
     assert (known.stops(1), known.stops(2)) == (2, 1)
+
+
+def answered(known: Known, exchange: Exchange[Answer], at: float = 5.0) -> Answer:
+    """It leaves, and everybody answers it."""
+    known.order(exchange, RATE)
+    assert isinstance(exchange.replies, tuple)
+    answer = Answer((), (), at)
+    known.heard([due.node for due in exchange.replies], exchange, answer, RATE)
+    return answer
+
+
+def test_a_stop_is_accepted_once_it_is_answered(known: Known) -> None:
+    stop = move(1, 5, rank=Rank.STOP)
+    known.order(stop, RATE)
+    assert (known.stops(1), known.accepts(1)) == (1, 0)
+    known.accept(stop, answered(known, stop))
+    assert (known.accepts(1), known.accepts(2)) == (1, 0)
+    known.accepted(2)
+    assert known.accepts(2) == 1
+
+
+def test_an_answer_that_is_taken_in_after_another_order_has_left_is_none_to_that(known: Known) -> None:
+    stop = move(1, 5, rank=Rank.STOP)
+    answer = answered(known, stop)
+    known.order(move(1, 9), RATE)
+    known.accept(stop, answer)
+    assert known.accepts(1) == 0
+
+
+@pytest.mark.parametrize(
+    ("goal", "later", "accepts"),
+    [
+        (Goal(1, "velocity", 0.0, -9.0, 9.0), None, 1),
+        (Goal(1, "velocity", 1.0, -9.0, 9.0), None, 0),
+        (Goal(1, "position", 0.0, -9.0, 9.0), None, 0),
+        (Goal(1, "position", 2.0, 2.0, 2.0, Stays.STILL), None, 1),
+        (Goal(1, "torque", 1.0, 1.0, 1.0, Stays.ON), None, 0),
+        (Goal(1, "velocity", 0.0, -9.0, 9.0), Later(1), 0),
+    ],
+)
+def test_an_order_to_rest_counts_once_it_is_obeyed(
+    known: Known, goal: Goal, later: Later | None, accepts: int
+) -> None:
+    plain = move(1, 5)
+    order: Exchange[Answer] = Exchange(
+        plain.request, plain.replies, effect=Effect.MOTION, goals=(goal,), later=later
+    )
+    known.accept(order, answered(known, order))
+    assert known.accepts(1) == accepts
 
 
 def test_a_stop_withdraws_what_would_move_its_node_and_nothing_else() -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from motorbus.cli.estops import with_estops
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_fenced import bounded
+from tests.motion.machines import described
 
 HOLD = 'estop = "hold"'
 
@@ -54,3 +57,15 @@ def test_what_can_be_seen_in_a_broken_file_is_enough_for_an_emergency_stop(run: 
     for words in (["estop"], ["estop", "arm"]):
         assert run(*words).code == 6
         assert torque(bench) == [1, 0, 0]
+
+
+def test_it_is_the_same_port_by_every_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ttyUSB0").touch()
+    (tmp_path / "arm").symlink_to("ttyUSB0")
+    axes = {"a2": {"estop": "hold"}}
+    file = tmp_path / "motorbus.toml"
+    file.write_text(described({"arm": "feetech:arm"}, "1-2", "", False, axes, {}), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for spelling in ("arm", "./arm", "ttyUSB0", str(tmp_path / "ttyUSB0")):
+        assert with_estops(f"feetech:{spelling}", {}) == {"estop_hold": "2"}
+    assert with_estops("feetech:./ttyUSB1", {}) == {}

@@ -127,3 +127,14 @@ def test_it_is_judged_before_it_is_said_that_torque_goes_off(bench: Bench, run: 
         ran = run("follow", *words.split(), "--seconds", "1")
         assert ran.code == 2
         assert "the torque goes off now" not in ran.err
+
+
+@pytest.mark.parametrize("pair", ["a1 a1", "arm arm", "lift a1"])
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+def test_who_cannot_follow_is_refused_before_torque_is_spoken_of(
+    pair: str, dry: tuple[str, ...], bench: Bench, run: Run
+) -> None:
+    ran = run("follow", *pair.split(), "--seconds", "1", *dry)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("error: ")
+    assert "torque goes off" not in ran.err

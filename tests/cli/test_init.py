@@ -61,7 +61,7 @@ def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: P
         r"# stepper controller.*\n# It has no limits.*\n# It does not know.*\n.*\n\[axis.stepper_1\]", text
     )
     assert text.startswith("# Simulated devices were asked.")
-    assert "# it is never faster" in text
+    assert "# it is never led faster" in text
 
 
 def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:

@@ -142,3 +142,18 @@ def test_what_cannot_be_clamped_says_so(words: list[str], told: str, run: Run, b
     ran = run("jog", *words, "--seconds", "1", "--clamp")
     assert (ran.code, ran.out) == (2, "")
     assert told in ran.err
+
+
+def test_what_is_agreed_to_is_the_way_that_is_left_when_it_is_clamped(bench: Bench, run: Run) -> None:
+    ran = run("jog", "a1=45deg/s", "--seconds", "1e9", "--clamp")
+    assert ran.code == 0, ran.err
+    assert ran.err.count("a1 goes to 150.0 deg instead of 4.5e+10 deg") == 1
+    ran = run("jog", "a1=-45deg/s", "--seconds", "1e9", "--clamp")
+    assert (ran.code, ran.err.splitlines()[0]) == (8, "error: nobody agreed to this: move a1 by 300.0 deg")
+
+
+@pytest.mark.parametrize("words", ["move a1=1e308deg", "jog a1=1deg/s --seconds 1e300", "move lift+=1e300mm"])
+def test_no_number_in_a_message_is_longer_than_people_read(words: str, bench: Bench, run: Run) -> None:
+    ran = run(*words.split())
+    assert ran.code == 8
+    assert max(map(len, ran.err.split())) < 40

@@ -40,7 +40,12 @@ def test_an_adapter_for_can_is_the_device_behind_it(port: Path) -> None:
 
 @pytest.mark.parametrize(
     "spelling",
-    ["socket://LOCALHOST:4000", "SOCKET://127.0.0.1:4000/", "socket://127.1:4000", "rfc2217://127.0.0.1:4000"],
+    [
+        "socket://LOCALHOST:4000",
+        "SOCKET://127.0.0.1:4000/",
+        "socket://127.1:4000",
+        "rfc2217://127.0.0.1:4000",
+    ],
 )
 def test_a_server_is_the_same_by_every_name(spelling: str) -> None:
     assert same_line(f"feetech:{spelling}", "feetech:socket://127.0.0.1:4000")

@@ -12,6 +12,7 @@ import pytest
 from motorbus import errors
 from motorbus.cli.exits import NeedsConsent
 from motorbus.cli.output import Output
+from motorbus.errors import LinkLost
 
 
 class Terminal(io.StringIO):
@@ -200,3 +201,20 @@ def test_what_was_added_to_an_error_on_its_way_is_told(
     facts = json.loads(capsys.readouterr().err)
     assert facts["notes"] == ["the servo is 3, and locked"]
     assert "\n" not in facts["summary"]
+
+
+def test_a_cause_that_several_have_in_common_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
+    gone = LinkLost("the port is gone", cause="it was unplugged", advice="see to it")
+    for name in ("a1", "a2", "a2"):
+        gone.add_note(f"{name} did not accept the stop: {LinkLost('it is gone', cause='it was unplugged')}")
+    gone.add_note(f"leaving failed: {LinkLost('x', cause='another', advice='see to it')}")
+    Output().error(gone)
+    assert capsys.readouterr().err.splitlines() == [
+        "error: the port is gone",
+        "  likely cause: it was unplugged",
+        "  what to do: see to it",
+        "  note: a1 did not accept the stop: it is gone",
+        "  note: a2 did not accept the stop: it is gone",
+        "  note: leaving failed: x",
+        "  likely cause: another",
+    ]

@@ -127,3 +127,13 @@ def test_a_file_that_cannot_be_replayed(text: str, code: int, told: str, bench: 
 def test_what_cannot_be_said_ends_with_2(words: tuple[str, ...], bench: Bench, run: Run, wave: Path) -> None:
     ran = run("replay", *words)
     assert (ran.code, ran.out) == (2, "")
+
+
+@pytest.mark.parametrize("speed", ["1e9", "1e-9", "0", "-1", "100001%"])
+def test_a_speed_at_which_nothing_can_be_judged_is_refused_by_its_name(
+    speed: str, bench: Bench, run: Run
+) -> None:
+    Path("w.csv").write_text("time [s],a1 [deg]\n0,0\n1,1\n2,0\n", encoding="utf-8")
+    ran = run("replay", "w.csv", "--speed", speed)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(f"error: --speed {speed}: ")

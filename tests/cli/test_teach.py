@@ -159,3 +159,14 @@ def test_what_cannot_be_taught_ends_with_2_and_lets_nobody_go(
     assert "has train" not in ran.err
     assert torques(bench) == [HELD, HELD, HELD]
     assert not Path("w.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "figure", ["--smooth inf", "--smooth nan", "--smooth -1", "--smooth 1e-320", "--smooth 1e300"]
+)
+def test_a_figure_that_cannot_be_lets_nobody_go(figure: str, bench: Bench, run: Run) -> None:
+    assert run("hold", "arm").code == 0
+    ran = run("teach", "arm", "--output", "wave.csv", "--seconds", "1", *figure.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert "--smooth" in ran.err
+    assert torques(bench) == [HELD, HELD, HELD]

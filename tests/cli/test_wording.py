@@ -34,6 +34,12 @@ from tests.cli.conftest import Run
         ("feetech", "set_torque_limit(1.0); more", "`motorbus feetech torque-limit BUS#ID 1.0`; more"),
         ("feetech", "still under way: stop() ends", "still under way: `motorbus stop` ends"),
         ("template", "use disable_torque()", "use `motorbus torque off`"),
+        ("feetech", "see to it, then robot.clear_fault('a1')", "see to it, then give the order again"),
+        (
+            "kst",
+            'see to it, then robot.clear_fault("a1"), or open the machine anew; nothing was sent',
+            "see to it, then give the order again; nothing was sent",
+        ),
     ],
 )
 def test_methods_become_commands(family: str, said: str, meant: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+from math import tau
 
 import pytest
 
@@ -273,3 +274,21 @@ def test_whatever_goes_wrong_names_the_axis() -> None:
         with pytest.raises(NoReply, match="^a1: "):
             robot["a1"].position()
         sims["arm"][1].plug()
+
+
+def test_a_plain_position_is_judged_as_a_sample_is_and_one_that_jumped_is_read_again() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.positions()
+        listened(sims)
+        robot.positions("a1")
+        once = len(said(sims))
+        sims["arm"][1].raw_position = 3500
+        assert robot.positions("a1")["a1"] == pytest.approx(
+            robot["a1"].spec.from_device(3500 * tau / 4096), abs=0.01
+        )
+        assert len(said(sims)) == once + 2
+        assert robot["a1"].state().quality is Quality.FRESH
+        sims["arm"][1].raw_position = 600
+        assert robot["a1"].state().quality is Quality.CONFIRMED
+        sims["arm"][2].raw_position = 600
+        assert robot["a2"].position() == pytest.approx(robot.positions()["a2"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from math import pi, tau
 
 import pytest
@@ -13,6 +14,8 @@ from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned
+from tests.families.stepper.runs import TURN
+from tests.families.stepper.runs import made as built
 from tests.motion.machines import listened, machine, said
 
 FAR = {"lift": {"low": "0 mm", "high": "2000 mm", "max_step": "500 mm"}}
@@ -51,6 +54,40 @@ def test_where_an_earlier_movement_did_not_say_how_it_ended_nobody_knows_where_t
     found.declare(1.0)
     found.depart()
     assert found.depart() == (None, "a movement was interrupted")
+
+
+def test_where_a_movement_began_is_known_while_it_goes_on_and_no_longer() -> None:
+    found = Reckoning()
+    found.depart()
+    assert found.departed is None
+    found.declare(1.0)
+    place = found.depart()
+    assert [found.position, found.departed] == [None, 1.0]
+    found.arrive(place)
+    assert [found.position, found.departed] == [1.0, None]
+    found.depart()
+    found.forget("somebody turned it")
+    assert found.departed is None
+
+
+@pytest.mark.parametrize(("begins", "mm"), [(0.190, 150.0), (0.010, 195.0), (None, 205.0)])
+def test_a_program_that_leads_out_of_the_limits_is_judged_by_where_it_begins(
+    begins: float | None, mm: float
+) -> None:
+    with machine(lift=True) as (made, sims), Robot.of(made) as robot:
+        lift, sim = robot["lift"], sims["stage"][1]
+        sim.put(1, built(replace(TURN, distance=round(1600 * mm / 5))))
+        if begins is not None:
+            lift.declare(begins)
+        with pytest.raises(LimitExceeded):
+            lift.run(1)
+        assert sim.position == 0
+        assert lift.estimated == begins
+        assert not lift.under_way
+        lift.declare(0.05)
+        sim.put(1, built(replace(TURN, distance=round(1600 * 20.0 / 5))))
+        lift.run(1)
+        assert sim.position > 0
 
 
 def test_what_needs_the_position_is_told_why_there_is_none() -> None:

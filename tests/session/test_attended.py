@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from math import pi
+from math import inf, pi
 from threading import Event
 from typing import Any
 
@@ -328,3 +328,13 @@ def test_on_an_event_loop_it_is_the_same() -> None:
                 assert (caught[0].reason, turning(sims)) == ("lease", False)
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize("lasts", ["x", True, 0.0, -1.0, inf, [1.0]])
+def test_a_time_that_is_none_is_refused_at_the_call(lasts: Any) -> None:
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        with pytest.raises(RequestError, match="a lease cannot last"):
+            robot.attended(lasts=lasts)
+        with pytest.raises(RequestError, match="a lease cannot last"):
+            AsyncRobot.of(made).attended(lasts=lasts)
+        assert robot.lease is None

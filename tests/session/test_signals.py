@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -179,3 +180,41 @@ def test_a_task_of_an_event_loop_is_cancelled_leaves_its_machine_and_ends() -> N
             asyncio.run(main(left))
         assert now() == {signal.SIG_DFL}
     assert (caught.value.code, left) == (143, [0, 0])
+
+
+def test_what_another_thread_closes_leaves_handlers_that_do_as_those_before_and_goes_at_the_end() -> None:
+    with handled(signal.SIG_DFL), ctrl_c(signal.default_int_handler), machine(arm="1") as (made, _):
+        found: list[BaseException] = []
+        with Robot.of(made) as robot:
+
+            def close() -> None:
+                try:
+                    robot.close()
+                except BaseException as error:
+                    found.append(error)
+
+            thread = Thread(target=close)
+            thread.start()
+            thread.join(60)
+            assert not found
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert now() == {signal.SIG_DFL}
+
+
+def test_a_signal_behind_that_ends_the_process_as_it_would_have_before() -> None:
+    program = """
+import signal, sys, threading
+from motorbus.session.signals import Signals
+signals = Signals(lambda error, frame: print("told"))
+signals.take()
+thread = threading.Thread(target=signals.give_back)
+thread.start()
+thread.join()
+signal.raise_signal(signal.SIGTERM)
+print("lives on")
+"""
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert told.returncode
+    assert not told.stdout

@@ -42,11 +42,13 @@ class Background(Generic[T]):
             ticket.deadline = self.link.now()
 
     def drop(self) -> None:
-        """Where it pauses nobody carries it along any more; where it is at work it goes on, and ends by itself."""
+        """Where it pauses or has not begun nobody carries it along any more; at work it ends by itself."""
         with self.turns.lock:
             ticket = self.run.root.ticket
-            if isinstance(ticket, Timer) and self._chore in self.turns.chores:
+            rests = isinstance(ticket, Timer) or not self.run.root.started
+            if rests and self._chore in self.turns.chores:
                 self.turns.chores.remove(self._chore)
+            if isinstance(ticket, Timer):
                 self.turns.abandon(ticket)
 
     def carried(self) -> T:

@@ -18,7 +18,11 @@ from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Goal, Ra
 
 FRESH = 0.02  # s; an older position is not where a moving device is
 MOVING = (Effect.TORQUE, Effect.MOTION)
-ENDLESS = ("velocity", "load", "current")  # quantities that go on being obeyed until something else is ordered
+ENDLESS = (
+    "velocity",
+    "load",
+    "current",
+)  # quantities that go on being obeyed until something else is ordered
 
 
 class Known(dict[int, Answer | None]):
@@ -38,7 +42,9 @@ class Known(dict[int, Answer | None]):
         self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
         self._stops: Counter[int | None] = Counter()  # those for everybody under None
         self._accepted: Counter[int] = Counter()
-        self._given: dict[int, set[Due]] = {}  # what a node has answered of a stop that takes several exchanges
+        self._given: dict[
+            int, set[Due]
+        ] = {}  # what a node has answered of a stop that takes several exchanges
         self._said: dict[int, Answer] = {}  # the answer to the last order of a node, while no other has left
         self.stopping = 0
 

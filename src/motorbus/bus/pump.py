@@ -31,9 +31,7 @@ class Bus(BusFace):
 
         Raises whatever the operation raises; KeyboardInterrupt after the operation has cleaned up.
         """
-        if isinstance(operation, Exchange) and not (
-            operation.effect and questions(self.turns, operation)
-        ):
+        if isinstance(operation, Exchange) and not (operation.effect and questions(self.turns, operation)):
             return self._exchange(operation)
         relay = self.relay
         run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=relay.wake)
@@ -63,7 +61,8 @@ class Bus(BusFace):
                 self.turns.abandon(flight)
             raise
         answer: Any = flight.result()
-        return taken(self.turns, exchange, answer)
+        value: T = taken(self.turns, exchange, answer)
+        return value
 
     def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""

@@ -242,9 +242,7 @@ class Turns(Air):
         self._settle(ticket, before, error)
 
     def _admitted(self, exchange: Exchange[Any]) -> None:
-        plain = (
-            exchange.later is None or self.admit is None
-        )  # what waits replaces what waited: the gate must know
+        plain = exchange.later is None or self.admit is None  # a gate must know what waits from now on
         if (exchange.effect not in GATED and plain) or exchange.rank is Rank.STOP:
             return
         if self.admit is None:

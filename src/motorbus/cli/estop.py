@@ -44,10 +44,11 @@ but only devices that are named (BUS#1-6), or known because they answered
 before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
 some did, 5 when nobody did, or the process that holds the bus does not answer,
 3 where the ports are gone. A port that a foreign program holds cannot be
-reached: the error names that program, and the code is 4. Without BUS, every bus that a motorbus
-process of yours holds is stopped, and those of the machine file if there is
-one. By its names, a group or an axis stops its whole buses. A line of the file
-that cannot be understood keeps no other bus from being stopped: exit code 6.
+reached: the error names that program, and the code is 4. Without BUS, every
+bus that a motorbus process of yours holds is stopped, and those of the machine
+file if there is one. By its names, a group or an axis stops its whole buses. A
+line of the file that cannot be understood keeps no other bus from being
+stopped: exit code 6.
 
 From here KST servos must say where they are before they can be held there. On
 a bus without ids everyone is asked who is there first, and the answers are

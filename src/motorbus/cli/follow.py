@@ -85,11 +85,11 @@ def follow(
     span = _span(seconds)
     check_rate(rate)
     with robot([*pairs, *pairs.values()], options, output) as hand:
+        _judge(hand, pairs, rate)
         present = {name: at for name, at in hand.robot.positions().items() if at is not None}
         if dry_run:
             return _plan(hand, pairs, present)
         goals = {one: present[other] for other, one in pairs.items() if other in present and one in present}
-        _judge(hand, pairs, rate)
         _consent(hand, present, goals, clamp=clamp, yes=yes)
         _warn(hand, pairs)
         with hand.working("following"), asked_to_end() as ended:
@@ -123,10 +123,9 @@ def _pairs(leader: str, follower: str) -> dict[str, str]:
 def _judge(hand: InHand, pairs: Mapping[str, str], rate: float) -> None:
     """Raise RequestError for pairs and a rate that cannot be, before it is said that torque goes off."""
     from motorbus.motion.budget import refuse_above
-    from motorbus.motion.follow import check_able
+    from motorbus.motion.follow import check_pairs
 
-    check_able(hand.robot, pairs, "train", "followed in a loop")
-    check_able(hand.robot, pairs.values(), "train", "led in a loop")
+    check_pairs(hand.robot, pairs)
     refuse_above(hand.robot.budget(rate, [*pairs, *pairs.values()]))
 
 

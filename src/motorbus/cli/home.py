@@ -36,7 +36,8 @@ switch or the switch is stuck, and nothing moves.
 Axes of a machine file are homed together, those of several buses at the same
 time, and none faster than its max_velocity: where its device is set to more,
 project 1 is borrowed for a lower speed. An axis without a max_velocity in the
-file has a low one. Nothing is remembered: `motorbus move --home` homes and goes on.
+file has a low one. Nothing is remembered: `motorbus move --home` homes and
+goes on.
 
 Examples:
 

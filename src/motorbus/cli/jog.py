@@ -129,15 +129,16 @@ def _axis(
     velocity = units.parse(speed, VELOCITY.of(spec.linear))
     if not span > 0:
         raise RequestError(f"--seconds {span:g}: not above 0", advice="nothing was sent")
-    way = abs(velocity * span)
+    far, way = FAR_LINEAR if spec.linear else FAR, abs(velocity * span)
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")
         if dry_run:
             _rehearse(hand, name, velocity, how, show=True)
             return Exit.OK
-        if way > (FAR_LINEAR if spec.linear else FAR) and not yes:
-            _rehearse(hand, name, velocity, how, show=False)
-            output.consent(f"move {name} by {spec.show(way)}", yes=False)
+        if way > far and not yes:
+            most = _rehearse(hand, name, velocity, how, show=False)
+            if abs(most) > far:
+                output.consent(f"move {name} by {spec.show(abs(most))}", yes=False)
         with hand.working("jogging"):
             told = verb(velocity, span, policy=how.policy)
         present = hand.robot.positions([name])[name]
@@ -148,21 +149,24 @@ def _axis(
     return Exit.OK
 
 
-def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool) -> None:
-    """What it would be refused for, and what would be sent. Of an axis that is led, that is made on the way only."""
+def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool) -> float:
+    """How far it would go at most (rad, m, with its sign). Raises what it would be refused for.
+
+    What would be sent is shown; of an axis that is led, that is made on the way only.
+    """
     from motorbus.motion.moving.jogging import way_of_jog
 
     axis = hand.robot[name]
     if "train" not in axis.able:
         rehearse(hand, [name], lambda one: one.jog(velocity, how.span, policy=how.policy), show=show)
-        return
+        return velocity * how.span
     goes, _ = way_of_jog(axis, velocity, how.span)
     present, goals = absolute(hand, {name: Goal(goes, way=True)})
     most = velocity * how.span
     if how.policy == "reject":
         inside(hand, present, goals)
     else:
-        most = _clamped(hand, name, present[name], goals[name], most)
+        most = _clamped(hand, name, present[name], goals[name], most, show=show)
     if show:
         facts = {"axis": name, "velocity": velocity, "seconds": how.span, "at_most": most}
         hand.output.document("motorbus.jog.plan/1", facts)
@@ -170,10 +174,11 @@ def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool
             f"{name} would go by {axis.spec.show(most)} at most; nothing was sent. "
             "Its frames are made on the way, from what is read then, so none can be shown."
         )
+    return most
 
 
-def _clamped(hand: InHand, name: str, present: float, goal: float, most: float) -> float:
-    """How far it would go at most where its limits hold it back (rad, m); that it does is told."""
+def _clamped(hand: InHand, name: str, present: float, goal: float, most: float, *, show: bool) -> float:
+    """How far it would go at most where its limits hold it back (rad, m); that it does is told where that is shown."""
     from motorbus.motion import limits
     from motorbus.motion.clamping import kept
 
@@ -182,6 +187,7 @@ def _clamped(hand: InHand, name: str, present: float, goal: float, most: float) 
     to, told = kept(name, axis.spec, goal, policy="clamp", device=device)
     if told is None:
         return most
-    hand.heard(told)
+    if show:
+        hand.heard(told)
     way = to - present
     return way if way * most > 0 else 0.0

@@ -187,13 +187,18 @@ def _error_text(error: BaseException) -> Any:
 
 
 def _message(error: BaseException) -> str:
+    """All of it; a cause or an advice that several have in common is said once."""
     said = "cancelled" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
-    return "\n".join([said, *(f"  note: {note}" for note in _notes(error))])
+    lines = said.splitlines()
+    for note in _notes(error):
+        first, *parts = note.splitlines() or [""]
+        lines += [f"  note: {first}", *(part for part in parts if part not in lines)]
+    return "\n".join(lines)
 
 
 def _notes(error: BaseException) -> list[str]:
     """What was added to it on its way, such as what has become of the device."""
-    return list(getattr(error, "__notes__", ()))
+    return list(dict.fromkeys(getattr(error, "__notes__", ())))
 
 
 def _error_facts(error: BaseException) -> dict[str, object]:

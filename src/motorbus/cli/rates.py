@@ -1,4 +1,4 @@
-"""What `--rate` says: every command that takes one refuses the same figures, in the same words."""
+"""What `--rate` and `--smooth` say: every command that takes one refuses the same figures, in the same words."""
 
 from __future__ import annotations
 
@@ -18,5 +18,15 @@ def check_rate(rate: float) -> None:
         raise RequestError(
             f"--rate {rate:g}: it cannot be done so often",
             expected=f"cycles per second: {LOWEST:g} to {HIGHEST:g}",
+            advice="nothing was sent",
+        )
+
+
+def check_smooth(smooth: float) -> None:
+    """Raise RequestError for a frequency (Hz) by which nothing can be smoothed; 0 is for nothing. Nothing was sent."""
+    if smooth and not LOWEST <= smooth <= HIGHEST:
+        raise RequestError(
+            f"--smooth {smooth:g}: nothing can be smoothed by that",
+            expected=f"Hz: {LOWEST:g} to {HIGHEST:g}, or 0 for nothing",
             advice="nothing was sent",
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import App, Parameter
 
@@ -11,6 +11,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import machine, machine_file
 from motorbus.cli.moving import Goal, absolute, consent_to_far, tell
 from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.rates import check_smooth
 from motorbus.cli.robot import place, robot
 from motorbus.cli.wording import in_words_of_the_shell
 from motorbus.core import units
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from motorbus.motion.machine import AxisSpec
     from motorbus.motion.moving.moved import Moved
     from motorbus.motion.trajectory import Trajectory
+
+FASTEST: Final = 1000.0
+"""How many times as fast as in the file, or as slow, at most; beyond that its samples would fall together."""
 
 app = App(
     name="replay",
@@ -73,11 +77,10 @@ def replay(
     options
         Any option of the buses, as a flag.
     """
-    share = units.parse(speed, "load") if speed else 1.0
-    if not share > 0 or repeat < 1 or not smooth >= 0:
-        raise RequestError(
-            "--speed must be above 0, --repeat at least 1 and --smooth not below 0", advice="nothing was sent"
-        )
+    share = _share(speed)
+    check_smooth(smooth)
+    if repeat < 1:
+        raise RequestError(f"--repeat {repeat}: not at least 1", advice="nothing was sent")
     wanted = _read(file, smooth)
     _judge(wanted.scaled(1 / share))
     with robot(list(wanted.axes), options, output) as hand:
@@ -93,6 +96,18 @@ def replay(
         tell(hand, "replay", moved)
         output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
     return Exit.OK
+
+
+def _share(speed: str) -> float:
+    """How fast, as a share of what the file says. Raises RequestError for a figure at which nothing can be judged."""
+    share = units.parse(speed, "load") if speed else 1.0
+    if not 1 / FASTEST <= share <= FASTEST:
+        raise RequestError(
+            f"--speed {speed}: no movement is carried out like that",
+            expected=f"{1 / FASTEST:g} to {FASTEST:g} times as fast as in the file",
+            advice="nothing was sent",
+        )
+    return share
 
 
 def _read(file: Path, smooth: float) -> Trajectory:

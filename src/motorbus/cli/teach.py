@@ -14,7 +14,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate
+from motorbus.cli.rates import check_rate, check_smooth
 from motorbus.cli.robot import place, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
@@ -126,8 +126,7 @@ def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
     if span is not None and not span > 0:
         raise RequestError("--seconds must be above 0", advice="nothing was sent")
     check_rate(rate)
-    if not smooth >= 0:
-        raise RequestError("--smooth must not be below 0", expected="Hz", advice="nothing was sent")
+    check_smooth(smooth)
     check_writable(file)
 
 

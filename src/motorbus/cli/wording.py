@@ -30,6 +30,7 @@ COMMANDS: Final[Mapping[str, str]] = {
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""
 PHRASES: Final[Mapping[str, str]] = {
+    "see to it, then reset the fault": "see to it, then give the order again",
     "call reset() on the bus, in the process that owns it": "give the command again, for the stop has ended this one",
     "estop() was called, here or by": "it was stopped, here or by",
     "whose device has train": "whose device can be led in a loop",
@@ -39,6 +40,8 @@ PHRASES: Final[Mapping[str, str]] = {
 """What only a program that goes on can do -> what comes to the same where the program has ended."""
 _BUS: Final = re.compile(r"(`motorbus [^`\[]*?\b)BUS(?![#\w])")
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")
+_FAULT: Final = re.compile(r"robot\.clear_fault\([^()]*\)(, or open the machine anew)?")
+"""A fault lives in one process: in a shell there is nothing to clear, for it has ended with the command."""
 _PARTS: Final = ("summary", "expected", "cause", "advice")
 
 
@@ -58,6 +61,7 @@ def shell_words(text: str, family: Family | None = None, bus: str = "") -> str:
     """A text that names methods, with commands in their place, for this bus where there is one."""
     for phrase, instead in PHRASES.items():
         text = text.replace(phrase, instead)
+    text = _FAULT.sub("give the order again", text)
     own = faces.offer(family.name, "COMMANDS") if family is not None else None
     words: dict[str, str] = {**COMMANDS, **(own or {})}
 

@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 from math import isfinite, pi
+from typing import Final
 
 from motorbus.errors import RequestError
 
@@ -118,8 +119,14 @@ def raw(text: str) -> int | None:
     return int(match[1], 16 if "x" in match[1].lower() else 10)
 
 
+LONG: Final = 1e6
+"""A number from here on is shown in six digits: nobody reads more, and there may be three hundred."""
+
+
 def show(value: float, quantity: str) -> str:
     """A value in the API's unit, for people: enough digits for a motor and no more, with its unit."""
+    if abs(value) >= LONG:
+        return f"{value:.6g} {next(iter(SCALES[quantity]))}"
     if quantity == "position":
         return f"{value:.4f} rad ({value / DEGREE:.1f}°)"
     if quantity == "velocity":

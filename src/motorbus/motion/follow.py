@@ -70,7 +70,7 @@ def follow(
     """
     wanted = dict(pairs)
     check_policy(policy)
-    _check(body, wanted)
+    check_pairs(body, wanted)
     check_seconds(seconds)
     limp = [name for name in wanted if "disable_torque" in body.axes[name].able]
     return Errand(
@@ -152,7 +152,8 @@ def check_able(body: Body, names: Iterable[str], needs: str, what: str) -> None:
             )
 
 
-def _check(body: Body, pairs: Mapping[str, str]) -> None:
+def check_pairs(body: Body, pairs: Mapping[str, str]) -> None:
+    """Raise RequestError for pairs, leader by follower, of which one cannot follow the other. Nothing is sent."""
     if not pairs:
         raise RequestError("nobody follows anybody", expected="leader and follower, by name", advice=NOTHING)
     check_able(body, pairs, "train", "followed in a loop")

@@ -204,9 +204,7 @@ def _rest(axis: AxisVerbs) -> Operation[Rest]:
 # -- without its holder ------------------------------------------------------------------------------------------------
 
 
-def given_up(
-    axes: Iterable[AxisVerbs], again: Container[str] = ()
-) -> Operation[dict[str, MotorbusError]]:
+def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> Operation[dict[str, MotorbusError]]:
     """The axes of one bus when the lease is lost: what moves is stopped, then what is to be limp lets go.
 
     What moves is stopped whatever its `exit` says, `leave` included: nobody is there any more. Nothing is parked, for

@@ -16,6 +16,7 @@ from motorbus.core.operation import Operation, Runnable
 from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
+from motorbus.motion.safety import canary
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
@@ -120,8 +121,10 @@ def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement, T], P
     `place` gives, from what was before and what the movement returned, where the axis is then. A refusal that is
     `unmoved` changes nothing; any other end in the middle makes a reckoned position unknown.
 
-    Raises RequestError, with nothing sent, while another movement of a reckoned axis is under way.
+    Raises RequestError, with nothing sent, while another movement of a reckoned axis is under way, and Refused while it
+    is at fault.
     """
+    canary.check(axis)
     movement = Movement()
     try:
         axis.departs(movement)

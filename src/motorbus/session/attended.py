@@ -8,8 +8,8 @@
 
 Endless motion, which only its stop ends, is refused unless somebody attends, and does not outlive that. A lease that is
 lost stops what moves, whatever the program does then: a `Sentry` sees to it, in threads of its own while the program
-sleeps or its event loop hangs, and where time is virtual along with whoever lets it pass. It needs this process. One that is killed, or frozen for good, stops
-nothing, and what turns without an end goes on turning.
+sleeps or its event loop hangs, and where time is virtual along with whoever lets it pass. It needs this process. One
+that is killed, or frozen for good, stops nothing, and what turns without an end goes on turning.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from motorbus.core.operation import Operation, Pause, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
-from motorbus.motion.leaving import stopped_going_on
+from motorbus.motion.leaving import goes_on, stopped_going_on
 from motorbus.motion.safety.gate import Gate
-from motorbus.motion.safety.lease import Lease, Standing
+from motorbus.motion.safety.lease import Lease, Standing, check_lasts
 from motorbus.motion.several import errors_of, gathered
 from motorbus.session.sentry import Sentry
 
@@ -50,20 +50,25 @@ class Leased(Body):
 
     @lease.setter
     def lease(self, lease: Lease | None) -> None:
+        self._put(lease)
+        if lease is None and any(map(goes_on, self.axes.values())):
+            lease = Lease(None, needed=False)  # it ends, for nobody attends it any more
+        if lease is not None and self.buses:
+            self._sentry = Sentry(self, lease)
+            self._sentry.start()
+
+    def _put(self, lease: Lease | None) -> None:
         if self._sentry is not None:
             self._sentry.end()
         self._lease, self._sentry = lease, None
         for bus in self.buses.values():
             if isinstance(bus.admit, Gate):
                 bus.admit.lease = lease
-        if lease is not None and self.buses:
-            self._sentry = Sentry(self, lease)
-            self._sentry.start()
 
     def _lay_down(self) -> None:
         """The machine is left: only a lease that was lost keeps it from parking."""
         if self._lease is not None and self._lease.standing(self.now) is not Standing.LOST:
-            self.lease = None
+            self._put(None)
 
     def _retire(self) -> None:
         """Its ports are about to be closed: nobody watches the lease any more."""
@@ -75,6 +80,7 @@ class Attending:
     """What a blocking and an async block that attends have in common."""
 
     def __init__(self, robot: Any, lasts: float | None, who: str) -> None:
+        check_lasts(lasts)
         self._robot = robot
         self._lasts = lasts
         self._who = self._holder = who
@@ -192,8 +198,8 @@ def blocking_attended(robot: Any, lasts: float | None = None, *, who: str = WHO)
     lost: what moves is stopped, the verb that is at work raises Refused with the reason "lease", or the end of the
     `with` does, and nothing moves until `robot.lease.reset(robot.now)`. `who` is named in messages.
 
-    Raises Refused on entering when somebody else holds the lease or it is lost, RequestError for a time that is none,
-    or another one than that of a lease that was set.
+    Raises RequestError for a time that is none, at once; on entering Refused when somebody else holds the lease or it is
+    lost, and RequestError for another time than that of a lease that was set.
     """
     return Attended(robot, lasts, who)
 

@@ -246,6 +246,7 @@ class Robot(RobotVerbs, Led):
 
     def _end(self, others: BaseException | None) -> None:
         if self._shut:
+            self._signals.give_back()  # it may have been closed from another thread
             return
         first: BaseException | None = None
         try:

@@ -120,8 +120,9 @@ class Sentry:
         moving = {axis.name for axis in axes if moves(axis) or axis.name in post.failed}
         failed = {axis.name for axis in axes if axis.name in moving and axis.bus.turns.latched}
         anew = loss > post.loss
+        again = () if anew else post.failed
         try:
-            errors = yield from (given_up(axes, () if anew else post.failed) if lost else stopped_going_on(axes))
+            errors = yield from (given_up(axes, again) if lost else stopped_going_on(axes))
         except Exception as error:  # the port is gone: this bus is told again, and the others at any rate
             self._failed(bus, loss, moving if lost else (), error)
         else:

@@ -40,6 +40,7 @@ class Signals:
         self._heard = heard
         self._python = python
         self._taken: dict[int, Any] = {}
+        self._over = False
 
     def take(self) -> None:
         """Take those that nobody else has; none outside the main thread, for Python allows no other to do so."""
@@ -52,7 +53,13 @@ class Signals:
                 signal.signal(number, self._told)
 
     def give_back(self) -> None:
-        """Let them do again what they did before; one for which the program has set a handler since stays with that."""
+        """Let them do again what they did before; one for which the program has set a handler since stays with that.
+
+        Outside the main thread, where Python allows no other handler, theirs stay and only hand on what comes.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            self._over = True
+            return
         for number, before in self._taken.items():
             if signal.getsignal(number) == self._told:
                 signal.signal(number, before)
@@ -64,6 +71,10 @@ class Signals:
         return handler is signal.SIG_DFL and name in NAMES
 
     def _told(self, number: int, frame: FrameType | None) -> None:
+        if self._over:
+            signal.signal(number, self._taken[number])
+            signal.raise_signal(number)
+            return
         python = self._taken[number] is signal.default_int_handler
         self._heard(KeyboardInterrupt() if python else SystemExit(SIGNALLED + number), frame)
 

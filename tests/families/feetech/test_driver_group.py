@@ -6,10 +6,12 @@ from math import tau
 
 import pytest
 
-from motorbus.core.operation import Effect, Goal
+from motorbus.core.operation import Effect, Exchange, Goal
 from motorbus.errors import ChecksumError, DeviceError, LimitExceeded, NoReply, RequestError
 from motorbus.families.feetech.driver import Node, prepare_all, sync_read, sync_write
-from motorbus.families.feetech.driver.group import block_of_each, trains
+from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.families.feetech.driver.group import block_of_each, trains, written_all
+from motorbus.families.feetech.driver.group import sync_writes as packets
 from motorbus.families.feetech.table import Mode
 from tests.families.feetech.driver_script import (
     ALL,
@@ -230,6 +232,28 @@ def test_more_than_a_packet_carries_are_split() -> None:
         sync_writes(42, 2, dict.fromkeys(ids, (0, 8))) for ids in (range(83), range(83, 166), range(166, 200))
     ]
     play(sync_write({prepared(id): {"goal_position": 2048 * COUNT} for id in range(200)}), *lines)
+
+
+def test_the_first_packet_is_judged_by_the_goals_of_all() -> None:
+    exchanges = list(
+        packets(
+            [prepared(id) for id in range(90)],
+            [Block(42, b"\0\x08", goals=(Goal(id, "position", 0.0),)) for id in range(90)],
+        )
+    )
+    assert [[goal.node for goal in exchange.goals] for exchange in exchanges] == [
+        [*range(90)],
+        [*range(83, 90)],
+    ]
+
+
+def test_an_error_between_two_packets_says_that_the_first_has_left() -> None:
+    operation = written_all([Exchange[None](b"1"), Exchange[None](b"2")])
+    next(operation)
+    operation.send(None)
+    with pytest.raises(NoReply) as caught:
+        operation.throw(NoReply("a stop"))
+    assert caught.value.__notes__ == ["1 of 2 packets had left before this one"]
 
 
 def test_nothing_is_written_when_one_is_silent() -> None:

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Effect, Goal, Rank
+from motorbus.core.goal import Goal, Stays
+from motorbus.core.operation import Effect, Rank
 from motorbus.errors import DeviceError, LimitExceeded, MotionError, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, enable_torque, move
 from motorbus.families.feetech.driver.motion import move_block, way
@@ -51,7 +52,8 @@ def test_the_goal_becomes_the_present_position_in_the_packet_that_switches_torqu
     played = watch(enable_torque(Node(3)), prepares(), BEFORE, stands(1304), *on(*low_high(1304)))
     order = played.exchanges[3]
     assert order.effect is Effect.MOTION
-    assert order.goals == (Goal(3, "position", 1304 * COUNT, 1304 * COUNT, 1304 * COUNT),)
+    here = 1304 * COUNT
+    assert order.goals == (Goal(3, "position", here, here, here, Stays.ON),)
 
 
 def test_limits_and_mode_are_read_anew_each_time() -> None:

@@ -242,5 +242,18 @@ def test_action_for_all_is_owed_no_reply() -> None:
     assert one.pending is other.pending is None
 
 
+def test_who_hands_over_and_who_lets_begin_is_marked_and_known_to_have_been_heard() -> None:
+    node = prepared()
+    one = watch(reg_write(node, goal_position=2048 * COUNT, goal_time=0, goal_velocity=1000 * COUNT), ORDER)
+    alone = watch(action(node), GO)
+    everyone = watch(action_all([node]), Line(packet(ALL, ACTION), None))
+    marks = [played.exchanges[-1].later for played in (one, alone, everyone)]
+    assert [(mark.node, mark.begins, mark.done) for mark in marks if mark] == [
+        (3, False, True),
+        (3, True, True),
+        (None, True, True),
+    ]
+
+
 def test_the_broadcast_of_an_action_is_that_of_the_manual() -> None:
     assert action_all().request == bytes.fromhex("FF FF FE 02 05 FA")

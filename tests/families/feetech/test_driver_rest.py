@@ -6,7 +6,8 @@ from math import tau
 
 import pytest
 
-from motorbus.core.operation import Effect, Goal
+from motorbus.core.goal import Goal, Stays
+from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.rest import at_rest, held, held_within, outside, switched_on, with_bound
@@ -31,18 +32,21 @@ def test_rest_is_a_0_in_the_register_that_the_mode_heeds(name: str, mode: Mode) 
     names = {Mode.VELOCITY: "goal_velocity", Mode.CURRENT: "goal_torque", Mode.PWM: "goal_time"}
     assert block.address == TABLES[name][names[mode]].address
     assert (block.data, block.effect) == (b"\0\0", Effect.MOTION)
-    assert [goal[2:] for goal in block.goals] == [(0.0, 0.0, 0.0)]
+    assert [goal[2:] for goal in block.goals] == [(0.0, 0.0, 0.0, Stays.STILL)]
 
 
 def test_held_is_where_it_stands_whatever_its_limits() -> None:
     block = play(held(prepared(at_12=0), STS), reads(3, 56, 0x84, 3))
-    assert block == Block(42, b"\x84\x03", Effect.MOTION, (Goal(3, "position", *[900 * COUNT] * 3),))
+    here = 900 * COUNT
+    goal = Goal(3, "position", here, here, here, Stays.STILL)
+    assert block == Block(42, b"\x84\x03", Effect.MOTION, (goal,))
 
 
 def test_held_within_goes_to_the_limit_that_is_near() -> None:
     before = reads(3, 40, 0, 7, 1, 2, 3, 4, 5, 6)
     block = play(held_within(prepared(at_12=0), STS, jump=5.0), before, reads(3, 56, 0x84, 3))
     assert (block.address, block.data) == (40, b"\x01\x07\xff\x00")
+    assert block.goals[0].stays is None, "it goes there, and is judged as what goes"
     assert outside(prepared(at_12=0), STS, play(held(prepared(at_12=0), STS), reads(3, 56, 0x84, 3)))
     assert not outside(prepared(), STS, play(held(prepared(), STS), reads(3, 56, 0x84, 3)))
 

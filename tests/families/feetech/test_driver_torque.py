@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import Effect, Rank
+from motorbus import Robot
+from motorbus.bus.known import Known, named
+from motorbus.core.operation import Effect, Operation, Pause, Rank, Together
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.feetech import Feetech
 from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
+from motorbus.families.feetech.driver.node import as_nodes
+from motorbus.families.feetech.driver.torque import all_limp
 from tests.families.feetech.driver_script import (
     ALL,
     SYNC_WRITE,
@@ -20,6 +25,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
+from tests.motion.machines import machine
 
 
 def off(id: int, error: int = 0) -> Line:
@@ -33,6 +39,36 @@ def all_off(*ids: int) -> Line:
 def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
     (exchange,) = watch(disable_torque(Node(3)), off(3)).exchanges
     assert (exchange.rank, exchange.effect) == (Rank.STOP, Effect.TORQUE)
+
+
+def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
+    silent, known = prepared(2, at_8=0), Known(Feetech(), 1_000_000)
+    (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).exchanges
+    assert named(let_go) == {2}
+    (together,) = all_limp(as_nodes([2, 3]))
+    known.order(together, 1_000_000)
+    assert [known.stops(node) for node in (1, 2, 3)] == [0, 1, 1]
+    assert not known  # whether there is anybody the answers tell
+
+
+def test_who_is_let_go_does_not_end_the_movement_of_another_and_does_not_hide_its_restart() -> None:
+    with machine(arm="1-3", exit="hold") as (made, sims), Robot.of(made) as robot:
+        bus, first = robot["a1"].bus, robot["a1"]
+
+        def off() -> Operation[None]:
+            yield from Pause(0.5)
+            yield from disable_torque_all([2, 3])
+
+        bus.run(iter(Together([type(first).move.function(first, 0.8), off()])))
+        assert first.position() == pytest.approx(0.8, abs=0.01)
+        robot["a2"].device.write(status_return_level=0)
+        robot["a2"].device.disable_torque()
+        bus.run(disable_torque_all([2, 3]))
+        sims["arm"][1].unplug()
+        sims["arm"][1].plug()
+        bus.run(iter(Pause(1.0)))
+        first.state()
+        assert set(robot.faults) == {"a1"}
 
 
 def test_alarms_do_not_matter() -> None:

@@ -78,7 +78,8 @@ def test_where_there_is_a_start_rule_the_start_goes_first_and_is_told() -> None:
     assert [event for event in played.events if isinstance(event, Started)] == [
         Started(5, played.exchanges[0].request)  # type: ignore[arg-type]
     ]
-    assert played.exchanges[0].effect is Effect.TORQUE
+    assert played.exchanges[0].effect is Effect.MOTION
+    assert played.exchanges[0].goals == played.exchanges[1].goals
     with bench(profile="xqpower", settings={"nmt": "none"}) as there:
         there.servo().move(0.1, wait=False)
         there.link.advance(1.0)

@@ -45,6 +45,24 @@ def test_at_a_speed_of_ones_own_project_1_is_borrowed() -> None:
     assert (line.as_before, line.journal.unfinished()) == (True, None)
 
 
+@pytest.mark.parametrize(
+    ("at_most", "rpm"), [(100 * tau / 60, 90), (90 * tau / 60, 90), (61.5 * tau / 60, 61)]
+)
+def test_project_1_is_borrowed_where_it_is_faster_than_it_may(at_most: float, rpm: int) -> None:
+    line = Line1(**WIRED)
+    told = line.run(lambda device: device.home(deadline=8.0, at_most=at_most))
+    assert isinstance(told, Homed)
+    assert told.velocity == pytest.approx(rpm * tau / 60)
+    assert (SELECT in starts(line.sent)) == (rpm < 90)
+    assert (line.as_before, line.journal.unfinished()) == (True, None)
+
+
+def test_nothing_homes_slower_than_one_rpm() -> None:
+    line = Line1(**WIRED)
+    failed(line.run(lambda device: device.home(at_most=0.5 * tau / 60)), RequestError, "whole RPM")
+    assert HOME not in starts(line.sent)
+
+
 def test_a_switch_that_never_comes_meets_the_deadline() -> None:
     line = Line1(home_switch="never")
     failed(line.run(homed), NotHomed, "not active within 8 s, so homing was stopped")

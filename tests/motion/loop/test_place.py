@@ -11,6 +11,7 @@ import pytest
 
 from motorbus.errors import LimitExceeded
 from motorbus.motion.loop.place import CATCH_UP, Place
+from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 from motorbus.session.robot import Robot
 from tests.motion.machines import machine
@@ -119,6 +120,28 @@ def test_no_order_is_farther_from_the_measured_position_than_max_step(axis: Any,
     assert one.asked == one.sent  # and there it stays
     one.judge(1)
     assert one.step(1) - pi == pytest.approx(one.sent)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_nor_than_where_its_goals_are_at_its_greatest_speed_with_all_that_it_may_lag(direct: bool) -> None:
+    with machine(arm="1", axes={"a1": {"gear": 2.0}}) as (made, _), Robot.of(made) as robot:
+        one = place(robot["a1"], direct=direct)
+        most = LATE * radians(90) + NEAR / 2
+
+        def pushes() -> None:
+            for number in range(1, 200):
+                one.asked = number * 0.9 * STEP if direct else 2.5
+                one.judge(1)
+                one.step(1)
+
+        with pytest.raises(
+            LimitExceeded, match=r"led at 90 deg/s at most is never ordered farther"
+        ) as refused:
+            pushes()
+        assert refused.value.reason == "velocity"
+        assert one.sent is not None
+        assert most - STEP < one.sent <= most
+        assert one.asked == one.sent
 
 
 def test_a_short_hitch_is_made_good_and_a_long_one_begins_anew_at_rest(axis: Any) -> None:

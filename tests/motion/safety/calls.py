@@ -1,9 +1,10 @@
-"""Calls by chance on a machine of three families, and what must become of each.
+"""Calls by chance on a machine of two families, and what must become of each.
 
-A `Caller` draws them from a seeded source: verbs of the robot, of axes and of devices, raw writes by name, writes of
-groups, broadcasts, orders that were kept and are run again; goals near and far, turns away, NaN, infinite, huge, no
-numbers at all. What leads axes is in `courses`, and what else may be the matter in `matters`. Before each it is reckoned by hand whether the goal is surely allowed (it must reach
-the wire), surely not (it must be refused), or too close to say (it must not be wrong).
+A `Caller` draws them from a seeded source: verbs of axes and of devices, writes by name, writes of groups, broadcasts,
+orders that were kept and are run again; goals near and far, turns away, NaN, infinite, huge, no numbers at all. What
+leads axes is in `courses`, and what else may be the matter in `matters`. Before each it is reckoned by hand whether the
+goal is surely allowed (it must reach the wire), surely not (it must be refused), or too close to say (it must not be
+wrong).
 """
 
 from __future__ import annotations

@@ -70,7 +70,10 @@ class Courses(Caller):
 
     def alone(self) -> Call:
         """A movement of one axis."""
-        name, to = self.chance.choice(sorted(SPOTS)), self.chance.choice((nan, inf, *[0.6, 0.3, -0.3, 0.1] * 2))
+        name, to = (
+            self.chance.choice(sorted(SPOTS)),
+            self.chance.choice((nan, inf, *[0.6, 0.3, -0.3, 0.1] * 2)),
+        )
         return self.led("axis.move", {name: to}, lambda: self.robot[name].move(to))
 
     def pose(self) -> Call:
@@ -83,7 +86,9 @@ class Courses(Caller):
         name, far = self.chance.choice(("a1", "c1")), self.chance.uniform(-0.9, 0.9)
         parts = [step / 50 for step in range(51)]
         places = [far * (10 * part**3 - 15 * part**4 + 6 * part**5) for part in parts]
-        seconds = max(1.25 * abs(far), sqrt(6 * abs(far) / ACCELERATION), 0.1)  # its peaks: 1.875/s and 5.77/s²
+        seconds = max(
+            1.25 * abs(far), sqrt(6 * abs(far) / ACCELERATION), 0.1
+        )  # its peaks: 1.875/s and 5.77/s²
         made = Trajectory([seconds * part for part in parts], {name: places})
         return self.led("robot.replay", {name: far}, lambda: self.robot.replay(made, rate=50))
 

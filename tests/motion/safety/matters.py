@@ -1,8 +1,8 @@
-"""Calls when something is the matter: an order that waits, a fault, a lease that nobody holds, a wheel, raw numbers, and
-callers that are threads.
+"""Calls when something is the matter: an order that waits, a fault, a lease that nobody holds, a wheel, raw numbers,
+and callers that are threads.
 
-Each is drawn like the others and judged by what went over the wires. An order that was handed over and carried out
-later, by whomever, is judged when it is carried out: where the servo is by then, and what is the matter by then, counts.
+Each is drawn like the others and judged by what went over the wires. An order that was handed over and is carried out
+later, by whomever, is judged when it begins: where the servo is by then, and what is the matter by then, counts.
 """
 
 from __future__ import annotations
@@ -54,7 +54,11 @@ class Matters(Courses):
         way = self.chance.choice((-1, 1)) * self.chance.uniform(0.3, 0.9) * BOUNDS[spot].step
         goal, away, device = here + way, here - way, self.device(spot)
         between = [lambda: Call("write", lambda: device.write(goal_position=away), {spot: away}), self.wait]
-        self.then = [*self.chance.sample(between, self.chance.randint(0, 2)), lambda: self.action(spot, goal)]
+        act, fault = (lambda: self.action(spot, goal)), (lambda: self.fault(spot))
+        self.then = [
+            *self.chance.sample(between, self.chance.randint(0, 2)),
+            self.chance.choice((act, act, act, fault)),
+        ]
         return Call("reg_write alone", lambda: device.reg_write(goal_position=goal), {spot: goal})
 
     def action(self, spot: Spot, goal: float) -> Call:
@@ -114,16 +118,17 @@ class Matters(Courses):
         way = self.chance.uniform(0.3, 0.7) * bound.step
         return here + way if here < (bound.low + bound.high) / 2 else here - way
 
-    def fault(self) -> Call:
+    def fault(self, waits: Spot | None = None) -> Call:
         """One is at fault, and is ordered to where it might go, by any spelling; or what waits there is carried out."""
-        spot = self.spot()
+        spot = waits or self.spot()
         order = self.chance.choice(self.orders(spot, self.near(spot)))
-        waiting = dict(self.line.place(spot[1])) if spot[0] == "arm" else {}
-        if waiting and self.chance.random() < 0.5:
+        late = waits is not None and any(self.line.place(spot[1]))
+        if late:
             order = self.action(spot, inf).do
 
         def ordered() -> None:
-            faults = self.robot.buses[spot[0]].admit.faults  # type: ignore[attr-defined]
+            bus: Any = self.robot.buses[spot[0]]
+            faults = bus.admit.faults
             faults[spot[1]] = "of this test"
             try:
                 order()
@@ -131,17 +136,20 @@ class Matters(Courses):
                 self.device(spot).stop()
                 del faults[spot[1]]
 
-        return Call("at fault", ordered, {spot: nan}, barred=[spot])
+        what = "action at fault" if late else "at fault"
+        return Call(what, ordered, {spot: nan}, barred=[spot], once=True)
 
     def unheld(self) -> Call:
         """The machine has a lease that nobody holds, or that was lost."""
-        spot, lease = self.spot(), Lease(0.5)
+        spot, lease, lost = self.spot(), Lease(0.5), self.chance.random() < 0.3
         order = self.chance.choice(self.orders(spot, self.near(spot))[:4])
 
         def ordered() -> None:
-            if self.chance.random() < 0.3:
-                lease.take("who fell silent", self.robot.now - 1.0)
+            if lost:
+                lease.take("who fell silent", self.robot.now)
             self.robot.lease = lease
+            for bus in self.robot.buses.values():
+                bus.link.advance(1.0)  # type: ignore[attr-defined]
             try:
                 order()
             finally:
@@ -234,7 +242,9 @@ class Matters(Courses):
         here = round(self.here(spot) / count)
         turn = round(2 * pi / count)
         near = [here + self.chance.randint(-100, 100) for _ in range(3)]
-        word = self.chance.choice((*near, here + turn, here - turn, here + 2 * turn, -here, here | 0x8000, 0xFFFF))
+        word = self.chance.choice(
+            (*near, here + turn, here - turn, here + 2 * turn, -here, here | 0x8000, 0xFFFF)
+        )
         goal, device = word * count, self.device(spot)
         return Call("raw", lambda: device.write(goal_position=goal), {spot: goal})
 

@@ -244,6 +244,50 @@ def test_torque_that_goes_while_nothing_moves_is_noted_when_somebody_looks() -> 
             robot.move({"a1": 0.1})
 
 
+@pytest.mark.parametrize("verb", ["move", "enable_torque", "hold", "device axis", "loop"])
+def test_a_restart_while_it_only_held_is_a_fault_before_it_gets_torque_again(verb: str) -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        robot["a1"].bus.link.advance(1.0)
+        sims["arm"][1].power_cycle()
+        robot["a1"].bus.link.advance(1.0)
+        with pytest.raises(Faulted, match="a1 is at fault: arm#1 has restarted") as told:
+            again(robot, verb)
+        assert told.value.reason == "restart"
+        assert set(robot.faults) == {"a1"}
+        assert not sims["arm"][1].memory["torque_enable"]
+        assert sims["arm"][1].raw_position == 2048
+
+
+def again(robot: Robot, verb: str) -> None:
+    """Somebody moves it, or gives it torque, without having looked at it."""
+    if verb == "move":
+        robot.move({"a1": 0.3, "a2": 0.3})
+    elif verb == "enable_torque":
+        robot.enable_torque()
+    elif verb == "hold":
+        robot["a1"].hold()
+    elif verb == "device axis":
+        robot["a1"].enable_torque()
+    else:
+        with robot.loop(50, "a1") as loop:
+            for state in loop:
+                loop.goal["a1"] = 0.1
+                if state.number > 20:
+                    break
+
+
+def test_who_kept_his_torque_or_was_let_go_gets_it_again() -> None:
+    with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        robot["a2"].disable_torque()
+        sims["arm"][2].power_cycle()
+        robot["a1"].bus.link.advance(1.0)
+        robot.enable_torque()
+        robot.move({"a1": 0.1, "a2": 0.1})
+        assert robot.faults == {}
+
+
 def test_who_is_told_to_hold_and_does_not_keep_his_torque_is_at_fault() -> None:
     with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
         robot.hold("a2")

@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 import pytest
 
 from motorbus import AsyncRobot
-from motorbus.bus.ticket import Flight
 from motorbus.core.operation import Data
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
-from tests.motion.safety.test_estop import MOST, question
+from tests.motion.safety.test_estop import MOST, is_stop, is_target, queued
 
-QUEUED = 10_000
 CHUNK = 0.001  # s of the line that one piece of garbage fills
+FAMILIES = {"arm": "feetech", "can": "kst", "stage": "stepper"}
 LIMITS = {"arm": MOST["feetech"], "can": MOST["kst"], "stage": MOST["stepper"]}
 NODES = {"arm": (1, 2, 3), "can": (0x25, 0x26), "stage": (1,)}
 LONG = 60.0  # s until a test that hangs says so
@@ -50,11 +49,6 @@ def babble(sim: Simulation, link: Any) -> None:
 
     sim.simulator.advance = advance  # type: ignore[method-assign]
     sim.simulator.due = lambda: told + CHUNK  # type: ignore[method-assign]
-
-
-def queued(bus: Any, nodes: tuple[int, ...]) -> None:
-    for number in range(QUEUED):
-        bus.turns.submit(Flight(question(bus, nodes[number % len(nodes)])), bus.link.now())
 
 
 def stopped(can: str, *, hold: bool = False) -> Went:
@@ -132,8 +126,12 @@ def test_06_the_first_byte_is_in_time_on_every_bus_with_everything_wrong_at_once
         "the others were over while that one still hung, and so did the loop"
     )
     for name, most in LIMITS.items():
-        assert went.sent[name][0][0] <= most, name
+        at, first = went.sent[name][0]
+        assert at <= most, name
+        assert is_stop(FAMILIES[name], first), name
+        assert all(is_stop(FAMILIES[name], data) for _, data in went.sent[name]) or (hold and name == "arm")
         assert went.outcomes[name].rounds <= 5
+    assert next(at for at, data in went.sent["can"] if is_target(data)) <= LIMITS["can"]
     assert went.outcomes["stage"].acknowledged == (1,)
     assert set(went.outcomes["can"].acknowledged) == {0x25, 0x26}
 

@@ -7,11 +7,14 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.family import Readdressed
+from motorbus.core.operation import Answer, Effect, Exchange, Goal
 from motorbus.errors import LimitExceeded, NoReply, Refused
 from motorbus.families.feetech import sync_write_positions
-from motorbus.motion.safety.fence import bounds
+from motorbus.motion.safety.fence import bounds, follow
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds
+from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import listened, machine, said
 
@@ -82,6 +85,7 @@ def test_an_axis_that_is_silent_is_not_moved_and_says_why() -> None:
         with pytest.raises(NoReply, match="node 37 did not answer"):
             axis.device.move(0.1)
         assert not [frame for frame in said(sims) if "goal" in frame]
+        sims["can"][0x25].plug()
 
 
 def test_an_order_that_was_kept_is_looked_after_too_and_refused_once_nobody_answers() -> None:
@@ -99,6 +103,7 @@ def test_an_order_that_was_kept_is_looked_after_too_and_refused_once_nobody_answ
             axis.bus.run(kept)
         assert caught.value.reason == "stale"
         assert not [frame for frame in said(sims) if "WRITE" in frame]
+        sims["arm"][1].plug()
 
 
 def test_a_device_that_has_jumped_is_looked_at_twice_and_then_moved_from_there() -> None:
@@ -147,3 +152,70 @@ def test_axes_of_the_file_that_were_not_opened_are_guarded_too() -> None:
             other.move(pi + 3.0, velocity=1.0)
         assert sims["arm"][2].raw_position == 2048
         other.move(pi + 0.1, velocity=1.0)
+
+
+@pytest.mark.parametrize("exit_", ["torque_off", "hold"])
+def test_what_was_ordered_by_itself_is_left_as_the_file_says(exit_: str) -> None:
+    with machine(arm="1", exit=exit_) as (made, sims):
+        with Robot.of(made) as robot:
+            assert not robot["a1"].engaged
+            robot["a1"].device.enable_torque()
+            assert (robot["a1"].engaged, robot["a1"].under_way) == (True, False)
+            robot["a1"].device.move(pi + 1.0, velocity=0.2, wait=False)
+            assert robot["a1"].under_way
+        assert bool(sims["arm"][1].memory["torque_enable"]) == (exit_ == "hold")
+        at = sims["arm"][1].raw_position
+        assert at < 2048 + 100
+        assert abs(sims["arm"][1].memory["goal_position"] - at) < 20
+
+
+def test_what_was_refused_or_only_tried_out_engages_nothing() -> None:
+    with machine(arm="1", can="0x25") as (made, _), Robot.of(made) as robot:
+        axis = robot["a1"]
+        with pytest.raises(LimitExceeded):
+            axis.device.write(goal_position=pi + 3.0)
+        gate_of(robot).lease = Lease()
+        with pytest.raises(Refused):
+            axis.device.enable_torque()
+        robot.lease = None
+        assert (axis.engaged, axis.under_way) == (False, False)
+        order = Goal(1, "position", pi + 0.1, 0.0, 6.0)
+        axis.position()
+        speed = Goal(1, "speed", 1.0, 0.0, 9.0)
+        exchange: Exchange[Answer] = Exchange(b"\x01", effect=Effect.MOTION, goals=(order, speed))
+        gate_of(robot).rehearsing()(exchange)
+        assert (axis.engaged, axis.under_way) == (False, False)
+        gate_of(robot)(exchange)
+        assert (axis.engaged, axis.under_way) == (True, True)
+
+
+def test_the_guard_goes_along_with_a_device_that_gets_another_id() -> None:
+    narrow = {"a1": {"low": "-20 deg", "high": "20 deg"}}
+    with machine(arm="1", axes=narrow) as (made, sims), Robot.of(made) as robot:
+        bus, sim = robot.buses["arm"], sims["arm"][1]
+        robot["a1"].device.set_id(7)
+        found = bus.family.devices.blocking(bus, 7)
+        found.enable_torque()
+        with pytest.raises(LimitExceeded, match="a1: .* is outside -20.0 deg to 20.0 deg"):
+            found.move(pi + 1.0, velocity=1.0)
+        found.move(pi + 0.1, velocity=1.0)
+        assert sim.raw_position == pytest.approx(2048 + 65, abs=3)
+
+
+def test_the_fault_goes_along_too_and_bounds_that_the_file_has_for_the_new_id_count() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        bus, gate = robot.buses["arm"], gate_of(robot)
+        own = gate.guards[2]
+        gate.faults[1] = "it was seen to smoke"
+        for old, new in ((1, 2), (1, 9), (None, 8), (77, 78)):
+            follow(bus, gate, Readdressed(old, new))
+        assert gate.guards[2] is own
+        assert [gate.guards[node].name for node in (8, 9)] == ["a1", "a1"]
+        assert gate.guards.keys() == {1, 2, 8, 9}
+        assert gate.faults.keys() == {1, 2, 8, 9}
+
+
+def test_what_a_servo_is_told_by_the_id_it_is_going_to_have_is_bounded_on_can_too() -> None:
+    with machine(can="0x25") as (made, _), Robot.of(made) as robot:
+        robot["c1"].device.set_node_id(0x30)
+        assert gate_of(robot, "can").guards[0x30].name == "c1"

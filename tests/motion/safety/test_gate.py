@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core.goal import Stays, torque_on
 from motorbus.core.operation import EVERY_LANE, Answer, Due, Effect, Exchange, Goal, Rank
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, Refused
 from motorbus.motion.safety.gate import Gate, blamed
@@ -147,7 +148,7 @@ def test_it_says_what_must_be_asked_before_an_order_can_be_judged() -> None:
     order = motion(place(0.1), Goal(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
     assert line.gate.look(order) == [QUESTION]
     assert line.gate.look(motion(place(0.1), rank=Rank.STOP)) == []
-    assert line.gate.look(motion(Goal(1, "position", 0.1, 0.1, 0.1))) == []
+    assert line.gate.look(motion(Goal(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
     assert line.gate.look(Exchange(b"")) == []
     line.reads(0.0, 1.0)
     assert line.gate.look(order) == []
@@ -162,9 +163,33 @@ def test_staying_is_always_allowed_and_a_number_it_must_be() -> None:
     line = Line()
     line.gate.faults[1] = "gone"
     line.gate.lease = Lease()
-    assert line.passes(Goal(1, "position", 7.0, 7.0, 7.0))
-    assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0))
-    assert not line.passes(Goal(1, "position", nan, nan, nan))
+    assert line.passes(Goal(1, "position", 7.0, 7.0, 7.0, Stays.STILL))
+    assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL))
+    assert not line.passes(Goal(1, "position", nan, nan, nan, Stays.STILL))
+
+
+def test_a_goal_stays_because_it_is_marked_so_and_not_because_its_limits_leave_one_place() -> None:
+    line = Line()
+    only, on = Goal(1, "position", 7.0, 7.0, 7.0), torque_on(1)
+    assert line.gate.look(motion(only)) == [QUESTION]
+    assert line.reason(only) == "stale"
+    line.reads(0.0, 1.0)
+    assert line.reason(only) == "limits"
+    assert line.passes(on)
+    line.gate.lease = Lease()
+    assert line.reason(only) == line.reason(on) == line.reason(on, effect=Effect.TORQUE) == "lease"
+    line.gate.faults[1] = "gone"
+    assert line.reason(only) == line.reason(on) == line.reason(on, effect=Effect.TORQUE) == "fault"
+
+
+def test_an_order_for_everyone_is_refused_while_anybody_of_them_is_at_fault() -> None:
+    line = Line()
+    line.reads(0.0, 1.0)
+    line.gate.faults[3] = "gone"
+    assert line.passes(place(0.1))
+    for effect in (Effect.MOTION, Effect.TORQUE):
+        with pytest.raises(Refused, match="node 3 is at fault"):
+            line.gate(Exchange(b"\x01", effect=effect, goals=(place(0.1),), lane=EVERY_LANE))
 
 
 def test_a_node_at_fault_neither_moves_nor_gets_torque_and_others_do() -> None:
@@ -237,20 +262,17 @@ def test_whatever_passes_is_inside_near_and_was_read_lately(
 # -- what goes on without an end, and why something ended ----------------------------------------------------------
 
 
-def test_it_knows_what_goes_on_until_it_is_told_something_else_or_stopped() -> None:
-    line, stops = Line(), {1: 0}
-    line.gate.watch(line.seen, lambda: line.now, stops.__getitem__)
+def test_it_knows_what_goes_on_until_a_stop_or_an_order_to_rest_was_accepted() -> None:
+    line, stops, accepted = Line(), {1: 0}, {1: 0}
+    line.gate.watch(line.seen, lambda: line.now, stops.__getitem__, accepted.__getitem__)
     turn = Goal(1, "velocity", 0.5, -9.0, 9.0)
-    for ended in ("stay", "zero", "stop"):
+    for ended in (Goal(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL), turn._replace(value=0.0)):
         assert not line.gate.goes_on(1)
         assert line.passes(turn)
-        assert line.gate.goes_on(1)
-        if ended == "stay":
-            assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0))
-        elif ended == "zero":
-            assert line.passes(turn._replace(value=0.0))
-        else:
-            stops[1] += 1
+        assert line.passes(ended)
+        stops[1] += 1
+        assert line.gate.goes_on(1)  # it has left, and may have been lost
+        accepted[1] += 1
     assert not line.gate.goes_on(1)
 
 

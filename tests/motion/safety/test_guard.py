@@ -134,7 +134,9 @@ def test_what_comes_without_a_speed_leads_no_farther_than_goals_of_one_that_is_l
     assert guard.is_fine(far, 10.0)
     assert not guard.is_fine(far + 2 * ROUNDED, 10.0)
     for goal in (place(far + 2 * ROUNDED), way(-far - 2 * ROUNDED)):
-        with pytest.raises(LimitExceeded, match="comes without a velocity, so .* as fast as it can") as caught:
+        with pytest.raises(
+            LimitExceeded, match="comes without a velocity, so .* as fast as it can"
+        ) as caught:
             guard.check_goal(goal)
         assert (caught.value.reason, caught.value.node) == ("velocity", 7)
         assert "nothing was sent" in str(caught.value)
@@ -142,5 +144,5 @@ def test_what_comes_without_a_speed_leads_no_farther_than_goals_of_one_that_is_l
 
 
 def test_who_is_led_as_slowly_and_lags_as_far_as_he_may_is_not_ordered_too_far() -> None:
-    assert LATE == pytest.approx(LAG + 2 / SLOWEST)
+    assert pytest.approx(LAG + 2 / SLOWEST) == LATE
     assert NEAR == FAR

@@ -1,8 +1,9 @@
 """A program that is killed in the midst of a movement: what it led goes on by no more than its last small goal.
 
-Real processes on real ports: a simulator for each bus, and the program, which SIGKILL ends after so many orders.
-A killed program tells nothing any more, so what the motors do is asked of the simulators. Whoever connects
-afterwards changes nothing.
+Real processes on real ports: a simulator for each bus, and the program, which SIGKILL ends: by its own hand as an order
+is about to leave, or from outside at any moment. Before each order the program writes down where it heard each device
+to be last and where it now sends it, so what counts is reckoned from before the kill and from what the program meant.
+What the motors do is asked of the simulators. Whoever connects afterwards changes nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections.abc import Callable, Iterator
 from math import pi, radians
 from pathlib import Path
 from random import Random
+from threading import Timer
 from typing import Any, NamedTuple
 
 import pytest
@@ -27,31 +29,47 @@ from motorbus.session.robot import Robot
 from tests.motion.machines import described
 
 PROGRAM = """
-import os, signal, sys
+import json, os, signal, sys
 from random import Random
 from motorbus import Robot
 from motorbus.bus.air import Air
 
 chance, left, launch = Random(int(sys.argv[2])), [int(sys.argv[3])], Air._launch
+names, places, goals = {}, {}, {}
 
 def doomed(air, flight, now):
-    if flight.exchange.goals:
+    ordered = [goal for goal in flight.exchange.goals if goal.quantity == "position"]
+    for goal in ordered:
+        goals[names[id(air)] + str(goal.node)] = goal.value
+    if ordered:
         left[0] -= 1
-        if left[0] < 0:
+        heard = {
+            names[id(air)] + str(node): guard.track.sample.value
+            for air, gate in gates for node, guard in gate.guards.items() if guard.track.sample
+        }
+        os.write(1, json.dumps([heard, goals]).encode() + b"\\n")
+        if left[0] == 0:
             os.kill(os.getpid(), signal.SIGKILL)
     return launch(air, flight, now)
 
-Air._launch = doomed
 with Robot.load(sys.argv[1]) as robot:
+    names = {id(bus.turns): name for name, bus in robot.buses.items()}
+    gates = [(bus.turns, bus.admit) for bus in robot.buses.values()]
+    Air._launch = doomed
     while True:
         robot.move({name: chance.uniform(-0.7, 0.7) for name in robot.axes})
 """
 QUANTUM = 0.25 * radians(90)
 """rad that an axis of this machine may go in 250 ms."""
+Spot = tuple[str, int]
 COUNTS = {"arm": 2 * pi / 4096, "can": radians(0.1)}
 """rad of a raw position."""
+SPOTS: dict[str, Spot] = {"arm1": ("arm", 0), "arm2": ("arm", 1), "arm3": ("arm", 2), "can37": ("can", 0)}
+"""By the name that the program gives it, the number of each device in the status of its bus."""
 GOALS = {"arm": "raw_goal_position", "can": "raw_target"}
 LOOKS = 100_000
+LONG = 60.0
+"""s until a program that does not die by its own hand is killed."""
 AT_REST = 3
 """Counts that a servo at rest may be off its goal."""
 
@@ -71,7 +89,7 @@ class Served(NamedTuple):
         nodes: list[dict[str, Any]] = found["nodes"]
         return nodes
 
-    def places(self) -> dict[tuple[str, int], tuple[float, float, bool]]:
+    def places(self) -> dict[Spot, tuple[float, float, bool]]:
         """Of each device: where it is, where it was told to go (rad), and whether it moves."""
         return {
             (bus, number): (one["raw_position"] * count, one[GOALS[bus]] * count, bool(one["moving"]))
@@ -95,14 +113,37 @@ def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         yield Served(control, file)
 
 
-def killed(served: Served, seed: int, orders: int) -> None:
-    """A program that moves everything, killed when so many orders have left."""
+class Last(NamedTuple):
+    """What a killed program wrote down last: where it heard each device to be, and the goals (rad) that each may have.
+
+    The last of all orders may have left, or not.
+    """
+
+    heard: dict[Spot, float]
+    goals: dict[Spot, set[float]]
+
+
+def killed(served: Served, seed: int, orders: int, after: float | None) -> Last:
+    """A program that moves everything, killed as this order of it leaves, or so long (s) after its first."""
     words = [sys.executable, "-c", PROGRAM, str(served.file), str(seed), str(orders)]
-    ended = subprocess.run(words, capture_output=True, timeout=120, check=False)
-    assert ended.returncode == -signal.SIGKILL, ended.stderr
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
+        assert program.stdout is not None
+        first = program.stdout.readline()
+        doom = Timer(LONG if after is None else after, program.kill)
+        doom.start()
+        rest, wrong = program.communicate(timeout=2 * LONG)
+        doom.cancel()
+    assert program.returncode == -signal.SIGKILL, wrong
+    lines = [json.loads(line) for line in (first + rest).splitlines()]
+    assert after is not None or len(lines) == orders, "by its own hand"
+    (heard, last), (_, before) = lines[-1], lines[-2] if len(lines) > 1 else ({}, {})
+    return Last(
+        {SPOTS[name]: place for name, place in heard.items()},
+        {spot: {goals[name] for goals in (last, before) if name in goals} for name, spot in SPOTS.items()},
+    )
 
 
-def at_rest(served: Served) -> dict[tuple[str, int], tuple[float, float, bool]]:
+def at_rest(served: Served) -> dict[Spot, tuple[float, float, bool]]:
     """Where all are once nothing moves."""
     for _ in range(LOOKS):
         found = served.places()
@@ -118,13 +159,21 @@ def test_what_was_led_goes_no_farther_than_its_last_goal_and_connecting_changes_
     chance = Random(8)
     caught = 0
     for seed in range(rounds(100_000) // 500):
-        killed(served, seed, chance.randrange(2, 300))
+        stood = served.places()  # who was not heard before the first order was not sent anywhere yet
+        own = seed % 2 == 0  # the other half is killed from outside
+        last = killed(
+            served, seed, chance.randrange(2, 300) if own else -1, None if own else chance.uniform(0, 2)
+        )
         before = served.places()
         after = at_rest(served)
         caught += any(moving for _, _, moving in before.values())
         for spot, (place, goal, _) in after.items():
-            assert abs(place - before[spot][0]) <= QUANTUM, (seed, spot)
-            assert abs(place - goal) <= AT_REST * COUNTS[spot[0]], (seed, spot)
+            count = COUNTS[spot[0]]
+            heard = last.heard.get(spot, stood[spot][0])
+            assert abs(place - heard) <= QUANTUM, (seed, spot)
+            assert not last.goals[spot] or abs(place - goal) <= AT_REST * count, (seed, spot)
+            ordered = last.goals[spot] or {heard}
+            assert any(abs(place - one) <= (AT_REST + 1) * count for one in ordered), (seed, spot, ordered)
             assert goal == before[spot][1], (seed, spot)
         assert_connecting_writes_nothing(served, monkeypatch)
         assert served.places() == after

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf, nan
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -99,8 +100,8 @@ def test_who_attends_is_there() -> None:
     assert not lease.is_attended(12.0)
 
 
-@pytest.mark.parametrize("lasts", [0.0, -1.0, nan, inf])
-def test_a_lease_that_never_ends_or_never_was_is_none(lasts: float) -> None:
+@pytest.mark.parametrize("lasts", [0.0, -1.0, nan, inf, True, "x", [1.0]])
+def test_a_lease_that_never_ends_or_never_was_is_none(lasts: Any) -> None:
     with pytest.raises(RequestError, match="cannot last"):
         Lease(lasts)
 
@@ -136,6 +137,28 @@ def test_a_loss_says_that_something_may_have_moved() -> None:
     assert error is not None
     assert (error.reason, error.unmoved) == ("lease", False)
     assert "nothing was sent" not in str(error)
+
+
+def test_it_counts_its_losses_each_once() -> None:
+    lease = held()
+    for now in (10.4, 11.0, 12.0):
+        lease.standing(now)
+    assert lease.losses == 1
+    lease.reset(12.0)
+    lease.take("page", 12.0)
+    lease.reset(99.0)
+    assert lease.losses == 2, "also when nobody looked before the reset"
+
+
+def test_its_watchers_hear_what_its_holder_says_but_that_he_is_there() -> None:
+    lease, heard = Lease(), []
+    lease.watchers.append(lambda: heard.append(lease.is_attended(0.0)))
+    lease.take("page", 0.0, attended=True)
+    lease.beat("page", 0.0)
+    lease.attend("page", 0.0, False)
+    lease.release("page", 0.0)
+    lease.reset(0.0)
+    assert heard == [True, False, False, False]
 
 
 def test_a_holder_has_a_name() -> None:

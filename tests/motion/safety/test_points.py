@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.ticket import Flight
 from motorbus.core.operation import Data, Pause
 from motorbus.errors import LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.families.feetech import sync_write, sync_write_positions
@@ -22,6 +21,7 @@ from motorbus.motion.safety.standstill import Rest, stopped
 from motorbus.session.robot import Robot
 from tests.motion.machines import listened, machine, said
 from tests.motion.safety.points import asks, known, sent
+from tests.motion.safety.test_estop import is_stop, queued
 
 
 def test_01_nothing_moves_on_connect(rounds: Callable[[int], int]) -> None:
@@ -183,11 +183,11 @@ def test_06_an_emergency_stop_goes_before_all_that_waits_on_every_bus_and_latche
         robot.enable_torque(["a1", "a2"])
         for name, bus in robot.buses.items():
             node = {"arm": 1, "can": 0x25, "stage": 1}[name]
-            for _ in range(100):
-                bus.turns.submit(Flight(bus.family.probe(node, 0)), bus.link.now())
+            queued(bus, (node,))
         listened(sims)
         robot.estop()
         first = {name: next(data for data in sim.line.sent) for name, sim in sims.items()}  # type: ignore[attr-defined]
+        assert [name for name, sim in sims.items() if not is_stop(sim.family.name, first[name])] == []
         assert not any(map(asks, (first["arm"], first["stage"])))
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
         for bus in robot.buses.values():

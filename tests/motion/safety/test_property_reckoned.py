@@ -54,6 +54,7 @@ class Caller:
         """A person puts it somewhere, looks, and says where it stands."""
         stands = self.chance.uniform(LOW, HIGH)
         self.zero += self.place() - stands
+        self.lift.stop()  # nobody else knows when what was ordered of its device has come to its end
         self.lift.declare(stands)
 
     def way(self) -> Any:

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.family import Quality
-from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, TREMBLING, Sample, Track
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import WireError
+from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, TREMBLING, Sample, Track, believed
 
 QUICK = st.floats(-FASTEST, FASTEST)
 
@@ -135,3 +137,36 @@ def test_what_is_believed_is_always_a_number_and_was_told(readings: list[tuple[f
         assert sample.at == at
         assert track.sample is None or abs(track.sample.value) < inf
         assert (track.why_not(at) == "") == (sample.quality in (Quality.FRESH, Quality.CONFIRMED))
+
+
+def reading(*angles: float) -> float:
+    """What is told of a device that was seen at 0, and then is read at these, 10 ms apart."""
+    track, left, at = Track(), list(angles), 1.0
+    track.take(0.0, at)
+
+    def ask() -> Operation[float]:
+        yield from ()
+        return left.pop(0)
+
+    steps = iter(believed(track, ask))
+    try:
+        assert isinstance(next(steps), Pause)
+        while True:
+            at += 0.01
+            steps.send(at)
+    except StopIteration as end:
+        assert not left
+        found: float = end.value
+        return found
+
+
+def test_a_place_is_told_where_a_motor_can_have_come_there_or_a_second_reading_agrees() -> None:
+    assert reading(0.1) == 0.1
+    assert reading(2.0, 0.1) == 0.1
+    assert reading(2.0, 2.001) == 2.001
+    assert reading(2.0, 4.0, 4.001) == 4.001
+
+
+def test_readings_of_which_none_agrees_are_not_told() -> None:
+    with pytest.raises(WireError, match="do not agree: 2, 4, 6 rad"):
+        reading(2.0, 4.0, 6.0)

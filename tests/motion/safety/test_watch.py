@@ -186,7 +186,7 @@ def test_who_is_not_guarded_pushes_as_he_likes_and_is_at_fault_all_the_same() ->
 def test_each_is_judged_by_its_own_answer_also_where_two_are_asked_at_a_time(limp: int, begun: int) -> None:
     with machine(arm="1-2") as (made, sims), Robot.of(made) as robot:
         robot.enable_torque()
-        bus, (first, second) = robot.buses["arm"], robot.axes.values()
+        bus, (first, second) = robot["a1"].bus, robot.axes.values()
         watch = Watch(bus, [first, second])
         bus.run(watch.begin([first, second]))
         bus.run(iter(Pause(2.0)))

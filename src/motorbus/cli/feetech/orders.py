@@ -103,7 +103,8 @@ def reg_write(
 
 @app.command(
     help_epilogue="""Without ids one broadcast starts all servos in the same instant, and none of
-them answers.
+them answers. Where a machine file bounds axes on this bus it is refused: what
+another program handed over nobody can judge.
 
 Examples:
 

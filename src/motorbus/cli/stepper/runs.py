@@ -162,12 +162,13 @@ def start_project(
 
 def _question(project: int, how: Behaviour, bus: Bus) -> str:
     one = face(bus, 1)
-    goal, _ = of_project(one, one.read_project(project).project, how)
-    if abs(goal.value) <= FAR:
+    goals = of_project(one, one.read_project(project).project, how)
+    if any(goal.quantity == "velocity" for goal in goals):
+        return f"start project {project}, which goes on until it is stopped"
+    far = max((goal.value for goal in goals if goal.quantity == "relative"), key=abs)
+    if abs(far) <= FAR:
         return ""
-    return (
-        f"start project {project}, which goes up to {units.show(goal.value, 'position')} from where it stands"
-    )
+    return f"start project {project}, which goes up to {units.show(far, 'position')} from where it stands"
 
 
 def heard(told: bool, output: Output, event: object, bar: Bar) -> None:

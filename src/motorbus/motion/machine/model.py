@@ -119,7 +119,7 @@ High: TypeAlias = Annotated[
 MaxVelocity: TypeAlias = Annotated[
     float,
     _key(
-        "it is never faster", ('"120 deg/s"', '"50 mm/s"'), VELOCITY,
+        "it is never led faster", ('"120 deg/s"', '"50 mm/s"'), VELOCITY,
         usual=("90 deg/s", "50 mm/s"), gt=0, le=FARTHEST,
     ),
 ]  # fmt: skip
@@ -251,7 +251,8 @@ class AxisSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """A position in the unit in which people see this axis: `-45.0 deg`, `12.50 mm`."""
         scale = units.SCALES[POSITION.of(self.linear)][self.unit]
         decimals = {"deg": 1, "mm": 2, "turn": 3}.get(self.unit, 4)
-        text = f"{position / scale:.{decimals}f}"
+        number = position / scale
+        text = f"{number:.{decimals}f}" if abs(number) < units.LONG else f"{number:.6g}"
         return f"{text if float(text) else text.removeprefix('-')} {self.unit}"
 
 

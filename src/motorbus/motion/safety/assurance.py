@@ -13,6 +13,7 @@ from motorbus.core.assurance import Assurance, Given, Point
 from motorbus.motion.limits import shown_rate
 from motorbus.motion.machine.model import VELOCITY
 from motorbus.motion.moving.stream import SHARE, USUAL
+from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 
 if TYPE_CHECKING:
@@ -130,6 +131,11 @@ MACHINE: Final[Mapping[str, Point]] = {
         Given.YES,
         "every order of this process passes it, raw ones and loops too: limits, step from the measured position, "
         "velocity, finite numbers. What is refused is not sent",
+    ),
+    "velocity": Point(
+        Given.PARTLY,
+        "held by what is led and by orders that say one; an order without one runs at the device's own speed, and may "
+        f"lead {LATE:g} s of its velocity and {NEAR:g} rad from where it is measured to be, no farther",
     ),
     "acceleration": Point(
         Given.PARTLY,

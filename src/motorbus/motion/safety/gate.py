@@ -136,6 +136,7 @@ class Gate:
             self._check_standing(exchange, goals)
         if self.guards or self.attended:
             now = self._now()
+            leaving: list[tuple[Guard, Goal]] = []
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
                 guard = self.guards.get(goal.node)
                 if guard is not None and guard.track is not None:
@@ -145,8 +146,9 @@ class Gate:
                 if not _stays(goal):
                     self._check_guarded(guard, goal, now, goals)
                     if guard is not None and obeyed:
-                        self._leaves(guard, goal)
-
+                        leaving.append((guard, goal))
+            for guard, goal in leaving:  # once all are judged: where it is is forgotten when it leaves
+                self._leaves(guard, goal)
         if self._tells and obeyed:
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
                 if goal.node in self.guards:

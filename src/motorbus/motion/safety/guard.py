@@ -22,8 +22,9 @@ UNIT: Final = 0.08
 LATE: Final = 0.8
 """s of its greatest speed that an order without a speed may lead from where a device is measured to be.
 
-So far goals are ahead where a device is led. It may be behind by 0.3 s (`moving.stream.LAG`), its last reading was taken
-one period ago, and the goal is for one period from now: 0.25 s each where goals are slowest (`motion.limits.SLOWEST`).
+So far goals are ahead where a device is led. It may be behind by 0.3 s (`moving.stream.LAG`), its last reading was
+taken one period ago, and the goal is for one period from now: 0.25 s each where goals are slowest
+(`motion.limits.SLOWEST`).
 """
 NEAR: Final = 0.1
 """rad that it may lead besides, whatever its speed: how far one that is led may be off (`moving.stream.FAR`)."""
@@ -67,8 +68,8 @@ class Guard:
     `ask` reads its position, so that a bus can look before it gives an order; `show` words an angle of the device;
     `answer` is the last one of the bus that was taken in here.
     `track` is None where the device does not tell where it is. Then `reckons` gives where it is by dead reckoning (rad
-    of the device; None: nobody knows), and `leaves` is called when it was ordered to move, whoever did that. `ordered` is
-    called of each device when it was ordered to move (true) or only given torque, whoever did that.
+    of the device; None: nobody knows), and `leaves` is called when it was ordered to move, whoever did that. `ordered`
+    is called of each device when it was ordered to move (true) or only given torque, whoever did that.
     """
 
     def __init__(

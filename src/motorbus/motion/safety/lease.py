@@ -21,6 +21,15 @@ LASTS: Final = 0.5
 """s from one heartbeat to the loss of the lease."""
 
 
+def check_lasts(lasts: object) -> None:
+    """Raise RequestError for what is no time (s) that a lease can last; None is for one that does not run out."""
+    number = isinstance(lasts, int | float) and not isinstance(lasts, bool) and isfinite(lasts) and lasts > 0
+    if lasts is not None and not number:
+        raise RequestError(
+            f"a lease cannot last {lasts!r} s", expected="a finite number above 0", advice="nothing was sent"
+        )
+
+
 class Standing(Enum):
     """How a lease stands."""
 
@@ -33,13 +42,12 @@ class Lease:
     """The right to move, which one holder has at a time. It `lasts` so long (s) after each heartbeat.
 
     With None it does not run out: that is for a holder who is this very program, for when that is gone it sends
-    nothing. One that is `needed` lets nothing move while nobody holds it. `losses` counts how often it was lost. Whoever
-    is among the `watchers` is called when its holder said something but that he is there, and when it was reset.
+    nothing. One that is `needed` lets nothing move while nobody holds it. `losses` counts how often it was lost. The
+    `watchers` are called when its holder said something else than that he is there, and when it was reset.
     """
 
     def __init__(self, lasts: float | None = LASTS, *, needed: bool = True) -> None:
-        if lasts is not None and not (isfinite(lasts) and lasts > 0):
-            raise RequestError(f"a lease cannot last {lasts} s", expected="a finite number above 0")
+        check_lasts(lasts)
         self.lasts: Final = lasts
         self.needed: Final = needed
         self.holder = ""

@@ -227,7 +227,8 @@ def action(node: Node) -> Runnable[None]:
     Raises RequestError when the settings of the servo were changed since its REG WRITE, or when it was let go or
     stopped since, by whomever on this bus: reg_write() it again. Raises DeviceError when the register map is not known,
     for then nobody knows what waits; OutcomeUnknown when it was not acknowledged, or still waits on a servo that
-    acknowledges nothing.
+    acknowledges nothing; Refused, where bounds are set, for what nobody on this bus has handed over since it was opened
+    (reason `unknown`), and for what they do not allow from where it is now.
     """
     if node.table is None or node.settings is None:
         return _met(node)

@@ -130,8 +130,12 @@ def broadcast_node_id(
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
+    return (yield from Alone(_readdressed(dialect, new)))
+
+
+def _readdressed(dialect: Dialect, new: int) -> Operation[tuple[int, ...]]:
     yield from Report(Readdressed(None, new))
-    return (yield from Alone(_written(dialect, dialect.profile.table["node_id"], new)))
+    return (yield from _written(dialect, dialect.profile.table["node_id"], new))
 
 
 def _written(

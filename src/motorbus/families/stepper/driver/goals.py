@@ -6,7 +6,10 @@ passes, and how far that may be is for whoever knows the machine. Angles are of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from math import inf, nan, tau
+from typing import Final
 
 from motorbus.core.operation import Goal
 from motorbus.families.stepper import execution
@@ -14,12 +17,25 @@ from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.table import Project
 
+COUNTLESS: Final = 1_000_000
+"""Passes for which an endless project is judged: what drifts in each leaves any travel in so many."""
+_COUNTS: Final = ("total", "extra")
+"""What a count of a loop may mean, in all or besides the first: nobody has settled it, so the farthest is judged."""
+
 
 def of_project(node: Node, project: Project, how: Behaviour = USUAL) -> tuple[Goal, ...]:
-    """Starting it: the farthest that one pass gets from where it begins, in rad, and its greatest speed in rad/s."""
+    """Starting it: the farthest that it gets in each direction from where it begins, in rad, its greatest speed in
+    rad/s, and that as a velocity where it never ends.
+
+    All of its passes count, in the reading of its loops that leads farthest. An input that ends a step before its end
+    is not reckoned with.
+    """
     places = {place.step for place in execution.one_pass(project, how)}
     fastest = max((project.step(number).speed for number in places), default=0)
-    return (_goal(node, "relative", _angle(project, _farthest(project, how))), _speed(node, fastest))
+    ways = [_goal(node, "relative", _angle(project, units)) for units in _ends(project, how)]
+    if _goes_on(project, how):
+        ways.append(_goal(node, "velocity", fastest * tau / 60))
+    return (*ways, _speed(node, fastest))
 
 
 def of_move(node: Node, project: Project) -> tuple[Goal, ...]:
@@ -46,11 +62,33 @@ def _angle(project: Project, units: int) -> float:
     return units * tau / project.turn_distance if project.turn_distance else nan
 
 
-def _farthest(project: Project, how: Behaviour) -> int:
-    """User units, with their sign, at the farthest end of a step of one pass."""
-    at, farthest = 0, 0
+def _ends(project: Project, how: Behaviour) -> Iterator[int]:
+    """User units, with their sign, at the farthest ends of all its passes: one, or two where it goes both ways."""
+    reached = [_reached(project, replace(how, seg_loop=count)) for count in _COUNTS]
+    high, low = max(top for top, _ in reached), min(bottom for _, bottom in reached)
+    if high or not low:
+        yield high
+    if low:
+        yield low
+
+
+def _reached(project: Project, how: Behaviour) -> tuple[int, int]:
+    """The highest and the lowest place that an end of a step is at, in user units from where the first pass begins.
+
+    What a pass leaves over adds up; so it is the first or the last pass that gets farthest.
+    """
+    at = high = low = 0
     for place in execution.one_pass(project, how):
         step = project.step(place.step)
-        at += step.sign * step.distance
-        farthest = max(at, farthest, key=abs)
-    return farthest
+        at += step.sign * step.distance if step.speed else 0
+        high, low = max(high, at), min(low, at)
+    counts = [execution.passes(project, replace(how, proj_loop=count)) or COUNTLESS for count in _COUNTS]
+    drift = at * (max(counts) - 1)
+    return max(high, high + drift), min(low, low + drift)
+
+
+def _goes_on(project: Project, how: Behaviour) -> bool:
+    """Whether only a stop ends it."""
+    numbers = range(1, execution.last_step(project) + 1)
+    still = any(not project.step(number).distance and project.step(number).speed for number in numbers)
+    return project.is_endless or (still and how.zero_distance == "endless")
