@@ -198,8 +198,8 @@ def blocking_attended(robot: Any, lasts: float | None = None, *, who: str = WHO)
     lost: what moves is stopped, the verb that is at work raises Refused with the reason "lease", or the end of the
     `with` does, and nothing moves until `robot.lease.reset(robot.now)`. `who` is named in messages.
 
-    Raises RequestError for a time that is none, at once; on entering Refused when somebody else holds the lease or it is
-    lost, and RequestError for another time than that of a lease that was set.
+    Raises RequestError for a time that is none, at once; on entering Refused when somebody else holds the lease or it
+    is lost, and RequestError for another time than that of a lease that was set.
     """
     return Attended(robot, lasts, who)
 

@@ -17,16 +17,17 @@ from tests.motion.machines import machine
 @pytest.mark.parametrize("seconds", [HELD_UP + 0.1, 3.0, 20.0])
 def test_after_a_gap_all_stop_where_they_are(axis: str, seconds: float) -> None:
     with machine(arm="1", can="0x25") as (made, sims):
-        robot: Any = None
+        machines: list[Any] = []
         held: list[float] = []
 
         def hear(event: object) -> None:
             if isinstance(event, Progress) and event.done > 1500 and not held:
-                held.append(robot[axis].spec.from_device(_place(sims, axis)))
-                for bus in robot.buses.values():
+                held.append(machines[0][axis].spec.from_device(_place(sims, axis)))
+                for bus in machines[0].buses.values():
                     bus.link.advance(seconds)
 
         with Robot.of(made, report=hear) as robot:
+            machines.append(robot)
             with pytest.raises(Interrupted, match=r"told where to go for \d") as told:
                 robot.move({"a1": 0.6, "c1": 0.6}, duration=6.0)
             assert "held up" in told.value.cause
@@ -36,16 +37,17 @@ def test_after_a_gap_all_stop_where_they_are(axis: str, seconds: float) -> None:
 
 def test_a_short_one_is_made_up_for() -> None:
     with machine(arm="1", can="0x25") as (made, _):
-        robot: Any = None
+        machines: list[Any] = []
         held: list[int] = []
 
         def hear(event: object) -> None:
             if isinstance(event, Progress) and event.done > 1500 and not held:
                 held.append(event.done)
-                for bus in robot.buses.values():
+                for bus in machines[0].buses.values():
                     bus.link.advance(HELD_UP / 2)
 
         with Robot.of(made, report=hear) as robot:
+            machines.append(robot)
             robot.move({"a1": 0.6, "c1": 0.6}, duration=6.0)
             assert robot["a1"].position() == pytest.approx(0.6, abs=0.01)
         assert held

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motorbus.core.family import Quality
 from motorbus.core.operation import Operation, Pause
 from motorbus.errors import WireError
-from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, TREMBLING, Sample, Track, believed
+from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 
 QUICK = st.floats(-FASTEST, FASTEST)
 
@@ -108,13 +108,38 @@ def test_what_was_forgotten_is_unseen_and_may_come_back_anywhere() -> None:
     assert track.take(-300.0, 1.001).quality is Quality.FRESH
 
 
-@given(st.floats(-100, 100), st.lists(st.tuples(st.floats(1e-4, 1.0), QUICK), max_size=30))
-def test_nothing_that_a_motor_does_is_ever_suspect(start: float, ways: list[tuple[float, float]]) -> None:
+@given(st.floats(-100, 100), st.lists(st.tuples(st.floats(1e-4, REACH), QUICK), max_size=30))
+def test_nothing_that_a_motor_does_while_somebody_looks_is_ever_suspect(
+    start: float, ways: list[tuple[float, float]]
+) -> None:
     track, at, place = Track(), 0.0, start
     track.take(place, at)
     for seconds, speed in ways:
         at, place = at + seconds, place + speed * seconds
         assert track.take(place, at).quality is Quality.FRESH
+
+
+@given(st.floats(-100, 100), st.lists(st.tuples(st.floats(1e-4, 10.0), QUICK), max_size=30))
+def test_whatever_a_motor_does_a_second_look_confirms_it(
+    start: float, ways: list[tuple[float, float]]
+) -> None:
+    track, at, place = Track(), 0.0, start
+    track.take(place, at)
+    for seconds, speed in ways:
+        at, place = at + seconds, place + speed * seconds
+        if track.take(place, at).quality is Quality.SUSPECT:
+            at, place = at + 0.001, place + speed * 0.001
+            assert track.take(place, at).quality is Quality.CONFIRMED
+
+
+@pytest.mark.parametrize("seconds", [0.07, 0.25, 0.5, 0.6, 10.0, 1e5])
+def test_one_reading_does_not_say_that_it_has_gone_far_while_nobody_looked(seconds: float) -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    assert track.take(3.0, 1.0 + seconds).quality is Quality.SUSPECT
+    assert track.take(1.02, 1.001 + seconds).quality is Quality.FRESH
+    assert track.sample is not None
+    assert track.sample.value == 1.02
 
 
 @given(st.floats(0, 10), st.floats(1e-4, 1.0), st.floats(1e-3, 100), st.sampled_from([-1, 1]))

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from math import inf
 from threading import current_thread, main_thread
 from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data, Pause
-from motorbus.errors import Refused, VerificationFailed
+from motorbus.core.operation import Data, Effect, Exchange, Goal, Pause
+from motorbus.errors import LimitExceeded, Refused, VerificationFailed
 from motorbus.families.feetech.wire import Instruction
 from motorbus.families.stepper.driver.commands import stop_motor, stop_project
 from motorbus.families.stepper.driver.node import Node
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.leaving import goes_on
+from motorbus.motion.safety.gate import Gate
+from motorbus.motion.safety.guard import Bounds, Guard
 from motorbus.motion.safety.turning import Resting, Turning
 from motorbus.session.robot import Robot
 from tests.motion.machines import Cut, machine
@@ -194,3 +197,20 @@ def test_a_stepper_has_stopped_once_it_has_accepted_both_that_end_what_it_does()
                 assert goes_on(robot["lift"])
                 bus.run(say(Node()))
             assert not goes_on(robot["lift"])
+
+
+def test_an_order_that_is_refused_sets_nothing_going_and_leaves_known_where_it_is() -> None:
+    there: list[float | None] = [1.0]
+    gate = Gate()
+    gate.guards[1] = Guard(
+        "lift",
+        Bounds(0.0, 2.0),
+        measures=False,
+        reckons=lambda: there[0],
+        leaves=lambda: there.__setitem__(0, None),
+    )
+    ways = tuple(Goal(1, "relative", way, -inf, inf) for way in (0.5, -1.5))
+    with pytest.raises(LimitExceeded):
+        gate(Exchange(b"", effect=Effect.MOTION, goals=ways))
+    assert there == [1.0]
+    assert not gate.goes_on(1)

@@ -22,6 +22,10 @@ MARGIN: Final = 1.5
 """How much farther than at its greatest speed a device may have come before that is called impossible."""
 TREMBLING: Final = 0.01
 """rad by which readings of a device at rest may differ: two counts of the coarsest servo there is."""
+REACH: Final = 0.06
+"""s for which the speed counts: after a longer time a motor can be anywhere, and one faulty reading must not say so."""
+STAYED: Final = 0.1
+"""rad within which a device is believed at once to be when nobody has looked for long."""
 FRESH: Final = 0.5
 """s for which a reading counts as fresh, whoever took it: as long as a lease, and longer than whoever leads axes waits
 for one that is silent (0.3 s), so that he says who is."""
@@ -100,8 +104,10 @@ class Track:
         self._sample = self._doubt = None
 
     def _possible(self, since: Sample, value: float, at: float) -> bool:
-        way = abs(value - since.value)
-        return way <= self.speed * (at - since.at) * MARGIN + TREMBLING
+        way, age = abs(value - since.value), at - since.at
+        if age > FRESH:  # nobody has looked for long: that it has left its place needs a second look
+            return way <= STAYED
+        return way <= self.speed * min(age, REACH) * MARGIN + TREMBLING
 
     def _believed(self, value: float, at: float, quality: Quality) -> Sample:
         self._doubt = None
