@@ -159,7 +159,7 @@ BAD = {
         "a9", "ready", "arm#1", "a1=1", "a1 a9", "''", "arm,baud=1", "feetech:x", "a1 --baud fast", "--colour red",
     ),
     "home": (
-        "", "a9", "ready", "lift=1", "arm", "can#37", "lift --velocity 1", "lift --deadline long",
+        "", "a9", "ready", "lift=1", "arm", "can#37", "lift --velocity 0", "lift --deadline long",
         "lift --deadline nan", "lift stage#1", "lift --colour red",
     ),
     "jog": (

@@ -156,7 +156,12 @@ def _axes(
 
 
 def _pace(names: list[str], velocity: str) -> float | None:
-    """How fast they shall home (rad/s, m/s). Raises RequestError for what no velocity of them all can be."""
+    """How fast they shall home (rad/s, m/s). Raises RequestError for what no velocity of them all can be.
+
+    LimitExceeded for one above that of an axis, before a port is opened.
+    """
+    from motorbus.motion.limits import check_velocity
+
     kinds = {VELOCITY.of(machine().axes[name].linear) for name in names}
     paces = [units.parse(velocity, kind) for kind in kinds] if velocity else []
     if len(paces) > 1:
@@ -165,4 +170,9 @@ def _pace(names: list[str], velocity: str) -> float | None:
             expected="axes of one kind",
             advice="home them one after the other; nothing was sent",
         )
+    for pace in paces:
+        if not pace > 0:
+            raise RequestError(f"--velocity {velocity}: not above 0", advice="nothing was sent")
+        for name in names:
+            check_velocity(name, machine().axes[name], pace)
     return paces[0] if paces else None

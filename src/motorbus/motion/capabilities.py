@@ -97,12 +97,12 @@ class AxisVerbs:
     """What an axis can do, blocking or async. Positions are in rad (m on a linear axis).
 
     `name` and `spec` are those of the machine file, `able` is what its device can do, `model` what that is. `engaged`
-    is true once it was given torque or moved from here, until it is let go: then its exit policy counts. `under_way` is
-    true from the beginning of a movement until that has come to its end; of what its device was ordered by itself
-    nobody tells that, so it is until a stop was accepted. `reckoning` is there where the device does not tell
-    where it is. `orders` counts what it was told from here, to move, to hold, to stop or to let go: by that whoever leads it sees
-    whether somebody else has told it something since. `track` judges what is told of its position from here (rad of the
-    device); the guard at the gate of its bus judges by what the bus has heard.
+    is true once it was given torque or moved from here, until it is let go: then its exit policy counts. `under_way`
+    is true from the beginning of a movement until that has come to its end; of what its device was ordered by itself
+    nobody tells that, so it is until a stop was accepted. `reckoning` is there where the device does not tell where
+    it is. `orders` counts what it was told from here, to move, to hold, to stop or to let go: by that whoever leads
+    it sees whether somebody else has told it something since. `track` judges what is told of its position from here
+    (rad of the device); the guard at the gate of its bus judges by what the bus has heard.
     """
 
     def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: Able) -> None:

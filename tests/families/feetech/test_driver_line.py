@@ -78,7 +78,7 @@ def test_a_probe_reads_the_id_first_and_stays_inside_the_eeprom(attempt: int) ->
 
 
 def test_stop_is_torque_off_for_everyone_and_then_for_each() -> None:
-    frames, promise = stop([4, 3])
+    frames, promise = stop({4: None, 3: None})
     assert [frame.request for frame in frames] == [
         packet(ALL, WRITE, 40, 0),
         packet(3, WRITE, 40, 0),

@@ -127,7 +127,8 @@ def test_a_move_is_one_packet() -> None:
     assert (exchange.effect, exchange.repeatable, exchange.rank) == (Effect.MOTION, True, Rank.CONTROL)
     where, speed = exchange.goals
     assert where == Goal(3, "position", 2048 * COUNT, 0.0, 4095 * COUNT)
-    assert speed[:3] == (3, "speed", pytest.approx(1000 * COUNT))
+    assert (speed.node, speed.quantity) == (3, "speed")
+    assert speed.value == pytest.approx(1000 * COUNT)
 
 
 def test_a_new_servo_is_asked_for_its_limits_first() -> None:

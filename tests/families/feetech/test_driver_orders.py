@@ -66,9 +66,10 @@ def test_in_step_mode_a_goal_is_a_way_and_not_repeatable() -> None:
 
 def test_in_position_mode_a_velocity_bounds_and_0_is_as_fast_as_it_can() -> None:
     (bound,) = made({}, goal_velocity=100 * COUNT)[0].goals
-    assert bound[:3] == (3, "speed", pytest.approx(100 * COUNT))
+    assert (bound.node, bound.quantity) == (3, "speed")
+    assert bound.value == pytest.approx(100 * COUNT)
     (fastest,) = made({}, goal_velocity=0)[0].goals
-    assert fastest[:3] == (3, "speed", pytest.approx(NO_LOAD * COUNT))
+    assert fastest.value == pytest.approx(NO_LOAD * COUNT)
     (still,) = made({"at_18": 0}, goal_velocity=0)[0].goals
     assert still[:3] == (3, "speed", 0.0)
 

@@ -7,7 +7,8 @@ from math import tau
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.feetech.driver.pace import NO_LOAD, burst, ramp_of, speed_at_least
+from motorbus.families.feetech.driver.orders import NO_LOAD
+from motorbus.families.feetech.driver.pace import burst, ramp_of, speed_at_least
 from motorbus.families.feetech.table import HLS, SCS, STS
 from tests.families.feetech.maps import met
 

@@ -14,7 +14,7 @@ from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError
 from motorbus.families import feetech
 from motorbus.families.feetech.driver import Node, Train, limits, sync_write_positions, train
 from motorbus.families.feetech.driver.identity import learn
-from motorbus.families.feetech.driver.pace import NO_LOAD
+from motorbus.families.feetech.driver.orders import NO_LOAD
 from tests.families.feetech.driver_script import (
     ALL,
     SYNC_WRITE,

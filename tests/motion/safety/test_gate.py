@@ -87,8 +87,9 @@ class Line:
         self.gate = Gate()
         self.now = 0.0
         self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
+        self.told: list[bool] = []
         self.gate.watch(self.seen, lambda: self.now)
-        self.gate.guards[1] = Guard("elbow", bounds, ask=lambda: QUESTION)
+        self.gate.guards[1] = Guard("elbow", bounds, ask=lambda: QUESTION, ordered=self.told.append)
 
     def reads(self, value: float, at: float | None = None) -> None:
         self.now = self.now if at is None else at
@@ -231,6 +232,10 @@ def test_what_has_no_end_of_its_own_needs_somebody_who_attends(quantity: str) ->
     lease.attend("page", 0.0)
     assert line.passes(goal)
     assert line.passes(goal._replace(value=0.0))
+    other = goal._replace(node=2)  # which is no axis that is open: nobody would stop it
+    assert line.reason(other) == "unattended"
+    line.gate.guards[2] = Guard("wrist", Bounds())
+    assert line.reason(other) == "unattended"
 
 
 def test_a_velocity_keeps_its_bound_whether_it_turns_or_only_bounds() -> None:

@@ -146,3 +146,16 @@ def test_what_comes_without_a_speed_leads_no_farther_than_goals_of_one_that_is_l
 def test_who_is_led_as_slowly_and_lags_as_far_as_he_may_is_not_ordered_too_far() -> None:
     assert pytest.approx(LAG + 2 / SLOWEST) == LATE
     assert NEAR == FAR
+
+
+def test_ways_that_are_told_before_the_last_one_has_ended_are_added_up() -> None:
+    guard = Guard("a1", Bounds(0.0, 1.0))
+    assert guard.track is not None
+    guard.track.take(0.5, 0.0)
+    way = Goal(1, "relative", 0.3, -9.0, 9.0)
+    guard.check_goal(way, paced=True)
+    guard.adds(0.3)
+    with pytest.raises(LimitExceeded, match="1.1 rad is outside"):
+        guard.check_goal(way, paced=True)
+    guard.adds(0.0, ends=True)
+    guard.check_goal(way, paced=True)

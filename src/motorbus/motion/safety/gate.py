@@ -19,7 +19,7 @@ from typing import Any, Final
 from motorbus.core.goal import Later, Stays
 from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused
-from motorbus.motion.safety.guard import Guard
+from motorbus.motion.safety.guard import Guard, untold
 from motorbus.motion.safety.lease import Lease
 from motorbus.motion.safety.turning import Turning
 from motorbus.motion.safety.waiting import Handed, Waiting
@@ -198,6 +198,8 @@ class Gate:
         endless = goal.quantity in ENDLESS
         if endless and goal.value:
             self._check_attended(goal, now)
+            if self.attended and (guard is None or guard.ordered is untold):
+                raise _nobody_stops(goal)
         if guard is None:
             return
         if goal.quantity in ("velocity", "speed"):
@@ -258,8 +260,20 @@ def _paced(node: int, goals: Iterable[Goal]) -> bool:
     return "speed" in told and "time" not in told
 
 
+def _nobody_stops(goal: Goal) -> Refused:
+    return Refused(
+        f"node {goal.node}: goal {goal.quantity} has no end of its own, and it is no axis that is open",
+        reason="unattended",
+        cause="only axes that are open are stopped when the machine is left, or its lease is lost",
+        advice="open the machine with it as an axis, or its bus by its address; nothing was sent",
+        node=goal.node,
+    )
+
+
 def _tell(guard: Guard, goal: Goal) -> None:
     """Whoever has set the guard is to know that this was ordered. What only bounds a movement moves nothing."""
+    if goal.quantity == "relative" or goal.stays is not None:
+        guard.adds(0.0 if goal.stays is not None else goal.value, ends=goal.stays is not None)
     if goal.stays is Stays.ON:
         guard.ordered(False)
     elif not _stays(goal) and (goal.quantity in PLACES or (goal.quantity in ENDLESS and goal.value)):

@@ -93,6 +93,7 @@ class Guard:
         self._reckons: Final = reckons
         self.track: Final = Track() if measures else None
         self.answer: Answer | None = None
+        self._due: float | None = None  # where the ways that it was told lead, while no stop has ended them
         self._low: Final = bounds.low - ROUNDED
         self._high: Final = bounds.high + ROUNDED
         self._step: Final = bounds.step + ROUNDED
@@ -124,10 +125,11 @@ class Guard:
         here = self._here()
         relative = goal.quantity == "relative"
         to = goal.value if not relative else None if here is None else here + goal.value
-        if to is not None and not self._allows(to, here):
-            raise self._refused(
-                goal, f"{self.show(to)} is outside {self._range()}", f"stay inside {self._range()}"
-            )
+        for place in (to, None if self._due is None or not relative else self._due + goal.value):
+            if place is not None and not self._allows(place, here):
+                raise self._refused(
+                    goal, f"{self.show(place)} is outside {self._range()}", f"stay inside {self._range()}"
+                )
         if to is None and abs(goal.value) > high - low + ROUNDED:
             raise self._refused(goal, "this way is more than all of its way", "go less far")
         way = abs(goal.value) if relative else 0.0 if here is None else abs(goal.value - here)
@@ -140,6 +142,14 @@ class Guard:
             )
         if way > self._lead and not paced:
             raise self._unpaced(goal, way)
+
+    def adds(self, way: float, *, ends: bool = False) -> None:
+        """It was told to go so much farther (rad), perhaps while an earlier way was not at its end; or that is over."""
+        here = self._here()
+        if ends or (self._due is None and here is None):
+            self._due = None
+        else:
+            self._due = (here if self._due is None else self._due) + way  # type: ignore[operator]  # one of them is there
 
     def _here(self) -> float | None:
         """Where it is, as far as that is known (rad of the device)."""
