@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,12 +28,13 @@ def build(target: Path = BUILD / "responder") -> Path:
     if compiler is None:
         raise NoCompiler("no C compiler found (gcc, cc or clang); on Debian and Ubuntu: apt install gcc")
     target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = target.with_name(f"{target.name}.{os.getpid()}")  # others may be about to run what is there
     done = subprocess.run(
-        [compiler, "-O2", "-Wall", "-Wextra", "-o", str(target), str(SOURCE)], capture_output=True, text=True
+        [compiler, "-O2", "-Wall", "-Wextra", "-o", str(fresh), str(SOURCE)], capture_output=True, text=True
     )
     if done.returncode:
         raise NoCompiler(done.stderr)
-    return target
+    return fresh.replace(target)
 
 
 class Responder:

@@ -126,7 +126,10 @@ class Last(NamedTuple):
 def killed(served: Served, seed: int, orders: int, after: float | None) -> Last:
     """A program that moves everything, killed as this order of it leaves, or so long (s) after its first."""
     words = [sys.executable, "-c", PROGRAM, str(served.file), str(seed), str(orders)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        words, stdout=pipe, stderr=pipe, bufsize=0
+    ) as program:  # no line is read ahead and lost
         assert program.stdout is not None
         first = program.stdout.readline()
         doom = Timer(LONG if after is None else after, program.kill)

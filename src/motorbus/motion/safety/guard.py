@@ -125,7 +125,7 @@ class Guard:
         here = self._here()
         relative = goal.quantity == "relative"
         to = goal.value if not relative else None if here is None else here + goal.value
-        for place in (to, None if self._due is None or not relative else self._due + goal.value):
+        for place in (to, self._from(here) + goal.value if relative and here is not None else None):
             if place is not None and not self._allows(place, here):
                 raise self._refused(
                     goal, f"{self.show(place)} is outside {self._range()}", f"stay inside {self._range()}"
@@ -145,11 +145,12 @@ class Guard:
 
     def adds(self, way: float, *, ends: bool = False) -> None:
         """It was told to go so much farther (rad), perhaps while an earlier way was not at its end; or that is over."""
-        here = self._here()
-        if ends or (self._due is None and here is None):
-            self._due = None
-        else:
-            self._due = (here if self._due is None else self._due) + way  # type: ignore[operator]  # one of them is there
+        here = None if self.track is None else self._here()
+        self._due = None if ends or here is None else self._from(here) + way
+
+    def _from(self, here: float) -> float:
+        """Where a way begins that it is told now, while it is here: at the end of the last one until it is there."""
+        return here if self._due is None or abs(self._due - here) < NEAR else self._due
 
     def _here(self) -> float | None:
         """Where it is, as far as that is known (rad of the device)."""
