@@ -75,7 +75,7 @@ def described(port: str) -> str:
     """The machine file: six servos, each an axis that may turn a whole turn."""
     axes = "".join(
         f'[axis.a{node}]\ndevice = "arm#{node}"\nzero = "180 deg"\nunit = "deg"\n'
-        'max_velocity = "300 deg/s"\nmax_acceleration = "3000 deg/s2"\nexit = "leave"\n'
+        'max_velocity = "600 deg/s"\nmax_acceleration = "3000 deg/s2"\nexit = "leave"\n'
         for node in IDS
     )
     return f'format = 1\n[bus.arm]\naddress = "feetech:{port},baud={BAUD}"\n{axes}'
@@ -119,7 +119,7 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
         gc.freeze()
         used, began = process_time(), perf_counter()
         for state, wanted in zip(loop, goals, strict=False):
-            positions.append((state.position, state.missing))
+            positions.append((state.position, state.missing | state.doubts.keys()))
             for name, way in wanted.items():
                 goal[name] = base[name] + way
             if perf_counter() - began >= seconds:
