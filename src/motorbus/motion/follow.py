@@ -19,8 +19,7 @@ from motorbus.motion.clamping import Policy, check_policy
 from motorbus.motion.loop.faces import Errand, LoopFace
 from motorbus.motion.loop.grid import ROUNDING, Statistics
 from motorbus.motion.loop.readings import LoopState
-
-NOTHING = "nothing was sent"
+from motorbus.motion.profile.shapes import NOTHING
 
 
 @dataclass(frozen=True, slots=True)

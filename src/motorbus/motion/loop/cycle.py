@@ -21,22 +21,19 @@ from motorbus.errors import (
     MotionError,
     MotorbusError,
     NoReply,
-    OutcomeUnknown,
     Overloaded,
-    WireError,
 )
 from motorbus.motion import capabilities as single
 from motorbus.motion.capabilities import AxisVerbs, cap
 from motorbus.motion.command import Command
 from motorbus.motion.loop.place import Place
+from motorbus.motion.moving.forgiving import LOST
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.track import FASTEST, MARGIN, TREMBLING
 
 if TYPE_CHECKING:
     from motorbus.motion.safety.watch import Watch
 
-LOST: Final = (NoReply, WireError, OutcomeUnknown)
-"""Ways in which a reading, or the acknowledgement of a goal, is lost and a loop goes on."""
 HALF: Final = 0.5
 """Of a period; after a hitch two readings may be closer together than that, and it is no matter."""
 SPIN: Final = 0.0002

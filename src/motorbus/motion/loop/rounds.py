@@ -34,7 +34,7 @@ from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState, state_of
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named
 
-LOST: Final = (Interrupted, Faulted, Overloaded)
+RELEASES: Final = (Interrupted, Faulted, Overloaded)
 """Errors after which it is seen who is not to be led any more."""
 
 
@@ -334,7 +334,7 @@ class Rounds:
                 part = self.parts[bus]
                 for place in part.places.values():
                     place.rest()
-                lost = part.release_lost() if isinstance(error, LOST) else []
+                lost = part.release_lost() if isinstance(error, RELEASES) else []
                 if lost and isinstance(error, Interrupted):
                     found[bus] = stopped(lost)
                     found[bus].__cause__ = error

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Quality
 from motorbus.core.operation import Operation, Pause, Runnable, outcome
-from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError
+from motorbus.errors import MotorbusError
 from motorbus.motion.capabilities import stop
+from motorbus.motion.moving.forgiving import LOST
 from motorbus.motion.safety.track import Sample, Track
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ PAUSE: Final = 0.02
 """s between two looks."""
 PATIENCE: Final = 1.0
 """s for which it is looked at, when nobody says how long."""
-LOST: Final = (NoReply, WireError, OutcomeUnknown)
-"""Ways in which a look fails, and another may not."""
 
 
 class Rest(Enum):
