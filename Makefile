@@ -14,7 +14,7 @@ help:
 	@echo "make demo    nine simulated axes of three families are found and moved together; picture in build/demo.png"
 	@echo "make test    every test but the long ones"
 	@echo "make check   lint, types, import contracts, strict docs, a few tests on every other Python found"
-	@echo "make soak    the long runs, with their figures"
+	@echo "make soak    the long runs; their figures go into docs/reliability.md"
 	@echo "make bench   side by side with other libraries"
 	@echo "make docs    the documentation, into build/site"
 	@echo "make lock    resolve the dependencies anew (needs the network)"
@@ -31,7 +31,9 @@ test: $(READY) $(PEERS)
 	$(BIN)/python -m pytest -n auto --dist loadgroup $(ARGS)
 
 soak: $(READY) $(PEERS)
-	$(BIN)/python -m pytest --soak -s --durations=0 $(ARGS)
+	@rm -f build/soak.jsonl
+	@failed=0; $(BIN)/python -m pytest --soak -s --durations=0 $(ARGS) || failed=1; \
+	$(BIN)/python -m scripts.reliability --take && exit $$failed
 
 bench: $(READY) $(PEERS)
 	$(BIN)/python -m bench $(ARGS)
@@ -41,6 +43,7 @@ docs: $(READY)
 	$(BIN)/python -m scripts.feetech_registers
 	$(BIN)/python -m scripts.feetech_peers
 	$(BIN)/python -m scripts.machine_file
+	$(BIN)/python -m scripts.reliability
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters

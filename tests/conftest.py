@@ -10,9 +10,12 @@ import gc
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 import pytest
 from hypothesis import settings
+
+from scripts import soaked
 
 HERE = Path(__file__).parent
 USUAL_ROUNDS = 10_000
@@ -81,3 +84,27 @@ def rounds(pytestconfig: pytest.Config) -> Callable[[int], int]:
     """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`."""
     most = {"soak": None, "test": USUAL_ROUNDS, "quick": QUICK_ROUNDS}[_profile(pytestconfig)]
     return lambda full: full if most is None else min(full, most)
+
+
+class Figures(Protocol):
+    """Tells the figures of a run: what it was, then numbers and short words by name."""
+
+    def __call__(
+        self, what: str, *, family: str = "", promise: int = 0, **figures: int | float | str
+    ) -> None: ...
+
+
+@pytest.fixture
+def figures(request: pytest.FixtureRequest) -> Figures:
+    """`figures("L7 late replies", family="kst", promise=3, exchanges=n, wrong=0)`: printed, and kept by `make soak`.
+
+    `promise` is the number of the promise of docs/reliability.md that the run proves.
+    """
+
+    def tell(what: str, *, family: str = "", promise: int = 0, **figures: int | float | str) -> None:
+        shown = ", ".join(f"{name} {value}" for name, value in figures.items())
+        print(f"\n{what}{f' ({family})' if family else ''}: {shown}")
+        if _profile(request.config) == "soak":
+            soaked.record(what, family=family, promise=promise, test=request.node.nodeid, **figures)
+
+    return tell

@@ -104,7 +104,7 @@ def test_what_can_only_be_read_refuses_to_be_written(writer: Family) -> None:
             refused(there, row.name, row.to_value(row.high))
 
 
-def test_what_is_protected_refuses_to_be_written_by_name(writer: Family) -> None:
+def test_d8_what_is_protected_refuses_to_be_written_by_name(writer: Family) -> None:
     with world(writer) as there:
         for row in there.table(NODE).values():
             if row.protected and row.writable:

@@ -26,9 +26,11 @@ class Rig:
     line: Line = field(default_factory=PerfectLine)
     options: dict[str, Any] = field(default_factory=dict)
     count: int = 0
+    model: str = "sts3215"
+    switches: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.simulator = FAMILY.simulator(IDS)
+        self.simulator = FAMILY.simulator(IDS, self.model, servo_baud=1_000_000, **self.switches)
         assert isinstance(self.simulator, FeetechBus)
         self.servos = self.simulator.nodes
         self.link = MemoryLink(self.simulator, line=self.line, **self.options)
@@ -42,10 +44,14 @@ class Rig:
     def stir(self) -> int:
         """Give every servo a position it has not had lately; returns it."""
         self.count += 1
-        raw = 17 + self.count * 7919 % 4000
+        raw = 17 + self.count * 7919 % (self.servos[1].model.turn - 96)
         for servo in self.servos.values():
             servo.raw_position = raw
         return raw
+
+    def code(self, raw: int) -> bytes:
+        """A word in the byte order of these servos."""
+        return raw.to_bytes(2, "big" if self.model.startswith("scs") else "little")
 
 
 class Bytewise:

@@ -205,7 +205,7 @@ WHOLE = [
 
 
 @pytest.mark.parametrize("step", range(3, len(WHOLE)))
-def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
+def test_d6_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
     done = step >= WHOLE.index(LOCK)
     played = Played([*WHOLE[:step], *GIVEN_UP[done:]], interrupt_at=step)
     with pytest.raises(KeyboardInterrupt):

@@ -107,7 +107,7 @@ def test_a_lock_that_stays_open_for_good_is_an_error() -> None:
 
 
 @pytest.mark.parametrize("step", range(len(WHOLE)))
-def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
+def test_d6_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
     played = Played([*WHOLE[:step], *given_up(step)], interrupt_at=step)
     with pytest.raises(KeyboardInterrupt):
         played.run(write(prepared(), position_p=33, led_mask=5))
@@ -117,7 +117,7 @@ def test_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
 
 @pytest.mark.parametrize("step", range(len(WHOLE)))
 @pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
-def test_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
+def test_d6_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
     played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in failing(step)), *given_up(step)])
     if step <= WHOLE.index(STILL_OPEN):
         with pytest.raises(type(failure)):

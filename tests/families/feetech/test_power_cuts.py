@@ -16,6 +16,7 @@ import pytest
 
 from motorbus.core.operation import INTENT
 from motorbus.errors import NoReply, RequestError
+from tests.conftest import Figures
 from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, World, cuts
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
@@ -67,7 +68,7 @@ def ended(world: World) -> list[str]:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("model", MODELS)
-def test_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds) -> None:
+def test_d10_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds, figures: Figures) -> None:
     counted = 0
     kinds = list(product(TORN, SETTINGS))
     for shift, (torn, settings) in enumerate(kinds):
@@ -78,8 +79,7 @@ def test_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds) -> Non
             world.run(world.change, cut)
             assert ended(world) == [], f"{options} {cut}"
             counted += 1
-    if is_thorough(rounds):
-        print(f"\n{verb} of {model}: {counted} cuts, each ended old or new, reachable and locked")
+    figures(f"D10 {verb} of {model}, cut once", family="feetech", promise=4, cuts=counted, lost=0)
 
 
 def wrecks(verb: str, options: dict[str, Any]) -> list[Cut]:
@@ -96,7 +96,7 @@ def wrecks(verb: str, options: dict[str, Any]) -> list[Cut]:
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("model", MODELS)
-def test_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds) -> None:
+def test_d10_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds, figures: Figures) -> None:
     """From every state that a first cut can leave, each cut of the recovery, and a recovery after that."""
     counted, states = 0, 0
     more = {"torn": "erased", **SETTINGS[1 + MODELS.index(model) % (len(SETTINGS) - 1)]}
@@ -118,11 +118,8 @@ def test_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds) ->
                 assert ended(world) == [], f"{kind} {first} {second}"
                 counted += 1
     assert states > 3
-    if is_thorough(rounds):
-        print(
-            f"\n{verb} of {model}: {states} states after a cut, {counted} cuts of their recovery, "
-            "each ended old or new, reachable and locked"
-        )
+    what = f"D10 {verb} of {model}, cut, and its recovery cut"
+    figures(what, family="feetech", promise=4, states=states, cuts=counted, lost=0)
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -305,7 +305,7 @@ def test_torque_on_and_an_open_lock_are_refused_by_name_and_the_other_value_is_t
         assert servo.read(name) == {name: taken}
 
 
-def test_what_is_read_only_or_protected_is_refused_and_nothing_is_sent(there: Bench) -> None:
+def test_d8_what_is_read_only_or_protected_is_refused_and_nothing_is_sent(there: Bench) -> None:
     servo = there.servo()
     servo.prepare()
     refused = [row for row in table_of(there).values() if row.protected or not row.writable]

@@ -21,7 +21,7 @@ JUDGES: tuple[Callable[[Family], None], ...] = (
     test_registers.test_every_kept_row_takes_values_up_to_both_ends_and_outlives_a_power_cut,
     test_registers.test_writing_one_node_changes_no_other,
     test_registers.test_what_can_only_be_read_refuses_to_be_written,
-    test_registers.test_what_is_protected_refuses_to_be_written_by_name,
+    test_registers.test_d8_what_is_protected_refuses_to_be_written_by_name,
     test_registers.test_what_is_out_of_range_refuses_to_be_written,
     test_quiet.test_looking_has_no_effect,
     test_quiet.test_ping_says_who_is_there,

@@ -17,7 +17,7 @@ TOLD = "4b0a30000cfe0000"
 OTHER = "4b0a300018fc0000"
 
 
-def test_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
+def test_d11_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
     for back in (None, "6010100100000000", ["6010100100000000"] * 2):
         play(driver.save(node()), (SAVE, back))
     with pytest.raises(DeviceError, match="hardware error"):

@@ -102,7 +102,7 @@ class Timed(MemoryLink):
 
 @pytest.mark.parametrize("wanted", WAYS, ids=str)
 @pytest.mark.parametrize("pending", ["pending", "active"])
-def test_power_that_goes_during_the_save_is_told_and_never_called_saved(
+def test_d11_power_that_goes_during_the_save_is_told_and_never_called_saved(
     wanted: dict[str, int], pending: str
 ) -> None:
     with bench(flash_time=2.0, pending_id=pending, link=Timed) as there:

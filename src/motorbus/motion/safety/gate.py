@@ -95,6 +95,8 @@ class Gate:
             return []
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
+        if not everyone and self._are_fine(goals, now):
+            return []
         for goal in self._of_everyone(goals) if everyone else goals:
             guard = self.guards.get(goal.node)
             if guard is None or guard.track is None or guard.ask is None or not _goes(goal):
@@ -121,6 +123,14 @@ class Gate:
 
     def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
         """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
+        if obeyed and goals and not self.faults and exchange.lane != EVERY_LANE:
+            if self._are_fine(goals, self._now()):
+                if self.lease is not None:
+                    self._check_standing(exchange, goals)
+                if self._tells:
+                    for goal in goals:
+                        self.guards[goal.node].ordered(True)
+                return
         if exchange.effect is Effect.MOTION and not goals:
             raise LimitExceeded(
                 "this write moves a motor and does not say where to",
@@ -153,6 +163,23 @@ class Gate:
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
                 if goal.node in self.guards:
                     _tell(self.guards[goal.node], goal)
+
+    def _are_fine(self, goals: tuple[Goal, ...], now: float) -> bool:
+        """Whether each of these leads to a place that is surely allowed, in one pass: the quick way of most orders.
+
+        What it does not find so is looked at more closely, by who asks.
+        """
+        guards, seen = self.guards, self._seen
+        for node, quantity, value, low, high, stays in goals:
+            guard = guards.get(node)
+            if guard is None or quantity != "position" or stays is not None or low is None or high is None:
+                return False
+            heard = seen.get(node)
+            if heard is not None and heard[1] is not guard.answer:
+                self._look(node, guard)
+            if not (-inf < low <= value <= high < inf and guard.is_fine(value, now)):
+                return False
+        return True
 
     def _leaves(self, guard: Guard, goal: Goal) -> None:
         """It is told to move: whoever reckons where it is must know, and whether this goes on without an end."""

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import Answer, Goal, Runnable
 from motorbus.errors import LimitExceeded, Refused
-from motorbus.motion.safety.track import Track
+from motorbus.motion.safety.track import FRESH, Track
 
 ROUNDED: Final = 0.003
 """rad by which a goal may be beyond: it was rounded to a count, and half of the coarsest one is 0.0026."""
@@ -103,10 +103,15 @@ class Guard:
     def is_fine(self, to: float, now: float) -> bool:
         """Whether this place is surely allowed: the quick way of most goals; what is not is looked at more closely."""
         track = self.track
-        if track is None or track.why_not(now):
+        if track is None or track.suspect is not None:
             return False
         sample = track.sample
-        return sample is not None and self._low <= to <= self._high and abs(to - sample.value) <= self._near
+        return (
+            sample is not None
+            and now - sample.at <= FRESH
+            and self._low <= to <= self._high
+            and abs(to - sample.value) <= self._near
+        )
 
     def check_known(self, node: int, now: float) -> None:
         """Raise Refused unless it is known where the device is, by a reading that is fresh and can be believed."""

@@ -46,24 +46,18 @@ class Sample(NamedTuple):
 
 
 class Track:
-    """What one device has told of its position, judged reading by reading. `speed` (rad/s) is the most it can do."""
+    """What one device has told of its position, judged reading by reading. `speed` (rad/s) is the most it can do.
 
-    __slots__ = ("_doubt", "_sample", "speed")
+    `sample` is the last reading that can be believed, None when there is none; `suspect` the last reading, when it is
+    one that cannot be believed yet.
+    """
+
+    __slots__ = ("sample", "speed", "suspect")
 
     def __init__(self, speed: float = FASTEST) -> None:
         self.speed: Final = speed
-        self._sample: Sample | None = None
-        self._doubt: Sample | None = None
-
-    @property
-    def sample(self) -> Sample | None:
-        """The last reading that can be believed; None when there is none."""
-        return self._sample
-
-    @property
-    def suspect(self) -> Sample | None:
-        """The last reading, when it is one that cannot be believed yet."""
-        return self._doubt
+        self.sample: Sample | None = None
+        self.suspect: Sample | None = None
 
     def take(self, value: float, at: float) -> Sample:
         """Judge a reading (rad, s); each reading once.
@@ -72,7 +66,9 @@ class Track:
         where it cannot and agrees with a suspect one before it. One that is older than the last is REPEATED, and
         changes nothing.
         """
-        before = self._sample
+        before = self.sample
+        if before is not None and at >= before.at and abs(value - before.value) <= TREMBLING:
+            return self._believed(value, at, Quality.FRESH)  # the usual case: possible whatever its age
         if not isfinite(value):
             return self._doubted(value, at)
         if before is None:
@@ -81,27 +77,27 @@ class Track:
             return before._replace(quality=Quality.REPEATED)
         if self._possible(before, value, at):
             return self._believed(value, at, Quality.FRESH)
-        doubt = self._doubt
+        doubt = self.suspect
         if doubt is not None and at >= doubt.at and self._possible(doubt, value, at):
             return self._believed(value, at, Quality.CONFIRMED)
         return self._doubted(value, at)
 
     def latest(self, now: float) -> Sample | None:
         """What is known of it at this moment: the last reading that can be believed, REPEATED once it is older."""
-        sample = self._sample
+        sample = self.sample
         return sample if sample is None or now <= sample.at else sample._replace(quality=Quality.REPEATED)
 
     def why_not(self, now: float) -> str:
         """ "" when the position is fresh and can be believed, else the reason: `unseen`, `suspect` or `stale`."""
-        if self._doubt is not None:
+        if self.suspect is not None:
             return "suspect"
-        if self._sample is None:
+        if self.sample is None:
             return "unseen"
-        return "" if now - self._sample.at <= FRESH else "stale"
+        return "" if now - self.sample.at <= FRESH else "stale"
 
     def forget(self) -> None:
         """It may be anywhere: it lost its supply, or was given another zero."""
-        self._sample = self._doubt = None
+        self.sample = self.suspect = None
 
     def _possible(self, since: Sample, value: float, at: float) -> bool:
         way, age = abs(value - since.value), at - since.at
@@ -110,14 +106,14 @@ class Track:
         return way <= self.speed * min(age, REACH) * MARGIN + TREMBLING
 
     def _believed(self, value: float, at: float, quality: Quality) -> Sample:
-        self._doubt = None
-        self._sample = Sample(value, at, quality)
-        return self._sample
+        self.suspect = None
+        self.sample = Sample(value, at, quality)
+        return self.sample
 
     def _doubted(self, value: float, at: float) -> Sample:
         sample = Sample(value, at, Quality.SUSPECT)
-        if isfinite(value) or self._doubt is None:
-            self._doubt = sample
+        if isfinite(value) or self.suspect is None:
+            self.suspect = sample
         return sample
 
 

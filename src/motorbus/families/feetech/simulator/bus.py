@@ -8,10 +8,10 @@ answer at once pull the wire low together.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from motorbus.core.chance import Chance
 from motorbus.core.operation import CanFrame, Data
@@ -23,6 +23,7 @@ from motorbus.families.feetech.simulator.instructions import MOST, OBEY, Answer
 from motorbus.families.feetech.simulator.memory import Layout
 from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.servo import Servo
+from motorbus.families.feetech.simulator.sight import Seen, Sight, shown
 from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.wire import (
     BROADCAST,
@@ -81,6 +82,7 @@ class FeetechBus:
         self._by_id: dict[int, list[Servo]] | None = None
         self._by_second: dict[int, list[Servo]] = {}
         self._chance = Chance(self.switches.seed)
+        self._sight = Sight()
         numbers = list(ids)
         kinds = [model] * len(numbers) if isinstance(model, Model) else list(model)
         distinct = {id(kind): kind for kind in kinds}
@@ -140,6 +142,16 @@ class FeetechBus:
         for packet in self._splitter.feed(data):
             if isinstance(packet, InstructionPacket):
                 self._hear(packet, at)
+
+    obeys_at_once = True
+
+    def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
+        """What each servo holds at this moment, those with one id included."""
+        return self._sight.all(self.servos, at)
+
+    def shown(self, picture: tuple[Hashable, ...], name: str) -> int:
+        """What a picture of a servo has in this row."""
+        return shown(cast("Seen", picture), name)
 
     def _pass(self, to: float) -> None:
         """Let time pass, and everything happen that servos do by themselves meanwhile."""

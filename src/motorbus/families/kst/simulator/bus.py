@@ -8,7 +8,7 @@ simplified: each broken frame counts as one error, and after 16 a servo turns er
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from heapq import heappop, heappush
 from itertools import count
 from typing import Final, NamedTuple
@@ -17,6 +17,7 @@ from motorbus.core.can_bits import precedence
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
+from motorbus.families.kst.simulator import sight as seen
 from motorbus.families.kst.simulator.servo import Servo
 from motorbus.families.kst.simulator.switches import Switches
 from motorbus.families.kst.table import Profile
@@ -119,6 +120,16 @@ class KstBus:
             if report is not None and (due is None or report < due):
                 due = report
         return due
+
+    obeys_at_once = False
+
+    def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
+        """What each servo holds at this moment."""
+        return seen.sight(self.servos, at)
+
+    def shown(self, picture: tuple[Hashable, ...], name: str) -> int:
+        """What a picture of a servo has in this row."""
+        return seen.shown(picture, name)
 
     def _wake(self, at: float) -> None:
         """What reports from power-up on does so from the first moment it is told, for a clock may begin anywhere.

@@ -7,7 +7,7 @@ Whoever advances the bus walks through all three in order, however long that tak
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import partial
 from heapq import heapify, heappop, heappush
 from itertools import count
@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
+from motorbus.families.stepper.simulator import sight as seen
 from motorbus.families.stepper.simulator.controller import Controller, Said
 from motorbus.families.stepper.simulator.ear import Ear
 from motorbus.families.stepper.simulator.harm import Harm
@@ -108,6 +109,17 @@ class StepperBus:
         """When something happens next by itself, or None; before its first moment nobody knows when that will be."""
         moment = inf if self._began is None else self._next()
         return None if moment == inf else moment
+
+    obeys_at_once = False
+
+    def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
+        """What the controller holds, after all that has happened by this moment."""
+        self._run_until(at)
+        return [(node, seen.sight(controller)) for node, controller in self._nodes.items()]
+
+    def shown(self, picture: tuple[Hashable, ...], name: str) -> int | bytes:
+        """What a picture of it has under this name, see `sight`."""
+        return seen.shown(picture, name)
 
     def press(self, port: int, active: bool, at: float) -> None:
         """Let an input change at a moment to come; until the bus has been used, counted from when it will be.

@@ -8,6 +8,7 @@ the supply.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import replace
 from typing import Any, Final, cast
 
@@ -51,6 +52,12 @@ class Memory:
         self.flags = dict(self._stored_flags)
         self.selected = switches.selected_at_boot
         self.working = self.stored[self.selected]
+
+    def copy(self) -> Memory:
+        """One that goes its own way from now on."""
+        twin = copy(self)
+        twin.stored, twin.flags, twin._stored_flags = dict(self.stored), dict(self.flags), dict(self._stored_flags)
+        return twin
 
     @property
     def _flags_are_shared(self) -> bool:

@@ -1,0 +1,135 @@
+"""Makes docs/reliability.md: what is promised, the figures of the last long runs, and the tests of each kind of fault.
+
+`make soak` measures and calls this with `--take`, which takes over what its runs have told. `--check` sees that the
+page is the one that its figures and the tests there are would make.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from textwrap import fill
+from typing import Any, Final
+
+from scripts import soaked
+from scripts.fault_rows import ROWS
+from scripts.pages import kept, listed
+
+PAGE: Final = soaked.ROOT / "docs" / "reliability.md"
+TESTS: Final = soaked.ROOT / "tests"
+NAMED: Final = re.compile(r"^(?:async )?def (test_([ld]\d+)_\w+)", re.M)
+FIRST: Final = ("seed", "exchanges", "faults", "wrong")
+"""Figures that come first in a table; the others follow in the order in which a run has told them."""
+
+HEAD: Final = """# Reliability
+
+What the bus survives, measured against the simulators, with faults on the line and in the devices. No hardware was
+attached. This page is made by `python -m scripts.reliability` from the figures of the last long runs and from the names
+of the tests. To measure all of it again:
+
+```sh
+make soak
+```
+
+It takes hours; a part of it, as `make soak ARGS=tests/faults/test_lines.py`, renews the figures of that part alone.
+`make test` runs the same tests with fewer rounds, in virtual time. A commit with a plus had files that differed.
+
+**Wrong** is judged by what the simulated devices really held, which they keep a history of. A value is right if the
+device held it at some moment between the call and its return. A write that succeeds is right if the device has carried
+it out within the call. A call that fails is right if what it says is so: *not sent*, *rejected by the device*, or
+*outcome unknown*; a reading that fails gives no value. Every run asserts that its faults have happened.
+
+What no program on the host can tell apart is no fault that a promise covers; it is measured too, and written down as a
+[known limit](explanation/taint.md).
+"""
+
+PROMISES: Final = {
+    1: "Any single byte-level fault in a reply gives no wrong value: all kinds of exchange of all families, and every"
+    " fault there is.",
+    2: "A million reads of two bytes of a FEETECH servo with 1 % of all bytes changed: at most 8 wrong where a reading"
+    " is not confirmed (a sum of 8 bits lets 2.2 pass on average), none where it is. No false acknowledgement of a"
+    " stepper controller. No call hangs, the second exchange after the last fault is right, and what met no fault is"
+    " right at its first try.",
+    3: "A million exchanges of each family with 1 % of the replies late: no stale value. What programs of others make"
+    " of the same fault stands beside it.",
+    4: "Power or program cut at every byte and every step of a change of id or rate, of provisioning and of writing a"
+    " project, and again during the recovery: old or new, reachable, locked, at most one device with an id.",
+    5: "A day of jogging, monitoring and reconnecting writes nothing to an EEPROM.",
+    6: "Ten minutes of garbage as fast as the line carries it, of five kinds: nothing hangs, no buffer has more than"
+    " 4 KiB, and the processor's time is bounded.",
+    7: "No test of a fault can pass while its fault is switched off.",
+}
+
+
+def page(runs: Iterable[dict[str, Any]]) -> str:
+    """The whole page."""
+    told = list(runs)
+    return "\n".join([HEAD, *_promises(told), *_others(told), *_rows()]).rstrip() + "\n"
+
+
+def _promises(runs: list[dict[str, Any]]) -> Iterator[str]:
+    for number, says in PROMISES.items():
+        yield f"## Promise {number}\n\n{fill(says, 118)}\n"
+        yield from _table(run for run in runs if run["promise"] == number)
+
+
+def _others(runs: list[dict[str, Any]]) -> Iterator[str]:
+    yield "## Other long runs\n"
+    yield from _table(run for run in runs if run["promise"] not in PROMISES)
+
+
+def _table(runs: Iterable[dict[str, Any]]) -> Iterator[str]:
+    rows = [[run["what"], run["family"], _figures(run["figures"]), _run(run)] for run in runs]
+    if rows:
+        yield from listed(("what", "family", "figures", "run"), rows)
+    else:
+        yield "Not measured yet.\n"
+
+
+def _figures(figures: dict[str, Any]) -> str:
+    names = [name for name in FIRST if name in figures] + [name for name in figures if name not in FIRST]
+    return ", ".join(f"{name.replace('_', ' ')} {_shown(figures[name])}" for name in names)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}".replace(",", " ") if value >= 10_000 else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _run(run: dict[str, Any]) -> str:
+    where = run["test"].removeprefix("tests/").replace("|", "/")
+    return f"`{where}` {run['date']} {run['commit']}".strip()
+
+
+def _rows() -> Iterator[str]:
+    """Each kind of fault with its tests."""
+    yield "## Kinds of faults, and their tests\n"
+    yield "L is what a line and its ends do, D what devices and buses do. Each has tests that bear its name.\n"
+    found = tests_of_rows()
+    rows = [
+        [name, says, "<br>".join(f"`{test}`" for test in found.get(name, []))] for name, says in ROWS.items()
+    ]
+    yield from listed(("", "fault, and what is promised", "tests"), rows)
+
+
+def tests_of_rows() -> dict[str, list[str]]:
+    """The tests of each row, by the names of their functions."""
+    found: dict[str, list[str]] = {}
+    for file in sorted(TESTS.rglob("test_*.py")):
+        for name, row in NAMED.findall(file.read_text("utf-8")):
+            found.setdefault(row.upper(), []).append(f"{file.relative_to(TESTS)}::{name}")
+    return found
+
+
+def main() -> int:
+    """Write the page, with --take from new figures as well; or with --check see that the one there is current."""
+    runs = soaked.merged(soaked.kept(), soaked.fresh() if "--take" in sys.argv[1:] else [])
+    wanted: dict[Path, str] = {PAGE: page(runs)}
+    return kept({soaked.KEPT: soaked.text(runs), **wanted})
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""Cuts a call at its nth executed line of the product's own code, and says what state it left the bus in.
+
+A line counts where it belongs to the bus, a link, a family's driver, the gate or the core: everything between the
+caller and the wire. What is at work inside the simulated wire does not, for there the world is, and not the program.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+import motorbus
+from motorbus.errors import MotorbusError
+from tests.faults.scenes import Scene
+
+PACKAGE = Path(motorbus.__file__).parent
+FLOORS = ("bus", "core", "families", "link", "motion")
+WORLD = str(PACKAGE / "link" / "memory.py")
+NEVER = 1 << 60
+UNSENT = "nothing was sent"
+
+_ours: dict[str, bool] = {}
+
+
+def ours(file: str) -> bool:
+    """Whether this file is the product's, between the caller and the wire."""
+    found = _ours.get(file)
+    if found is None:
+        path = Path(file)
+        found = path.is_relative_to(PACKAGE) and path.relative_to(PACKAGE).parts[0] in FLOORS
+        _ours[file] = found
+    return found
+
+
+class Scissors:
+    """Raises this before the nth executed line; `where` is that line, None when there were fewer."""
+
+    def __init__(self, at: int, error: type[BaseException]) -> None:
+        self.at = at
+        self.error = error
+        self.count = 0
+        self.where: str | None = None
+        self._outside: FrameType | None = None
+
+    def __call__(self, frame: FrameType, event: str, argument: object) -> Any:
+        file = frame.f_code.co_filename
+        if self._outside is not None or not ours(file):
+            return None
+        if file == WORLD:
+            self._outside = frame
+            frame.f_trace_lines = False
+            return self._world
+        return self._line
+
+    def _world(self, frame: FrameType, event: str, argument: object) -> Any:
+        if event == "return" and frame is self._outside:
+            self._outside = None
+        return self._world
+
+    def _line(self, frame: FrameType, event: str, argument: object) -> Any:
+        if event == "line":
+            self.count += 1
+            if self.count == self.at:
+                name = Path(frame.f_code.co_filename).relative_to(PACKAGE)
+                self.where = f"{name}:{frame.f_lineno} in {frame.f_code.co_name}"
+                raise self.error
+        return self._line
+
+
+class Outcome(NamedTuple):
+    """What came of a call that was cut: its value, or what it raised; where it was cut, and in how many lines."""
+
+    value: Any
+    error: BaseException | None
+    where: str | None
+    lines: int
+
+
+def cut(act: Callable[[], Any], at: int = NEVER, error: type[BaseException] = KeyboardInterrupt) -> Outcome:
+    """Do it, cut at this line."""
+    scissors, before = Scissors(at, error), sys.gettrace()
+    value, raised = None, None
+    gc.disable()  # what an earlier call has left behind is no line of this one
+    sys.settrace(scissors)
+    try:
+        value = act()
+    except BaseException as caught:
+        raised = caught
+    finally:
+        sys.settrace(before)
+        gc.enable()
+    return Outcome(value, raised, scissors.where, scissors.count)
+
+
+def free(lock: Any) -> bool:
+    """Whether another thread can have this lock."""
+    if lock._is_owned():
+        return False
+    got: list[bool] = []
+    thread = threading.Thread(target=lambda: got.append(lock.acquire(timeout=5) and not lock.release()))
+    thread.start()
+    thread.join()
+    return got == [True]
+
+
+def told(error: BaseException | None) -> str:
+    """Everything an error says."""
+    return "\n".join([str(error), *getattr(error, "__notes__", ())])
+
+
+def left_behind(there: Scene) -> list[str]:
+    """What of a call that is over is still on the bus."""
+    turns = there.bus.turns
+    found = {
+        "the lock": turns.lock._is_owned(),
+        "a holder": turns._holder is not None,
+        "a claim": bool(turns._claims),
+        "something queued": turns.waiting,
+        "a timer": bool(turns._timers),
+        "a stop under way": turns.stopping,
+        "somebody who pumps": getattr(getattr(there.bus, "relay", None), "pumper", None) is not None,
+    }
+    return [what for what, is_there in found.items() if is_there]
+
+
+def reads_right(there: Scene, read: Callable[[], Any]) -> tuple[bool, list[str]]:
+    """One read: whether it succeeded, and what was wrong with it."""
+    there.stir()
+    try:
+        value = read()
+    except MotorbusError:
+        return False, []
+    return True, [] if there.true(value) else [f"a wrong value: {value!r}"]
+
+
+def afterwards(there: Scene, run: Callable[[Any], Any]) -> list[str]:
+    """What is wrong with the bus: it must be right at the second read at the latest, and a stop must go out."""
+    wrong = left_behind(there)
+    if "a stop under way" in wrong or "the lock" in wrong:
+        return wrong
+    _, faults = reads_right(there, lambda: run(there.asked()))
+    good, more = reads_right(there, lambda: run(there.asked()))
+    wrong += faults + more + ([] if good else ["the second read failed"])
+    before = len(there.wire.sent)
+    outcome = there.bus.estop()
+    if there.ids[0] not in outcome.acknowledged or len(there.wire.sent) == before:
+        wrong.append(f"the stop did not go out: {outcome}")
+    there.bus.reset()
+    return wrong + left_behind(there)

@@ -1,0 +1,185 @@
+"""Every exchange that the driver has with a FEETECH servo, of both byte orders; each judges what it is told.
+
+What is written is another value each time. Success must mean that the servo holds it; after a failure it holds the old
+value or the new one, and never a third. What does not name a servo leaves it as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from motorbus.core.operation import Answer, Due, Exchange, Timeout
+from motorbus.errors import MotorbusError
+from motorbus.families.feetech import Servo, wire
+from motorbus.families.feetech.driver.exchanges import (
+    Block,
+    acknowledged,
+    read_block,
+    unanswered,
+    write_block,
+)
+from tests.faults.rig import FEEDBACK, Rig, ping
+
+GOAL_TIME = 44  # on HLS the goal torque; a word of RAM that moves nothing while a servo is limp
+GROUP = (1, 2, 3)
+
+
+class Kind(NamedTuple):
+    """An exchange: how it is carried out and judged, how many bytes it has there and back, and what is done before."""
+
+    act: Callable[[Rig], None]
+    there: int
+    back: int
+    before: Callable[[Rig], None] = lambda rig: None
+    sure: bool = True  # it may be said again, so it gets over any single fault
+
+
+def reading(count: int) -> Kind:
+    """READ from the position on; the bytes behind it do not change."""
+
+    def act(rig: Rig) -> None:
+        raw = rig.stir()
+        memory = rig.servos[1].memory
+        block = read_block(Servo(rig.bus, 1), 56, count, bytes)
+        plain: Exchange[Answer] = Exchange(block.request, block.replies, repeatable=True)
+        told = rig.bus.run(plain).replies[0].data
+        assert told[4] == 0, "an alarm that nobody has"
+        assert told[5:-1] == (rig.code(raw) + memory.read(58, FEEDBACK)[: max(0, count - 2)])[:count]
+
+    return Kind(act, 8, 6 + count)
+
+
+def _written(rig: Rig, exchange: Exchange[Any], held: Callable[[], object], new: object) -> None:
+    others = {id: bytes(servo.memory.live) for id, servo in rig.servos.items() if id not in GROUP}
+    old = held()
+    try:
+        rig.bus.run(exchange)
+    except MotorbusError:
+        assert held() in (old, new), "it was made to hold what nobody has sent"
+        raise
+    finally:
+        assert others == {id: bytes(rig.servos[id].memory.live) for id in others}, "somebody else has obeyed"
+    assert held() == new, "a false success"
+
+
+def _word(rig: Rig) -> bytes:
+    rig.count += 1
+    return rig.code(rig.count * 7919 % 1000)
+
+
+def writing(count: int) -> Kind:
+    """WRITE of one byte, or of a word."""
+
+    def act(rig: Rig) -> None:
+        data, memory = _word(rig)[-count:], rig.servos[1].memory
+        exchange = write_block(Servo(rig.bus, 1), Block(GOAL_TIME, data))
+        _written(rig, exchange, lambda: memory.read(GOAL_TIME, count), data)
+
+    return Kind(act, 7 + count, 6)
+
+
+def reg_write(rig: Rig) -> None:
+    """Success means that it waits in the servo."""
+    data, servo = _word(rig), rig.servos[1]
+    block = Block(GOAL_TIME, data, repeatable=False)
+    exchange = acknowledged(Servo(rig.bus, 1), wire.reg_write(1, GOAL_TIME, data), block)
+    _written(rig, exchange, lambda: servo.pending, (GOAL_TIME, data))
+
+
+def action(rig: Rig) -> None:
+    """Success means that what waited is done."""
+    servo = rig.servos[1]
+    assert servo.pending is not None
+    data = servo.pending[1]
+    exchange = acknowledged(Servo(rig.bus, 1), wire.action(1), Block(0, b"", repeatable=False))
+    _written(rig, exchange, lambda: servo.memory.read(GOAL_TIME, 2), data)
+    assert servo.pending is None
+
+
+def sync_write(rig: Rig) -> None:
+    """Nobody answers it, so success means that it was sent; a servo obeys it, or has not heard it."""
+    data = [_word(rig) for _ in GROUP]
+    before = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
+    rig.bus.run(unanswered(wire.sync_write(GOAL_TIME, list(zip(GROUP, data, strict=True))), Block(0, b"").effect))
+    rig.link.advance(0.1)
+    after = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
+    assert after in (before, data), "some have obeyed what was not said"
+
+
+def sync_read(rig: Rig) -> None:
+    """A node may be missing; one that is there is right."""
+    raw = rig.stir()
+    dues = tuple(Due(node, node, 8) for node in GROUP)
+    answer: Answer = rig.bus.run(Exchange[Answer](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
+    told = {reply.data[2]: reply.data[5:7] for reply in answer.replies}
+    assert told == dict.fromkeys(set(GROUP) - set(answer.missing), rig.code(raw))
+
+
+def restore(rig: Rig) -> None:
+    """RESET, known as factory restore: what was set is as shipped."""
+    memory = rig.servos[1].memory
+    exchange = acknowledged(Servo(rig.bus, 1), wire.factory_restore(1), timeout=Timeout.STORE)
+    shipped = memory.layout.factory[13]
+    _written(rig, exchange, lambda: memory.live[13], shipped)
+
+
+def _set_apart(rig: Rig) -> None:
+    rig.link.advance(2.0)  # a servo is deaf while it restores itself
+    memory = rig.servos[1].memory
+    memory.live[13] = memory.layout.factory[13] - 1
+
+
+def calibration(position: int | None) -> Kind:
+    """CALIBRATE 0x0B: where it stands reads as was asked for, or as the middle of the turn."""
+
+    def act(rig: Rig) -> None:
+        servo = rig.servos[1]
+        request = wire.calibrate(1, b"" if position is None else rig.code(position))
+        exchange = acknowledged(Servo(rig.bus, 1), request, timeout=Timeout.STORE)
+        _written(rig, exchange, lambda: servo.raw_position, 2048 if position is None else position)
+
+    return Kind(act, 6 if position is None else 8, 6, lambda rig: _stand(rig, 1000), sure=False)
+
+
+def _stand(rig: Rig, raw: int) -> None:
+    rig.link.advance(0.2)  # what it stores takes its time
+    servo = rig.servos[1]
+    servo.memory["homing_offset"] = 0  # at one pose the offset that a calibration needs does not fit
+    servo.count_anew(rig.link.now())
+    servo.raw_position = raw
+
+
+def clear_turns(rig: Rig) -> None:
+    """CLEAR TURNS 0x0A: it tells a position within one turn."""
+    servo = rig.servos[1]
+    exchange = acknowledged(Servo(rig.bus, 1), wire.clear_turns(1), timeout=Timeout.STORE)
+    _written(rig, exchange, lambda: servo.raw_position, servo.raw_position % 4096)
+
+
+_COMMON = {
+    "ping": Kind(ping, 6, 6),
+    "read 1 byte": reading(1),
+    "read 2 bytes": reading(2),
+    "read 4 bytes": reading(4),
+    "read 15 bytes": reading(FEEDBACK),
+    "write 1 byte": writing(1),
+    "write 2 bytes": writing(2),
+    "reg write": Kind(reg_write, 9, 6, sure=False),
+    "action": Kind(action, 6, 6, reg_write, sure=False),
+    "sync write": Kind(sync_write, 8 + 3 * len(GROUP), 0),
+    "restore": Kind(restore, 6, 6, _set_apart, sure=False),
+}
+KINDS: dict[str, dict[str, Kind]] = {
+    "sts3215": {
+        **_COMMON,
+        "sync read 3 x 2 bytes": Kind(sync_read, 11, 24),
+        "calibrate": calibration(None),
+    },
+    "scs215": _COMMON,
+    "hls3606": {
+        "calibrate to a position": calibration(300),
+        "clear turns": Kind(clear_turns, 6, 6, lambda rig: _stand(rig, 5000), sure=False),
+    },
+}
+"""By model: little-endian, big-endian, and one that obeys what the others do not."""

@@ -1,0 +1,126 @@
+"""Every way in which one byte can go wrong between a host and a device, one after the other on one bus.
+
+What must hold of each: the call that suffers it tells nothing false and ends by its own time, what is asked next comes
+true, and what is asked after that comes true at its first try. And the fault has happened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from motorbus.bus.pump import Bus
+from motorbus.errors import MotorbusError
+from motorbus.link.base import Line, PerfectLine, Side
+from motorbus.link.memory import MemoryLink
+from motorbus.simulation.faults import Fault, ScriptedLine
+
+SPLIT = 0.0003
+"""s between two pieces of what is one packet all the same."""
+LATE = 0.03
+"""s by which a byte and all behind it come too late for its exchange."""
+EVERY = range(256)
+EDGES = (0x00, 0x01, 0x02, 0x04, 0x80, 0xFE, 0xFF)
+"""Values that mean something somewhere."""
+
+
+class Struck(Protocol):
+    """What suffers: a bus on a link whose line can be changed."""
+
+    bus: Bus
+    link: MemoryLink
+
+    def put(self, line: Line) -> None:
+        """Another line between host and device."""
+
+
+R = TypeVar("R", bound=Struck)
+
+
+class Tally(NamedTuple):
+    """How many faults there were, how many calls succeeded in spite of theirs, and how long the longest took (s)."""
+
+    faults: int
+    succeeded: int
+    longest: float
+
+    @property
+    def told(self) -> dict[str, int | float | str]:
+        """For the table of figures."""
+        return {"faults": self.faults, "wrong": 0, "succeeded": self.succeeded, "longest": self.longest}
+
+
+def every_fault(
+    length: int, values: Iterable[int] = EVERY, to: Side = Side.HOST, places: Iterable[int] | None = None
+) -> Iterator[Fault]:
+    """At each byte: lost, there twice, another one, parted from those before it, late; before and behind it: one more."""
+    values = tuple(values)
+    for byte in range(length + 1) if places is None else places:
+        if byte < length:
+            yield Fault(1, byte, "drop", to)
+            yield Fault(1, byte, "duplicate", to)
+            yield Fault(1, byte, "delay", to, seconds=SPLIT)
+            yield Fault(1, byte, "delay", to, seconds=LATE)
+            yield from (Fault(1, byte, "corrupt", to, value=value) for value in values if value)
+        yield from (Fault(1, byte, "insert", to, value=value) for value in values)
+
+
+def number_of(length: int, values: int = 256) -> int:
+    """How many faults these are, 00 among the values."""
+    return length * (4 + values - 1) + (length + 1) * values
+
+
+def suffer(
+    rig: R,
+    act: Callable[[R], Any],
+    faults: Iterable[Fault],
+    *,
+    before: Callable[[R], Any] = lambda rig: None,
+    wrap: Callable[[Line], Line] = lambda line: line,
+    at_most: float = 1.0,
+) -> Tally:
+    """Every fault in turn. `act` raises AssertionError for what is false, MotorbusError when it fails honestly.
+
+    `before` is done on a sound line before each call of `act`, which may take `at_most` s. Two calls follow each fault.
+    """
+    total = succeeded = 0
+    longest = 0.0
+    for fault in faults:
+        total += 1
+        try:
+            before(rig)
+            line = ScriptedLine([fault])
+            rig.put(wrap(line))
+            began = rig.link.now()
+            succeeded += _succeeds(rig, act)
+            longest = max(longest, rig.link.now() - began)
+            assert len(line.fired) == 1, "it did not happen"
+            rig.put(PerfectLine())
+            _recovers(rig, act, before)
+        except BaseException as error:
+            error.add_note(f"the fault was `{fault}`")
+            raise
+    assert longest <= at_most, "a call hung on"
+    return Tally(total, succeeded, longest)
+
+
+def _succeeds(rig: R, act: Callable[[R], Any]) -> bool:
+    try:
+        act(rig)
+    except MotorbusError:
+        return False
+    return True
+
+
+def _recovers(rig: R, act: Callable[[R], Any], before: Callable[[R], Any]) -> None:
+    before(rig)
+    act(rig)
+    before(rig)
+    again = tried_again(rig.bus)
+    act(rig)
+    assert tried_again(rig.bus) == again, "the second call behind it is not right at its first try"
+
+
+def tried_again(bus: Bus) -> int:
+    """How often this bus has said something twice."""
+    return sum(ledger.retries for ledger in bus.statistics.nodes.values())

@@ -1,0 +1,109 @@
+"""What is put before every decoder: a request, the bytes that come back, and how these were made.
+
+An outcome is what a decoder makes of that: a value as plain data, or why there is none.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from motorbus.families.feetech import wire
+
+Frame = tuple[int, bytes]
+"""Identifier and data of a CAN frame."""
+
+
+class Request(NamedTuple):
+    """A FEETECH request: `kind` is ping, read, write, reg_write, sync_read, sync_write or action."""
+
+    kind: str
+    node: int = 1
+    address: int = 0
+    size: int = 0
+    data: bytes = b""
+    nodes: tuple[int, ...] = ()
+
+    def packet(self) -> bytes:
+        """As we send it."""
+        if self.kind == "ping":
+            return wire.ping(self.node)
+        if self.kind == "action":
+            return wire.action(self.node)
+        if self.kind == "read":
+            return wire.read(self.node, self.address, self.size)
+        if self.kind == "sync_read":
+            return wire.sync_read(self.address, self.size, self.nodes)
+        if self.kind == "sync_write":
+            size = len(self.data) // len(self.nodes)
+            shares = [self.data[place * size : (place + 1) * size] for place in range(len(self.nodes))]
+            return wire.sync_write(self.address, list(zip(self.nodes, shares, strict=True)))
+        made = wire.write if self.kind == "write" else wire.reg_write
+        return made(self.node, self.address, self.data)
+
+    def due(self) -> tuple[tuple[int, int], ...]:
+        """Node and length of each reply."""
+        if self.kind == "sync_read":
+            return tuple((node, self.size + wire.OVERHEAD) for node in self.nodes)
+        return ((self.node, wire.OVERHEAD + (self.size if self.kind == "read" else 0)),)
+
+
+class Case(NamedTuple):
+    """A request, what comes back in one piece, and what was done to that."""
+
+    request: Request
+    stream: bytes
+    change: str
+
+    def line(self) -> dict[str, Any]:
+        """As the decoders of others take it."""
+        request = self.request
+        return {
+            "kind": request.kind,
+            "node": request.node,
+            "address": request.address,
+            "count": request.size,
+            "data": request.data.hex(),
+            "nodes": list(request.nodes),
+            "stream": self.stream.hex(),
+        }
+
+
+class SdoRequest(NamedTuple):
+    """An upload, or a download of `data`."""
+
+    kind: str
+    node: int
+    index: int  # type: ignore[assignment]  # hides tuple.index, which nobody needs here
+    subindex: int
+    data: bytes = b""
+
+
+class SdoCase(NamedTuple):
+    """A request, the frames that come back for each frame that the client sends, and what was done to them."""
+
+    request: SdoRequest
+    steps: tuple[tuple[Frame, ...], ...]
+    change: str
+
+    def line(self) -> dict[str, Any]:
+        """As the decoder of python-canopen takes it."""
+        node = self.request
+        return {
+            "kind": node.kind,
+            "node": node.node,
+            "index": node.index,
+            "subindex": node.subindex,
+            "data": node.data.hex(),
+            "steps": [[[identifier, data.hex()] for identifier, data in step] for step in self.steps],
+        }
+
+
+class Outcome(NamedTuple):
+    """`value` when it was taken for an answer, else `why` there is none."""
+
+    value: Any
+    why: str = ""
+
+    @property
+    def taken(self) -> bool:
+        return not self.why

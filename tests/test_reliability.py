@@ -1,0 +1,88 @@
+"""The page on reliability is the one that its figures make, and new figures take the place of old ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scripts import reliability, soaked
+from scripts.fault_rows import ROWS
+
+
+@pytest.fixture
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Figures and page are somewhere else for once."""
+    monkeypatch.setattr(soaked, "FRESH", tmp_path / "build" / "soak.jsonl")
+    monkeypatch.setattr(soaked, "KEPT", tmp_path / "reliability.json")
+    monkeypatch.setattr(reliability, "PAGE", tmp_path / "reliability.md")
+    return tmp_path
+
+
+def written(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> str:
+    monkeypatch.setattr("sys.argv", ["reliability", *arguments])
+    assert reliability.main() == 0
+    return reliability.PAGE.read_text("utf-8")
+
+
+def test_the_page_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["reliability", "--check"])
+    assert reliability.main() == 0, "python -m scripts.reliability makes it"
+
+
+def test_what_a_run_tells_is_on_the_page(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    soaked.record(
+        "L7 late replies", family="kst", promise=3, test="tests/x.py::y[a|b]", exchanges=12345, wrong=0
+    )
+    page = written(monkeypatch, "--take")
+    part = page[page.index("## Promise 3") : page.index("## Promise 4")]
+    assert "| L7 late replies | kst | exchanges 12 345, wrong 0 | `x.py::y[a/b]` 2" in part
+
+
+def test_figures_come_in_one_order(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    soaked.record("one", longest=0.123456, wrong=1, held="8 KiB", seed=4)
+    assert "| seed 4, wrong 1, longest 0.1235, held 8 KiB |" in written(monkeypatch, "--take")
+
+
+def test_a_newer_run_takes_the_place_of_an_older_one(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    soaked.record("L9 garbage", family="kst", promise=6, wrong=1)
+    soaked.record("L9 garbage", family="feetech", promise=6, wrong=2)
+    written(monkeypatch, "--take")
+    soaked.FRESH.unlink()
+    soaked.record("L9 garbage", family="kst", promise=6, wrong=3)
+    page = written(monkeypatch, "--take")
+    assert ("wrong 1" in page, "wrong 2" in page, "wrong 3" in page) == (False, True, True)
+
+
+def test_without_being_told_to_it_takes_nothing_over(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    soaked.record("L9 garbage", wrong=1)
+    assert "L9 garbage" not in written(monkeypatch)
+
+
+def test_rows_come_in_the_order_of_the_matrix() -> None:
+    names = ("else", "D1 b", "L10 c", "L2 d")
+    runs = [{"what": what, "family": "", "promise": 0} for what in names]
+    assert [run["what"] for run in soaked.merged([], runs)] == ["L2 d", "L10 c", "D1 b", "else"]
+
+
+def test_a_page_that_is_behind_is_noticed(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(monkeypatch)
+    soaked.KEPT.write_text(json.dumps({"format": 1, "runs": [soaked.record("new", wrong=0)]}), "utf-8")
+    monkeypatch.setattr("sys.argv", ["reliability", "--check"])
+    assert reliability.main() == 1
+
+
+def test_figures_name_the_commit_they_belong_to(apart: Path) -> None:
+    assert soaked.record("one", wrong=0)["commit"] == soaked.commit()
+    assert [run["what"] for run in soaked.fresh()] == ["one"]
+
+
+def test_every_kind_of_fault_has_its_tests() -> None:
+    found = reliability.tests_of_rows()
+    assert [row for row in ROWS if row not in found] == []
+    assert [row for row in found if row not in ROWS] == []
+
+
+def test_the_rows_are_those_of_the_matrix() -> None:
+    assert list(ROWS) == [*(f"L{n}" for n in range(1, 19)), *(f"D{n}" for n in range(1, 16))]
