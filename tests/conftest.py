@@ -32,6 +32,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("motorbus")
     group.addoption("--soak", action="store_true", help="only the long runs, with their full counts")
     group.addoption("--quick", action="store_true", help="only a small subset, with small counts")
+    group.addoption("--faults-off", action="store_true", help="nothing goes wrong; tests of faults must fail")
 
 
 def _profile(config: pytest.Config) -> str:
@@ -41,7 +42,11 @@ def _profile(config: pytest.Config) -> str:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    settings.load_profile(_profile(config))
+    settings.load_profile("quick" if config.getoption("--faults-off") else _profile(config))
+    if config.getoption("--faults-off"):
+        from tests.faults.off import switch_off
+
+        switch_off(pytest.MonkeyPatch())
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -83,6 +88,7 @@ def _is_quick(item: pytest.Item) -> bool:
 def rounds(pytestconfig: pytest.Config) -> Callable[[int], int]:
     """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`."""
     most = {"soak": None, "test": USUAL_ROUNDS, "quick": QUICK_ROUNDS}[_profile(pytestconfig)]
+    most = QUICK_ROUNDS if pytestconfig.getoption("--faults-off") else most
     return lambda full: full if most is None else min(full, most)
 
 

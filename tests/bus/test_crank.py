@@ -56,6 +56,7 @@ def test_a_lost_link_fails_what_waits_and_does_not_raise() -> None:
     assert isinstance(flight.error, LinkLost)
     again = Flight(position(1))
     assert not launch(bus.link, bus.turns, again)
+    crank(bus.link, bus.turns, inf)  # which looks for the link first
     assert isinstance(again.error, LinkLost)
 
 

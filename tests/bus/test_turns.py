@@ -197,7 +197,7 @@ def test_alone_lets_only_its_owner_send() -> None:
     assert script.sent()[2] == 2
     script.feed(reply(2))
     assert script.send() is None
-    script.turns.release(mine)
+    script.turns.release(claim)
     assert script.sent()[2] == 1
 
 

@@ -37,7 +37,7 @@ def test_exchanges_that_waited_go_before_the_next_one_alone() -> None:
     script.turns.submit(first, script.now)
     script.submit(position(3))
     script.turns.submit(second, script.now)
-    script.turns.release(first.owner)
+    script.turns.release(first)
     assert not second.done, "the exchange has waited longer"
     assert script.sent()[2] == 3
     script.feed(reply(3))

@@ -7,6 +7,7 @@ caller and the wire. What is at work inside the simulated wire does not, for the
 from __future__ import annotations
 
 import gc
+import re
 import sys
 import threading
 from collections.abc import Callable
@@ -22,7 +23,7 @@ PACKAGE = Path(motorbus.__file__).parent
 FLOORS = ("bus", "core", "families", "link", "motion")
 WORLD = str(PACKAGE / "link" / "memory.py")
 NEVER = 1 << 60
-UNSENT = "nothing was sent"
+UNSENT = re.compile("nothing was sent(?! to stop)")
 
 _ours: dict[str, bool] = {}
 
@@ -118,8 +119,8 @@ def left_behind(there: Scene) -> list[str]:
     turns = there.bus.turns
     found = {
         "the lock": turns.lock._is_owned(),
-        "a holder": turns._holder is not None,
-        "a claim": bool(turns._claims),
+        "a holder": bool(turns._claims.held),
+        "a claim": bool(turns._claims.waiting),
         "something queued": turns.waiting,
         "a timer": bool(turns._timers),
         "a stop under way": turns.stopping,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Timeout
+from motorbus.core.operation import Answer, Due, Exchange, Operation, Timeout
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -17,9 +17,11 @@ from motorbus.families.feetech.driver.exchanges import (
     acknowledged,
     read_block,
     unanswered,
+    verified,
     write_block,
 )
 from tests.faults.rig import FEEDBACK, Rig, ping
+from tests.faults.single import Overheard
 
 GOAL_TIME = 44  # on HLS the goal torque; a word of RAM that moves nothing while a servo is limp
 GROUP = (1, 2, 3)
@@ -79,6 +81,19 @@ def writing(count: int) -> Kind:
     return Kind(act, 7 + count, 6)
 
 
+def write_and_read_back(rig: Rig) -> None:
+    """As what matters is written: an acknowledgement alone proves that something was heard."""
+    data, memory = _word(rig), rig.servos[1].memory
+    servo, block = Servo(rig.bus, 1), Block(GOAL_TIME, data)
+
+    def both() -> Operation[None]:
+        yield from write_block(servo, block)
+        yield from verified(servo, block)
+
+    rig.bus.run(both())
+    assert memory.read(GOAL_TIME, 2) == data, "a false success"
+
+
 def reg_write(rig: Rig) -> None:
     """Success means that it waits in the servo."""
     data, servo = _word(rig), rig.servos[1]
@@ -101,7 +116,9 @@ def sync_write(rig: Rig) -> None:
     """Nobody answers it, so success means that it was sent; a servo obeys it, or has not heard it."""
     data = [_word(rig) for _ in GROUP]
     before = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
-    rig.bus.run(unanswered(wire.sync_write(GOAL_TIME, list(zip(GROUP, data, strict=True))), Block(0, b"").effect))
+    rig.bus.run(
+        unanswered(wire.sync_write(GOAL_TIME, list(zip(GROUP, data, strict=True))), Block(0, b"").effect)
+    )
     rig.link.advance(0.1)
     after = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
     assert after in (before, data), "some have obeyed what was not said"
@@ -165,6 +182,7 @@ _COMMON = {
     "read 15 bytes": reading(FEEDBACK),
     "write 1 byte": writing(1),
     "write 2 bytes": writing(2),
+    "write 2 bytes and read back": Kind(write_and_read_back, 9, 6),
     "reg write": Kind(reg_write, 9, 6, sure=False),
     "action": Kind(action, 6, 6, reg_write, sure=False),
     "sync write": Kind(sync_write, 8 + 3 * len(GROUP), 0),
@@ -183,3 +201,15 @@ KINDS: dict[str, dict[str, Kind]] = {
     },
 }
 """By model: little-endian, big-endian, and one that obeys what the others do not."""
+
+
+def another_request(heard: Overheard) -> bool:
+    """Is there, in what the servos heard, a packet with a right sum that nobody has sent?"""
+    data = heard.heard
+    for start in range(len(data) - 5):
+        size = data[start + 3] + 4
+        packet = data[start : start + size]
+        sound = packet[:2] == b"\xff\xff" and len(packet) == size >= 6 and sum(packet[2:]) & 0xFF == 0xFF
+        if sound and packet not in heard.said:
+            return True
+    return False

@@ -188,16 +188,18 @@ KINDS: dict[str, Kind] = {
     "feetech sync read": Kind(
         "feetech",
         lambda there: sync_read(["present_position"], there.devices),
-        lambda there, told: all_true(
-            there, [told.values[node]["present_position"] for node in there.ids]
-        ),
+        lambda there, told: all_true(there, [told.values[node]["present_position"] for node in there.ids]),
     ),
     "feetech torque": Kind("feetech", lambda there: there.said("enable_torque"), raw("torque_enable", 1)),
     "feetech stop": Kind("feetech", lambda there: there.said("stop"), stands, off),
     "feetech home": Kind("feetech", lambda there: there.said("calibrate"), middle),
     "feetech run": Kind("feetech", lambda there: there.said("move", 3.3), at(3.3), torque),
     "kst read": Kind("kst", Scene.asked, Scene.true),
-    "kst write": Kind("kst", lambda there: there.said("set_reversed", True), lambda there, _: bool(there.devices[0].reversed())),
+    "kst write": Kind(
+        "kst",
+        lambda there: there.said("set_reversed", True),
+        lambda there, _: bool(there.devices[0].reversed()),
+    ),
     "kst guarded write": Kind(
         "kst", lambda there: there.said("set_travel_limits", -0.8, 0.9), raw("positive_limit", 516)
     ),
@@ -207,7 +209,9 @@ KINDS: dict[str, Kind] = {
     "kst run": Kind("kst", lambda there: there.said("move", 0.2), at(0.2)),
     "stepper read": Kind("stepper", Scene.asked, Scene.true),
     "stepper write": Kind(
-        "stepper", lambda there: there.said("set_output", 1, 1), lambda there, _: bool(there.node().outputs[0])
+        "stepper",
+        lambda there: there.said("set_output", 1, 1),
+        lambda there, _: bool(there.node().outputs[0]),
     ),
     "stepper guarded write": Kind(
         "stepper",

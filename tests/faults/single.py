@@ -6,12 +6,13 @@ true, and what is asked after that comes true at its first try. And the fault ha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from motorbus.bus.pump import Bus
+from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
-from motorbus.link.base import Line, PerfectLine, Side
+from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import Fault, ScriptedLine
 
@@ -34,26 +35,58 @@ class Struck(Protocol):
         """Another line between host and device."""
 
 
+class Striking(Line, Protocol):
+    """A line with a fault in it; `fired` lists what has happened."""
+
+    @property
+    def fired(self) -> Sequence[object]: ...
+
+
 R = TypeVar("R", bound=Struck)
+F = TypeVar("F")
 
 
 class Tally(NamedTuple):
-    """How many faults there were, how many calls succeeded in spite of theirs, and how long the longest took (s)."""
+    """How many faults there were, how many calls succeeded in spite of theirs, and how long the longest took (s).
+
+    `misled` are those calls that did not because the device heard another sound request; of these, `false` told
+    something that is not so.
+    """
 
     faults: int
     succeeded: int
     longest: float
+    misled: int = 0
+    false: int = 0
 
     @property
     def told(self) -> dict[str, int | float | str]:
         """For the table of figures."""
-        return {"faults": self.faults, "wrong": 0, "succeeded": self.succeeded, "longest": self.longest}
+        told: dict[str, int | float | str] = {"faults": self.faults, "wrong": self.false}
+        return told | {"succeeded": self.succeeded, "longest_s": round(self.longest, 4)}
+
+
+class Overheard:
+    """Carries as another line does; `said` is what the host has sent, `heard` what of it reached the device."""
+
+    def __init__(self, line: Line) -> None:
+        self.line = line
+        self.said: list[Data] = []
+        self.heard = b""
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        deliveries = self.line.carry(sender, data, at)
+        if sender is Side.HOST:
+            self.said.append(data)
+            for delivery in deliveries:
+                self.heard += delivery.data if isinstance(delivery.data, bytes) else b""
+        return deliveries
 
 
 def every_fault(
     length: int, values: Iterable[int] = EVERY, to: Side = Side.HOST, places: Iterable[int] | None = None
 ) -> Iterator[Fault]:
-    """At each byte: lost, there twice, another one, parted from those before it, late; before and behind it: one more."""
+    """At each byte: lost, there twice, changed, parted from those before it, late; before and behind it one more."""
     values = tuple(values)
     for byte in range(length + 1) if places is None else places:
         if byte < length:
@@ -70,46 +103,63 @@ def number_of(length: int, values: int = 256) -> int:
     return length * (4 + values - 1) + (length + 1) * values
 
 
+def scripted(fault: Any) -> ScriptedLine:
+    """A line with this one fault of a script."""
+    return ScriptedLine([fault])
+
+
 def suffer(
     rig: R,
     act: Callable[[R], Any],
-    faults: Iterable[Fault],
+    faults: Iterable[F],
     *,
+    line_of: Callable[[F], Striking] = scripted,
+    settle: Callable[[R, F], object] = lambda rig, fault: rig.put(PerfectLine()),
     before: Callable[[R], Any] = lambda rig: None,
     wrap: Callable[[Line], Line] = lambda line: line,
     at_most: float = 1.0,
+    misleading: Callable[[Overheard], bool] = lambda heard: False,
 ) -> Tally:
     """Every fault in turn. `act` raises AssertionError for what is false, MotorbusError when it fails honestly.
 
-    `before` is done on a sound line before each call of `act`, which may take `at_most` s. Two calls follow each fault.
+    `before` is done on a sound line before each call of `act`, which may take `at_most` s. Two calls follow each fault;
+    `settle` is what is done before them, to the line above all.
+    `misleading` says whether what a device heard is, by its own rules, another request than what was said: then, and
+    only then, something false may be told.
     """
-    total = succeeded = 0
+    faults = list(faults)
+    succeeded = misled = false = 0
     longest = 0.0
     for fault in faults:
-        total += 1
         try:
             before(rig)
-            line = ScriptedLine([fault])
-            rig.put(wrap(line))
+            line = line_of(fault)
+            rig.put(heard := Overheard(wrap(line)))
             began = rig.link.now()
-            succeeded += _succeeds(rig, act)
+            verdict = _verdict(rig, act)
             longest = max(longest, rig.link.now() - began)
             assert len(line.fired) == 1, "it did not happen"
-            rig.put(PerfectLine())
+            was_misled = verdict is not None and misleading(heard)
+            if isinstance(verdict, AssertionError) and not was_misled:
+                raise verdict
+            succeeded += verdict is None
+            misled += was_misled
+            false += isinstance(verdict, AssertionError)
+            settle(rig, fault)
             _recovers(rig, act, before)
         except BaseException as error:
             error.add_note(f"the fault was `{fault}`")
             raise
     assert longest <= at_most, "a call hung on"
-    return Tally(total, succeeded, longest)
+    return Tally(len(faults), succeeded, longest, misled, false)
 
 
-def _succeeds(rig: R, act: Callable[[R], Any]) -> bool:
+def _verdict(rig: R, act: Callable[[R], Any]) -> MotorbusError | AssertionError | None:
     try:
         act(rig)
-    except MotorbusError:
-        return False
-    return True
+    except (MotorbusError, AssertionError) as error:
+        return error
+    return None
 
 
 def _recovers(rig: R, act: Callable[[R], Any], before: Callable[[R], Any]) -> None:

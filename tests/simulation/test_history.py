@@ -21,10 +21,12 @@ class Bench:
     def __init__(self, family: Family, *ids: int, keep: int | None = None, **options: object) -> None:
         self.history = History(family.simulator(ids, "", **options), keep=keep)
         self.link = MemoryLink(self.history, rate=RATES[family.name])
-        self.bus = Bus(self.link, family.configured(), admit=Gate())
+        self.bus = Bus(self.link, family.configured(), admit=Gate(), report=lambda event: None)
 
     def now(self) -> float:
-        """A moment that nothing else has: time passes first."""
+        """A moment that nothing else has, and what is so just before is known."""
+        self.link.advance(0.001)
+        self.history.look(self.link.now())
         self.link.advance(0.001)
         return self.link.now()
 
@@ -55,10 +57,9 @@ def test_what_a_servo_works_out_is_known_without_anybody_reading_it() -> None:
     bench = Bench(feetech.FAMILY, 1)
     bench.history.simulator.servos[0].raw_position = 1234
     since = bench.now()
-    bench.history.look(since)
+    bench.link.advance(0.001)
     bench.history.simulator.servos[0].raw_position = 4000
     until = bench.now()
-    bench.history.look(until)
     assert bench.history.held(1, "present_position", since, since) == {1234}
     assert bench.history.held(1, "present_position", since, until) == {1234, 4000}
 
@@ -82,8 +83,7 @@ def test_of_two_servos_with_one_id_what_either_held_was_held() -> None:
     bench = Bench(feetech.FAMILY, 1, 2, duplicate="1")
     here, _, twin = bench.history.simulator.servos
     here.raw_position, twin.raw_position = 100, 200
-    bench.history.look(bench.now())
-    now = bench.link.now()
+    now = bench.now()
     assert bench.history.held(1, "present_position", now, now) == {100, 200}
 
 
@@ -107,8 +107,7 @@ def test_objects_of_a_servo_on_can() -> None:
     goal = servo.table["goal_position"].to_raw(0.5)
     assert bench.history.applied(0x25, "goal_position", since, until) == [goal]
     bench.link.advance(0.1)
-    bench.history.look(bench.link.now())
-    places = bench.history.held(0x25, "present_position", since, bench.link.now())
+    places = bench.history.held(0x25, "present_position", since, bench.now())
     assert {0} < places
 
 
@@ -120,7 +119,6 @@ def test_a_stepper_controller_shows_its_project_its_images_and_its_pins() -> Non
     controller.set_step_delay(1, 777)
     bench.history.nodes[1].set_input(3, True)  # type: ignore[attr-defined]  # a simulated controller has it
     until = bench.now()
-    bench.history.look(until)
     assert bench.history.applied(1, "output_2", since, until) == [1]
     assert bench.history.applied(1, "input_3", since, until)[-1] == 1
     assert bench.history.applied(1, "step_1_delay", since, until) == [777]
@@ -134,19 +132,17 @@ def test_a_history_that_keeps_little_says_so_when_it_is_asked_for_more() -> None
     servo = feetech.Servo(bench.bus, 1)
     for raw in range(1, 10):
         accelerate(servo, raw)
+        bench.link.advance(0.001)
     assert bench.history.changes() <= 2
-    now = bench.link.now()
+    now = bench.now()
     assert bench.history.held(1, "acceleration", now, now) == {9}
     with pytest.raises(RequestError, match="lies before the 3 changes"):
         bench.history.held(1, "acceleration", 0.0, now)
 
 
 def test_what_shows_nothing_has_no_history() -> None:
-    class Blind:
-        nodes: dict[int, object] = {}
-
     with pytest.raises(RequestError, match="does not show"):
-        History(Blind())  # type: ignore[arg-type]
+        History(object())  # type: ignore[arg-type]
     with pytest.raises(RequestError, match="a history of 1"):
         History(feetech.FAMILY.simulator((1,)), keep=1)
 

@@ -69,8 +69,7 @@ class AsyncBus(BusFace):
     async def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""
         self.watch.close()
-        self.stopper.close()
-        self.link.close()
+        self._hang_up()
 
     async def __aenter__(self) -> Self:
         return self

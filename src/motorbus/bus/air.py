@@ -13,12 +13,11 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
-from motorbus.bus.pace import Pace
+from motorbus.bus.pace import Pace, least_time
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.trust import Trust
-from motorbus.core.can_bits import bits, least
 from motorbus.core.family import Family
 from motorbus.core.operation import (
     ANY,
@@ -27,6 +26,7 @@ from motorbus.core.operation import (
     CanFrame,
     Data,
     Due,
+    Event,
     Exchange,
     Noise,
     Notice,
@@ -143,14 +143,23 @@ class Air:
                 if self.echo.broken:
                     self._echo_broke(now)
             if data:
-                for event in self.receiver.feed(data):
-                    self._take(event, now)
+                events = self.receiver.feed(data)
+                if not self._take_all(events):
+                    for event in events:
+                        self._take(event, now)
             if isinstance(data, bytes):
                 if self.echo.returned:
                     self._echo_returned()
                 self._let_settle(len(data), now)
         self._land(now)
         self.expire(now if looked is None else looked)
+
+    def _take_all(self, events: Sequence[Event]) -> bool:
+        """The usual case: one exchange is in the air, and these are its replies, all of them and nothing else."""
+        if len(self._flying) != 1:
+            return False
+        (flight,) = self._flying.values()
+        return flight.take_all(events, self.echo.recent)
 
     def _let_settle(self, size: int, now: float) -> None:
         """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.
@@ -283,7 +292,7 @@ class Air:
 
         On a byte line both would be the same bytes in one stream, so there the try is lost at once.
         """
-        if not pace.suspects(now - flight.sent_at, self._least_time(flight.exchange)):
+        if not pace.suspects(now - flight.sent_at, least_time(flight.exchange, self.family, self.rate)):
             return False
         if not isinstance(flight.exchange.request, CanFrame) or len(flight.got) != 1:
             flight.spoiled = "early"
@@ -298,13 +307,6 @@ class Air:
             flight.take_back()
         else:
             flight.spoiled = flight.spoiled or "early"
-
-    def _least_time(self, exchange: Exchange[Any]) -> float:
-        """The least time in which an answer can be here; a family's air time of frames may count the most bits."""
-        request, dues = exchange.request, exchange.replies
-        if not isinstance(request, CanFrame) or dues is ANY:
-            return self.family.air_time(exchange, self.rate)
-        return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / self.rate
 
     def expire(self, now: float) -> None:
         """Settle everything whose moment has passed."""

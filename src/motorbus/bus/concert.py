@@ -15,6 +15,7 @@ from math import inf
 from threading import get_ident
 from typing import Any
 
+from motorbus.bus.absence import back
 from motorbus.bus.crank import IDLE, take_in
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
 from motorbus.bus.pump import Bus
@@ -40,6 +41,8 @@ class _Pumped(Part[Bus]):
     def prepare(self) -> tuple[bool, float]:
         """Send what may go. Is the wire to be watched from here, and how long (s) has that time?"""
         relay, turns = self.bus.relay, self.turns
+        if turns.gone is not None and not back(turns):
+            return False, self._without()
         with relay.changed:
             mine = relay.claim()
             settled = self.push()
@@ -50,6 +53,14 @@ class _Pumped(Part[Bus]):
         known = turns.settled
         take_in(self.link, turns, -inf)  # the one who pumps may wait for something far away
         return False, 0.0 if turns.settled != known else min(NAP, max(self.due - now, SHORT))
+
+
+    def _without(self) -> float:
+        """The link is gone: what is due is settled without it; how long (s) until something is."""
+        with self.turns.lock:
+            self.turns.expire(self.link.now())
+            self.due = min(self.turns.due(), self.run.deadline)
+        return min(NAP, max(self.due - self.link.now(), SHORT))
 
 
 class Bell:

@@ -6,6 +6,7 @@ blocking pump, the async pump and the stop thread, so that none of them has poli
 
 from __future__ import annotations
 
+from motorbus.bus.absence import back, rest
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
 from motorbus.errors import LinkError, MotorbusError
@@ -16,6 +17,8 @@ IDLE = 0.25  # s; the longest wait when nothing is awaited from the wire
 
 def crank(link: Link, turns: Turns, until: float) -> None:
     """Send, wait at most `until`, take in. A lost link fails everything awaited and does not raise."""
+    if turns.gone is not None and not found_again(link, turns, until):
+        return
     try:
         with turns.lock:
             settled = turns.settled
@@ -26,6 +29,23 @@ def crank(link: Link, turns: Turns, until: float) -> None:
             turns.lost(error)
     else:
         take_in(link, turns, min(until, due, now + IDLE))
+
+
+def found_again(link: Link, turns: Turns, until: float) -> bool:
+    """Is a link that was gone there again? If not, all that waited has failed; else time passes, at most `until`."""
+    settled = turns.settled
+    if back(turns):
+        return True
+    if turns.settled == settled:
+        rest(turns, min(until, link.now() + IDLE))
+    return False
+
+
+def reach(link: Link, turns: Turns, until: float) -> bool:
+    """`take_in`, for one who need not send; where the link is gone time passes without it."""
+    if turns.gone is not None and not found_again(link, turns, until):
+        return False
+    return take_in(link, turns, until)
 
 
 def take_in(link: Link, turns: Turns, until: float) -> bool:
@@ -94,7 +114,7 @@ def launch(link: Link, turns: Turns, flight: Flight) -> bool:
     try:
         with turns.lock:
             now = link.now()
-            if turns.idle:
+            if turns.idle and turns.gone is None:
                 drain(link, turns, now)
                 request = turns.short(flight, now)
                 if request is not None:

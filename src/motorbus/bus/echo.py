@@ -99,3 +99,10 @@ class Echo:
     def doubted(self) -> None:
         """The bytes sent came back where none were expected: find out again."""
         self.present = None
+
+    def doubt_anew(self) -> None:
+        """The adapter was gone and is there again: nothing that was sent before comes back, and nobody knows more."""
+        self.present = None
+        self.broken = self.returned = False
+        self._expected = self._matched = self._since = b""
+        self.recent.clear()

@@ -13,7 +13,7 @@ from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
 from motorbus.core.family import Family, Readdressed
 from motorbus.core.operation import Exchange, Journal, Notice
-from motorbus.link.base import Link
+from motorbus.link.base import Link, Renewable
 
 Notify = Callable[[object], None]
 
@@ -54,6 +54,7 @@ class BusFace:
             admit=self._armed(admit) if admit is not None else None,
         )
         self.turns.trouble = getattr(link, "trouble", str)
+        self.turns.renewal = link if isinstance(link, Renewable) else None
         self.changed = Condition(self.turns.lock)
         self.stopper = Stopper(link, self.turns, stop_socket)
         if stop_socket is not None:
@@ -66,6 +67,12 @@ class BusFace:
                 self.stopper.start()
 
         return admitted
+
+    def _hang_up(self) -> None:
+        """End the stop thread, then give the port back; nobody looks for it any more."""
+        self.stopper.close()
+        self.turns.renewal = None
+        self.link.close()
 
     def listener(self, report: Notify | None) -> Notify | None:
         """Who hears the events of an operation: `report`, or the bus's own listener; and the journal before them."""

@@ -90,6 +90,13 @@ class Known(dict[int, Answer | None]):
             if node in self:
                 self[node] = None
 
+    def forget(self) -> None:
+        """Whoever is there may have started anew: where they are and what they said last counts no more."""
+        self.update(dict.fromkeys(self))
+        self.seen.clear()
+        self._said.clear()
+        self._given.clear()
+
     def fresh(self, now: float) -> dict[int, Answer | None]:
         """Everybody, with the last position if that is fresh, else None."""
         return {
@@ -152,6 +159,13 @@ def rest_of(flight: Flight, family: Family, rate: int, now: float) -> float:
 def rests(goal: Goal) -> bool:
     """Whether whoever obeys this goal goes on no more."""
     return goal.stays is Stays.STILL or (goal.quantity in ENDLESS and not goal.value)
+
+
+def moves(exchange: Exchange[Any]) -> bool:
+    """Whether it sets something moving or gives it torque; what stops, or lets go, does not."""
+    if exchange.effect not in MOVING or exchange.rank is Rank.STOP:
+        return False
+    return not exchange.goals or not all(map(rests, exchange.goals))
 
 
 def named(exchange: Exchange[Any]) -> set[int]:

@@ -8,6 +8,12 @@ no bit time. (Once, the true one may have been lost.)
 
 from __future__ import annotations
 
+from typing import Any
+
+from motorbus.core.can_bits import bits, least
+from motorbus.core.family import Family
+from motorbus.core.operation import ANY, CanFrame, Exchange
+
 SHOWN = 32  # replies in a row, none of them too early
 MISSED = 2  # replies in a row that were put aside and had none behind them
 EARLY = 0.9  # of the least time; clocks differ, and so do bit rates by their tolerance
@@ -52,3 +58,11 @@ class Pace:
         if self.missed >= MISSED:
             self.refute()
         return self.refuted
+
+
+def least_time(exchange: Exchange[Any], family: Family, rate: int) -> float:
+    """s: the least time in which an answer can be here; a family's air time of frames may count the most bits."""
+    request, dues = exchange.request, exchange.replies
+    if not isinstance(request, CanFrame) or dues is ANY:
+        return family.air_time(exchange, rate)
+    return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / rate

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from typing import Any, Generic, TypeVar
 
-from motorbus.bus.crank import IDLE, push, take_in
+from motorbus.bus.absence import back
+from motorbus.bus.crank import IDLE, push, reach
 from motorbus.bus.face import BusFace
 from motorbus.bus.run import Run
 from motorbus.core.operation import Runnable
@@ -54,12 +55,13 @@ class Part(Generic[B]):
     def push(self) -> bool:
         """Send what may go; True when somebody can go on at once."""
         settled = self.turns.settled
-        push(self.link, self.turns)
+        if self.turns.gone is None or back(self.turns):
+            push(self.link, self.turns)
         return self.turns.settled != settled
 
     def reach(self, until: float) -> bool | None:
         """Let time pass until then, or until something comes; False when the link is lost, None when others pump."""
-        return take_in(self.link, self.turns, until)
+        return reach(self.link, self.turns, until)
 
 
 def advance(parts: Iterable[Part[Any]]) -> bool:

@@ -66,8 +66,7 @@ class Bus(BusFace):
 
     def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""
-        self.stopper.close()
-        self.link.close()
+        self._hang_up()
 
     def __enter__(self) -> Self:
         return self

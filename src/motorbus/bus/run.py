@@ -12,6 +12,7 @@ from math import inf
 from typing import Any, Generic, TypeVar
 
 from motorbus.bus import verdict
+from motorbus.bus.known import moves
 from motorbus.bus.look import questions
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.bus.turns import GATED, Turns
@@ -48,7 +49,7 @@ class Branch:
     __slots__ = (
         "alone",
         "children",
-        "claimed",
+        "claim",
         "error",
         "finished",
         "generator",
@@ -65,7 +66,7 @@ class Branch:
         self.generator: Operation[Any] = iter(operation) if isinstance(operation, Exchange) else operation
         self.alone = alone
         self.looked = looked
-        self.claimed = False
+        self.claim: Claim | None = None
         self.owner: object = parent.owner if parent is not None and parent.owner is not None else None
         if alone and self.owner is None:
             self.owner = self  # the outermost one owns the bus; what is nested in it belongs to it
@@ -92,6 +93,7 @@ class Run(Generic[T]):
         self.now = now
         self.report = report
         self.wake = wake
+        self.losses = turns.losses
         self.interruption: BaseException | None = None
         self.thrown = False
         self.deadline = inf
@@ -132,9 +134,6 @@ class Run(Generic[T]):
         assert ticket is not None
         if ticket.error is not None:
             return None, ticket.error
-        if isinstance(ticket, Claim):
-            branch.claimed = True
-            return None, None
         if not isinstance(ticket, Flight):
             return ticket.value, None
         try:
@@ -161,8 +160,9 @@ class Run(Generic[T]):
         elif isinstance(wish, Alone):
             child = Branch(wish.operation, branch, alone=True)
             child.started = True
+            child.claim = Claim(child.owner, self.wake)
             branch.children = [child]
-            self._await(child, Claim(child.owner, self.wake))
+            self._await(child, child.claim)
         elif isinstance(wish, Report):
             self._notify(branch, wish.event)
         elif isinstance(wish, Exchange) and self._must_look(branch, wish):
@@ -195,6 +195,9 @@ class Run(Generic[T]):
         if self.now() >= self.deadline:
             ticket.finish(error=verdict.cancelled())
             return
+        if self.losses != self.turns.losses and isinstance(ticket, Flight) and moves(ticket.exchange):
+            ticket.finish(error=verdict.outlived(ticket.exchange))
+            return
         with self.turns.lock:
             self.turns.submit(ticket, self.now())
 
@@ -213,10 +216,9 @@ class Run(Generic[T]):
 
     def _finish(self, branch: Branch, value: Any, error: BaseException | None) -> None:
         branch.value, branch.error = value, error
-        if branch.claimed:
+        if branch.claim is not None:
             with self.turns.lock:
-                branch.claimed = False
-                self.turns.release(branch.owner)
+                self.turns.release(branch.claim)
         branch.finished = True
 
     def _join(self, branch: Branch) -> None:
@@ -268,9 +270,7 @@ class Run(Generic[T]):
         ticket, branch.ticket = branch.ticket, None
         if ticket is not None:
             with self.turns.lock:
-                granted = isinstance(ticket, Claim) and ticket.done
                 self.turns.abandon(ticket)
-                branch.claimed = branch.claimed or granted
 
     def _give_up(self) -> None:
         """The clean-up took too long: whatever it still waits for fails at once."""

@@ -183,9 +183,13 @@ class Stopper:
         with self.turns.lock:
             for node in obeyed:
                 self.turns.known.accepted(node)
-        again = [flight.exchange for flight in missing if not isinstance(flight.error, LinkLost)]
+        again = [flight.exchange for flight in missing if self._may_come(flight)]
         while _answered(again) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
+
+    def _may_come(self, flight: Flight) -> bool:
+        """Whether it is worth sending this once more: a link that is lost may be there again in a moment, or never."""
+        return not isinstance(flight.error, LinkLost) or self.turns.gone is not None
 
     def _submit(self, exchanges: Iterable[Exchange[Answer]], flights: list[Flight], limit: float) -> float:
         """Queue them; returns the limit of the round, later by the time they take."""

@@ -6,11 +6,11 @@ any line leaves either an unfinished ticket or a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Sequence
 from math import inf
 from typing import Any
 
-from motorbus.core.operation import ANY, Answer, Exchange, Listen, Rank, Reply, Tune
+from motorbus.core.operation import ANY, Answer, Event, Exchange, Listen, Rank, Reply, Tune
 
 
 class Ticket:
@@ -158,6 +158,28 @@ class Flight(Ticket):
                 return False
         got[index] = self.last = reply
         self.complete = len(got) == len(dues) or bool(self.unbelieved and self._all_believed_here())
+        return True
+
+    def take_all(self, events: Sequence[Event], sent: Container[bytes]) -> bool:
+        """Are these all the replies due, in order, and nothing came before? Keeps them if so: the usual case.
+
+        None of them may look like what was `sent` lately. Everything else is looked at one by one.
+        """
+        exchange = self.exchange
+        dues, lane = exchange.replies, exchange.lane
+        if dues is ANY or exchange.rank is Rank.STOP or self.got or self.unbelieved:
+            return False
+        if not events or len(events) != len(dues):
+            return False
+        for event, due in zip(events, dues, strict=True):
+            if type(event) is not Reply:
+                return False
+            its, key, data = event
+            if its != lane or key != due[1] or len(data) != due[2] or data in sent:
+                return False
+        self.got = dict(enumerate(events))  # type: ignore[arg-type]  # all of them are replies
+        self.ordered, self.last = len(dues), self.got[len(dues) - 1]
+        self.complete = True
         return True
 
     def put_reply_aside(self) -> None:

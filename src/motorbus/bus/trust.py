@@ -152,6 +152,14 @@ class Trust:
         assert oldest is not None
         return oldest[1]
 
+    def doubt_everyone(self, now: float, quiet: float) -> None:
+        """The line to all of them was cut, and is there again: what is outstanding may still come, from now on."""
+        for trust in self.nodes.values():
+            trust.tainted = True
+            trust.quiet_until = now + quiet
+            trust.silent = 0
+            trust.outstanding = dict.fromkeys(trust.outstanding, now)
+
     def stayed_silent(self, node: int, now: float, quiet: float) -> None:
         """A probe was not answered: leave the node alone, longer each time."""
         trust = self.of(node)

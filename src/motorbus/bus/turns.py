@@ -18,13 +18,15 @@ from threading import RLock
 from typing import Any
 
 from motorbus.bus import verdict
+from motorbus.bus.absence import Absence
 from motorbus.bus.air import Air
+from motorbus.bus.claims import Claims
 from motorbus.bus.known import rest_of, withdraws
 from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
 from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Runnable, Timeout
-from motorbus.errors import LinkError, MotorbusError, RequestError
+from motorbus.errors import LinkError, MotorbusError
 
 RETRIES = 2  # of a repeatable exchange, after the first try
 GATED = (Effect.MOTION, Effect.TORQUE)
@@ -34,7 +36,7 @@ Admit = Callable[[Exchange[Any]], None]
 Look = Callable[[Exchange[Any]], "Sequence[Runnable[Any]]"]  # what must be asked before this may leave
 
 
-class Turns(Air):
+class Turns(Absence, Air):
     """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link.
 
     `paced` says whether it takes bit time; None: it will show. While the link is `listening` every exchange is
@@ -62,9 +64,8 @@ class Turns(Air):
         self.latched = self.stopping = False
         self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
         self._timers: list[Timer | Listener] = []
-        self._claims: deque[Claim] = deque()
-        self._holder: object = None
-        self._held = self._courtesy = 0  # courtesy: who waited for one alone goes before the next claim
+        self._claims = Claims()
+        self._courtesy = 0  # who waited for one alone goes before the next claim
         self._look_at = inf
 
     # -- what is wanted -------------------------------------------------------------------------------------
@@ -85,7 +86,7 @@ class Turns(Air):
         elif isinstance(ticket, Timer | Listener):
             self._timers.append(ticket)
         elif isinstance(ticket, Claim):
-            self._claims.append(ticket)
+            self._claims.waiting.append(ticket)
             self._grant_claim()
 
     def abandon(self, ticket: Ticket) -> None:
@@ -95,8 +96,8 @@ class Turns(Air):
                 queue.remove(ticket)  # type: ignore[arg-type]
         if isinstance(ticket, Timer | Listener) and ticket in self._timers:
             self._timers.remove(ticket)
-        if isinstance(ticket, Claim) and ticket in self._claims:
-            self._claims.remove(ticket)
+        if isinstance(ticket, Claim):
+            self._forget(ticket)
         if isinstance(ticket, Flight):
             ticket.abandoned = True
         self._settle(ticket, error=verdict.cancelled())
@@ -108,23 +109,17 @@ class Turns(Air):
                 self._settle(ticket, error=verdict.withdrawn())
                 self.abandon(ticket)
 
-    def release(self, owner: object) -> None:
-        """One `Alone` of this owner has ended."""
-        if self._holder is owner:
-            self._held -= 1
-            if self._held <= 0:
-                self._holder, self._held = None, 0
-                self._courtesy = sum(map(len, self._queues))
+    def release(self, claim: Claim) -> None:
+        """What was to be done alone has ended. However often this is said, and whether it was granted or not."""
+        self._forget(claim)
         self._grant_claim()
 
+    def _forget(self, claim: Claim) -> None:
+        if self._claims.forget(claim):
+            self._courtesy = sum(map(len, self._queues))
+
     def _grant_claim(self) -> None:
-        for claim in list(self._claims):
-            if self._holder is None and not self._flying and not (self._courtesy and self.waiting):
-                self._holder = claim.owner
-            if self._holder is claim.owner:
-                self._held += 1
-                self._claims.remove(claim)
-                self._settle(claim)
+        self._claims.grant(not (self._flying or (self._courtesy and self.waiting)), self._settle)
 
     @property
     def waiting(self) -> bool:
@@ -134,7 +129,7 @@ class Turns(Air):
     @property
     def idle(self) -> bool:
         """Nothing waits, nothing flies, nobody holds the bus."""
-        return not (self._flying or self._claims or self._holder or self.latched or any(self._queues))
+        return not (self._flying or self._claims or self.latched or any(self._queues))
 
     @property
     def _takes_time(self) -> bool:
@@ -145,6 +140,8 @@ class Turns(Air):
     def send(self, now: float) -> Data | Retune | None:
         """What the pump must do next: write this data, change the rate, or (None) wait."""
         self._look_at = inf
+        if self._claims.waiting and not self._flying:  # who was to hand it on may have been interrupted
+            self._grant_claim()
         if len(self._flying) >= self.window:
             return None
         if now < self._free_at and self._takes_time:
@@ -220,9 +217,9 @@ class Turns(Air):
         urgent = isinstance(ticket, Flight) and ticket.rank is Rank.STOP
         if self.stopping and not urgent:
             return False
-        if not urgent and self._holder is not None and self._holder is not ticket.owner:
-            return False
-        return urgent or self._holder is not None or not self._claims or bool(self._courtesy)
+        if self._claims.held:
+            return urgent or self._claims.ours(ticket.owner)
+        return urgent or not self._claims.waiting or bool(self._courtesy)
 
     def _retune(self, ticket: Retune, queue: deque[Flight | Retune]) -> Retune | None:
         queue.remove(ticket)
@@ -246,12 +243,7 @@ class Turns(Air):
         if (exchange.effect not in GATED and plain) or exchange.rank is Rank.STOP:
             return
         if self.admit is None:
-            raise RequestError(
-                "this bus has no gate, so it refuses whatever moves a motor or switches its torque",
-                sent=exchange.request,
-                cause="the bus was built by hand, without the gate that open() puts in",
-                advice="use motorbus.open(), or give the bus an `admit`; nothing was sent",
-            )
+            raise verdict.ungated(exchange)
         if exchange.refusal is not None and (error := exchange.refusal(self.known.stops)):
             raise error
         self.admit(exchange)
@@ -371,7 +363,7 @@ class Turns(Air):
             flight.deadline = min(flight.deadline, now + rest + self.latency)
             flight.abandoned = True
             self._settle(flight, error=verdict.latched())
-        for idle in (*self._timers, *(one for one in self._claims if one.owner is not self._holder)):
+        for idle in (*self._timers, *self._claims.outside()):
             self._settle(idle, error=verdict.latched())
             self.abandon(idle)
         return self.known.frames
@@ -385,16 +377,20 @@ class Turns(Air):
         self.latched = self.stopping = False
 
     def lost(self, error: LinkError) -> None:
-        """The link is gone: everything awaited fails with this error."""
-        for flight in self._flying.values():
+        """The link is gone: everything awaited fails with this error; moments awaited since then do not."""
+        was_gone = self._was_gone(error)
+        for lane, flight in self._flying.items():
             for due in () if flight.exchange.replies is ANY else flight.exchange.replies:
                 self.statistics.of(due.node).errors["lost"] += 1
-        waiting: list[Ticket] = [*self._flying.values(), *self._timers, *self._claims]
+                self.trust.missed(lane, due, flight.sent_at, self._quiet)
+        waiting: list[Ticket] = [*self._flying.values(), *self._claims.waiting]
+        if not was_gone:
+            waiting += self._timers
+            self._timers.clear()
         for queue in self._queues:
             waiting += queue
             queue.clear()
         self._flying.clear()
-        self._timers.clear()
-        self._claims.clear()
+        self._claims.waiting.clear()
         for ticket in waiting:
             self._settle(ticket, error=error)

@@ -10,6 +10,7 @@ from motorbus.errors import (
     ChecksumError,
     FramingError,
     Interrupted,
+    LinkLost,
     MotorbusError,
     NoReply,
     OutcomeUnknown,
@@ -56,6 +57,8 @@ ERRORS: dict[str, type[MotorbusError]] = {
     "unexpected": UnexpectedReply,
     "early": UnexpectedReply,
 }
+
+SOUGHT = "it is looked for again whenever something is asked for; nothing of before is sent again"
 
 
 def fault(flight: Flight) -> str:
@@ -124,6 +127,33 @@ def withdrawn() -> Interrupted:
         "the order was withdrawn: its device was told to stop, or to let go, before the order was through",
         cause="a torque-off, or another stop, that was asked for later overtook it and ends it",
         advice="it may have been carried out before the stop, but not after it; give it again if it is still wanted",
+    )
+
+
+def ungated(exchange: Exchange[Any]) -> RequestError:
+    """The error for an order on a bus that nobody has given a gate."""
+    return RequestError(
+        "this bus has no gate, so it refuses whatever moves a motor or switches its torque",
+        sent=exchange.request,
+        cause="the bus was built by hand, without the gate that open() puts in",
+        advice="use motorbus.open(), or give the bus an `admit`; nothing was sent",
+    )
+
+
+def sought(error: LinkLost) -> LinkLost:
+    """The same error, of a link that is looked for again; one that says so itself is left as it is."""
+    if SOUGHT not in error.advice:
+        error.advice = f"see to the other end; {SOUGHT}"
+    return error
+
+
+def outlived(exchange: Exchange[Any]) -> LinkLost:
+    """The error for an order of an operation that began before the link was lost."""
+    return LinkLost(
+        "the port was gone since this was begun, so it moves nothing any more",
+        sent=exchange.request,
+        cause="what was to be done may no longer be right: nobody knows what happened meanwhile",
+        advice="begin it anew if it is still wanted; nothing of this was sent",
     )
 
 

@@ -7,6 +7,7 @@ import contextlib
 from math import inf
 from threading import Thread
 
+from motorbus.bus.absence import back
 from motorbus.bus.crank import push, take_in
 from motorbus.bus.turns import Turns
 from motorbus.link.base import Link
@@ -22,22 +23,30 @@ class Watch:
         self.turns = turns
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._losses = 0  # so many there were when this link was found
+        self._watched: int | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Watch the link on this loop; does nothing when it is watched."""
-        if self._loop is loop:
+        """Watch the link on this loop; does nothing when it is watched, or is gone and not there again."""
+        losses = self.turns.losses
+        if (self._loop is loop and self._losses == losses) or not back(self.turns):
             return
-        self.close()  # the loop before this one is gone
-        self._loop = loop
-        descriptor = self.link.fileno()
+        self.close()  # the loop before this one is gone, or the port
+        self._loop, self._losses = loop, losses
+        self._watched = descriptor = self.link.fileno()
         if descriptor is not None:
             with contextlib.suppress(ValueError):  # closed: the next look says so
                 loop.add_reader(descriptor, self.crank)
         else:
-            Thread(target=self._read, name="motorbus reader", daemon=True).start()
+            Thread(target=self._read, args=(losses,), name="motorbus reader", daemon=True).start()
 
     def crank(self) -> None:
         """Everything that can be done without waiting; then be back when something is due."""
+        if self.turns.gone is not None and not back(self.turns):
+            self.close()
+            with self.turns.lock:
+                self.turns.expire(self.link.now())
+            return
         if not take_in(self.link, self.turns, -inf):
             self.close()  # a dead descriptor would be ready for ever
             return
@@ -48,14 +57,17 @@ class Watch:
         if self._loop is not None and due < inf:
             self._timer = self._loop.call_later(max(0.0, due - self.link.now()), self.crank)
 
-    def _read(self) -> None:
-        while self._loop is not None and take_in(self.link, self.turns, self.link.now() + LOOK):
+    def _read(self, losses: int) -> None:
+        while self._watches(losses) and take_in(self.link, self.turns, self.link.now() + LOOK):
             push(self.link, self.turns)
+
+    def _watches(self, losses: int) -> bool:
+        return self._loop is not None and self._losses == losses
 
     def close(self) -> None:
         """Watch no longer."""
         loop, self._loop = self._loop, None
-        descriptor = self.link.fileno()
+        descriptor, self._watched = self._watched, None
         if loop is not None and descriptor is not None and not loop.is_closed():
             with contextlib.suppress(ValueError, OSError):
                 loop.remove_reader(descriptor)

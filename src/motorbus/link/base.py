@@ -7,7 +7,7 @@ The bus never looks at a clock of its own and never sleeps: it asks `link.now()`
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from motorbus.core.operation import CanFrame, Data
 
@@ -54,6 +54,20 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Give the port back. Calling it again does nothing."""
+
+
+@runtime_checkable
+class Renewable(Link, Protocol):
+    """A link that can be opened anew when it was lost. Nothing of before is kept: neither bytes nor requests."""
+
+    def renew(self, losses: int) -> None:
+        """Open it anew if it is there again, and time to look. Raises LinkLost, saying why it is still gone.
+
+        `losses` is how often the caller has seen it lost: a loss that another thread has mended by now needs nothing.
+        """
+
+    def rest(self, until: float) -> None:
+        """Let time pass while it is gone: until this moment, or until it is time to look for it again."""
 
 
 class Adapter(Protocol):

@@ -65,7 +65,7 @@ class MemoryLink:
         self._arrived: list[Data] = []
         self._serial = 0
         self._free = {Side.HOST: -inf, Side.DEVICE: -inf}
-        self._gone_at = inf
+        self._gone_at = self._back_at = inf
         self._closed = False
         self._changed = Condition()
         self.tune(rate)
@@ -114,19 +114,39 @@ class MemoryLink:
 
     # -- for tests ------------------------------------------------------------------------------------------
 
-    def unplug(self, at: float = -inf) -> None:
-        """Pull the adapter, at once or at a moment to come: what is under way then is lost, `LinkLost` is raised."""
+    def unplug(self, at: float = -inf, seconds: float = inf) -> None:
+        """Pull the adapter, at once or at a moment to come: what is under way then is lost, `LinkLost` is raised.
+
+        So many `seconds` later it is there again, and works as soon as it has been opened anew (`renew`).
+        """
         with self._changed:
             self._gone_at = at
+            self._back_at = max(at, self.now()) + seconds
             self._changed.notify_all()
 
     def plug(self) -> None:
         """Put the adapter back; what was under way when it was pulled does not come any more."""
         with self._changed:
-            if self.now() >= self._gone_at:
+            now = self.now()
+            if now >= self._gone_at:
                 self._under_way.clear()
                 self._arrived.clear()
-            self._gone_at = inf
+                self.simulator.advance(now)  # what devices have said meanwhile nobody has heard
+            self._gone_at = self._back_at = inf
+
+    def renew(self, losses: int) -> None:
+        with self._changed:
+            if self._closed or self.now() < self._back_at:
+                self._check(self.now())
+            self.plug()
+
+    def rest(self, until: float) -> None:
+        with self._changed:
+            moment = until if self.now() >= self._back_at else min(until, self._back_at)
+            if self.virtual:
+                self._now = max(self._now, moment)
+            elif moment > self.now():
+                self._changed.wait(moment - self.now())
 
     def advance(self, seconds: float) -> None:
         """Let virtual time pass without reading; what arrives meanwhile is kept for the next `read`."""
@@ -176,6 +196,8 @@ class MemoryLink:
 
     def _next(self) -> float:
         """The next moment that matters."""
+        if self.now() >= self._gone_at:
+            return self._back_at
         due = self.simulator.due()
         moment = self._gone_at if due is None else min(due, self._gone_at)
         return min(moment, self._under_way[0][0]) if self._under_way else moment

@@ -116,7 +116,8 @@ class History:
     def held(self, node: int, name: str, since: float, until: float) -> set[Raw]:
         """The raw values that a row of this node had at some instant between two moments, both included (s).
 
-        Of two devices with one id, those of both. Raises RequestError when that lies further back than is kept.
+        At the very moment of a change it had both, so `look` and let time pass before a window begins. Of two devices
+        with one id, those of both. Raises RequestError when that lies further back than is kept.
         """
         return {self.simulator.shown(seen.picture, name) for seen in self._between(node, since, until)}
 
@@ -126,7 +127,7 @@ class History:
         for log in self._logs:
             seen = [one for one in self._span(log, since, until) if one.node == node]
             values = [(one.at, self.simulator.shown(one.picture, name)) for one in seen]
-            changes += [now for before, now in pairwise(values) if now[1] != before[1] and now[0] > since]
+            changes += [now for before, now in pairwise(values) if now[1] != before[1] and now[0] >= since]
         return [value for _, value in sorted(changes, key=lambda change: change[0])]
 
     def changes(self) -> int:
@@ -142,10 +143,10 @@ class History:
         span: list[Seen] = []
         until_next = inf
         for seen in reversed(log):
-            if seen.at <= until and until_next > since:
+            if seen.at <= until and until_next >= since:
                 span.append(seen)
             until_next = seen.at
-            if seen.at <= since:
+            if seen.at < since:
                 return span[::-1]
         if len(log) == self.keep:
             raise RequestError(

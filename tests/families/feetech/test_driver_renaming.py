@@ -111,7 +111,7 @@ def test_an_id_that_two_have_is_taken_too() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_two_with_the_old_id_are_refused(model: str) -> None:
+def test_d1_two_with_the_old_id_are_refused(model: str) -> None:
     with motorbus.simulate("feetech", ids=(3, 3), model=model) as simulation:
         simulation.simulator.servos[1].raw_position = 700  # type: ignore[attr-defined]
         with pytest.raises(RequestError, match="two servos seem to have the id 3") as caught:

@@ -67,7 +67,7 @@ def test_two_that_answer_one_after_the_other_are_heard() -> None:
         assert asked(simulation).suspected
 
 
-def test_two_that_are_equal_in_everything_look_like_one() -> None:
+def test_d1_two_that_are_equal_in_everything_look_like_one() -> None:
     """As the docs say: not even 1000 questions tell, and connecting one at a time is the only proof."""
     with twins() as simulation:
         seen = asked(simulation, 1000)
@@ -171,7 +171,7 @@ def one_pair(random: Random, model: str) -> Simulation:
 
 
 @pytest.mark.timeout(1200)
-def test_pairs_that_differ_are_found_within_200_questions(rounds: Callable[[int], int]) -> None:
+def test_d1_pairs_that_differ_are_found_within_200_questions(rounds: Callable[[int], int]) -> None:
     """The bar is all of them; how many questions it took is printed by `make soak`."""
     random = Random(4)
     total = rounds(20_000) if rounds(20_000) == 20_000 else 60

@@ -67,7 +67,7 @@ def test_an_id_that_reads_back_as_neither_is_told() -> None:
     play(write_node_id(node(), 9), write, (ID, abort(0x3000, 0x0601_0001)))
 
 
-def test_two_servos_with_one_id_are_given_no_other() -> None:
+def test_d2_two_servos_with_one_id_are_given_no_other() -> None:
     with bench(duplicate="5", duplicate_delay=0.0003) as there:
         with pytest.raises(RequestError, match="two servos answer"):
             there.servo().set_node_id(9)

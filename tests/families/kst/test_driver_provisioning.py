@@ -138,7 +138,7 @@ def test_an_id_that_is_taken_is_refused_before_anything_is_written() -> None:
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.0003])
-def test_two_servos_with_one_id_are_refused_before_anything_is_written(delay: float) -> None:
+def test_d2_two_servos_with_one_id_are_refused_before_anything_is_written(delay: float) -> None:
     with bench(ids=(5,), duplicate="5", duplicate_delay=delay) as there:
         there.simulator.servos[1].raw_position = 7
         with pytest.raises(RequestError, match=r"two servos answer as 0x05 \(5\)"):
@@ -154,7 +154,7 @@ def test_nobody_there() -> None:
         assert there.servo().ping() is True
 
 
-def test_a_bus_in_use_at_the_old_rate_is_not_spoken_to_at_the_new_one() -> None:
+def test_d12_a_bus_in_use_at_the_old_rate_is_not_spoken_to_at_the_new_one() -> None:
     with bench(ids=(5, 6), profile="kst-ext") as there:
         there.servo(6).start_reports(0.02)
         there.sent()

@@ -70,13 +70,13 @@ def test_an_id_that_waits_for_a_restart_is_told() -> None:
 
 
 @pytest.mark.parametrize("ids", [(), (5,)])
-def test_two_servos_with_one_id_are_told(ids: tuple[int, ...]) -> None:
+def test_d2_two_servos_with_one_id_are_told(ids: tuple[int, ...]) -> None:
     with bench(duplicate="5", duplicate_delay=0.0003) as there:
         assert [one.node for one in there.run(there.family.scan(ids))] == [5]
         assert "two servos with one id" in there.of(Suspicion)[0].what
 
 
-def test_bus_errors_are_told() -> None:
+def test_d2_bus_errors_are_told() -> None:
     with bench(ids=(5, 6)) as there:
         there.sim(6).values["node_id"] = 7
         there.sim(6).node = 5
@@ -94,7 +94,7 @@ def test_at_another_rate_it_listens_first_and_the_rate_is_set_back() -> None:
         assert there.bus.rate == there.link.rate == 500_000
 
 
-def test_a_running_bus_at_another_rate_is_not_disturbed() -> None:
+def test_d12_a_running_bus_at_another_rate_is_not_disturbed() -> None:
     with bench(bit_rate=250_000, reports_ms=20, profile="kst-ext") as there:
         there.run(there.family.scan((), tuple(rate for rate in RATES if rate != 500_000)))
         assert there.sim().errors == 0

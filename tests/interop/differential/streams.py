@@ -230,5 +230,5 @@ def drawn(seed: int, count: int) -> Iterator[Case]:
         if random.random() < 0.25:
             chosen.append(random.choice(names[:10]))
         for name in chosen:
-            stream = CHANGES[name](random, request, stream) if stream else stream
+            stream = CHANGES[name](random, request, stream) if len(stream) >= wire.OVERHEAD else stream
         yield Case(request, stream, ", then ".join(chosen))

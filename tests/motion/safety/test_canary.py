@@ -128,7 +128,7 @@ def moving_or_giving_torque(data: Data, node: int) -> bool:
     return any(40 <= rest[0] <= 48 and not (rest[0] == 40 and one == b"\0") for one in writes)
 
 
-def test_a_servo_that_restarts_in_mid_motion_is_at_fault_within_two_looks_and_gets_no_torque() -> None:
+def test_d3_a_servo_that_restarts_in_mid_motion_is_at_fault_within_two_looks_and_gets_no_torque() -> None:
     noted: list[object] = []
     with machine(arm="1-3") as (made, sims), Robot.of(made, report=noted.append) as robot:
         sim, bus = sims["arm"], robot.buses["arm"]

@@ -101,10 +101,10 @@ def told_by(
     nodes: Mapping[int, Node], address: int, count: int
 ) -> bool | Callable[[Answer], Mapping[int, float]]:
     """What a read of these registers of these servos says of where they are; see `Exchange.tells_position`."""
-    return address == PRESENT and count > 1 and partial(_places, nodes)
+    return address == PRESENT and count > 1 and partial(places, nodes)
 
 
-def _places(nodes: Mapping[int, Node], answer: Answer) -> dict[int, float]:
+def places(nodes: Mapping[int, Node], answer: Answer) -> dict[int, float]:
     """Where those are who are known well enough to tell (rad), by the settings that they have now."""
     found = {}
     for reply in answer.replies:

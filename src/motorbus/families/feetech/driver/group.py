@@ -116,11 +116,15 @@ def block_of_each(nodes: Sequence[Node], address: int, count: int) -> Exchange[d
 
 
 def sync_exchange(
-    nodes: Sequence[Node], address: int, count: int, read: Callable[[Answer], T]
+    nodes: Sequence[Node],
+    address: int,
+    count: int,
+    read: Callable[[Answer], T],
+    places: Callable[[Answer], Mapping[int, float]] | None = None,
 ) -> Exchange[T]:
     """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`).
 
-    `read` must make do with either.
+    `read` must make do with either, and so must `places`, which says where they are by what was read last.
     """
     by_id = {node.node: node for node in nodes}
     ids = list(by_id)
@@ -131,7 +135,7 @@ def sync_exchange(
             tuple(Due(id, id, wire.OVERHEAD + count) for id in ids),
             read,
             repeatable=True,
-            tells_position=told_by(by_id, address, count),
+            tells_position=places or told_by(by_id, address, count),
             other=lambda: exchange(other, count),
         )
 

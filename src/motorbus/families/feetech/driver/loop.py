@@ -7,13 +7,14 @@ orders may be mixed: present and goal position have the same place and size in a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Final, Literal
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Positions
 from motorbus.core.operation import Answer, Exchange, Operation, outcome
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, read_block
+from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
 from motorbus.families.feetech.driver.node import Node, Settings
@@ -40,12 +41,8 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
             "stop would have to wait as long",
             advice="divide the servos, or give a greater `air`; nothing was sent",
         )
-    gauges = {node.node: _Gauge(node, rows[node.node]) for node in nodes}
-
-    def read(answer: Answer) -> Positions:
-        return Positions(_positions(gauges, answer), answer.missing, answer.at)
-
-    return sync_exchange(nodes, row.address, row.size, read)
+    gauges = _Gauges({node.node: _Gauge(node, rows[node.node]) for node in nodes})
+    return sync_exchange(nodes, row.address, row.size, gauges.read, gauges.places)
 
 
 def position_reads(
@@ -106,10 +103,10 @@ def _no_sync_read(node: Node) -> RequestError:
 class _Gauge:
     """Tells the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker.
 
-    What has been made of those is kept as long as they are the same. A code below `_plain` is its own raw value.
+    What has been made of those `settings` is kept as long as they are the same. A code below `_plain` is its own raw value.
     """
 
-    __slots__ = ("_factor", "_order", "_plain", "_scale", "_settings", "end", "node", "row")
+    __slots__ = ("_factor", "_order", "_plain", "_scale", "end", "node", "row", "settings")
 
     def __init__(self, node: Node, row: Entry) -> None:
         self.node = node
@@ -118,7 +115,7 @@ class _Gauge:
         self._order: Final[Literal["little", "big"]] = "little" if row.order == "little" else "big"
         self._plain: Final = 1 << (8 * row.size - 1 if row.sign_bit is None else row.sign_bit)
         self._scale: Final = row.scale
-        self._settings: Settings | None = None
+        self.settings: Settings | None = None
         self._factor = 0.0
 
     def value(self, data: bytes) -> float:
@@ -126,9 +123,9 @@ class _Gauge:
         settings = self.node.settings
         if settings is None:
             raise _unsettled(self.node)
-        if settings is not self._settings:
+        if settings is not self.settings:
             self._factor = settings.factors["present_position"]
-            self._settings = settings
+            self.settings = settings
         raw = int.from_bytes(data, self._order)
         if raw >= self._plain:
             raw = self.row.decode(data)
@@ -147,15 +144,41 @@ def _unsettled(node: Node) -> RequestError:
     )
 
 
-def _positions(gauges: Mapping[int, _Gauge], answer: Answer) -> dict[int, float]:
-    found: dict[int, float] = {}
-    at = answer.at
-    for reply in answer.replies:
-        frame = reply.data
-        gauge = gauges[frame[2]]
-        gauge.node.heard(frame[4], at)
-        found[frame[2]] = gauge.value(frame[5 : gauge.end])
-    return found
+class _Gauges:
+    """Those of several servos that one exchange asks. What was read last is kept, for the gate asks the same again."""
+
+    __slots__ = ("_gauges", "_last", "_places")
+
+    def __init__(self, gauges: Mapping[int, _Gauge]) -> None:
+        self._gauges = gauges
+        self._last: tuple[Answer, dict[int, float]] | None = None
+        self._places = partial(places, {id: gauge.node for id, gauge in gauges.items()})
+
+    def read(self, answer: Answer) -> Positions:
+        """Where they are. Raises RequestError as `_Gauge.value`."""
+        found: dict[int, float] = {}
+        gauges, at = self._gauges, answer.at
+        for _, _, frame in answer.replies:
+            id = frame[2]
+            gauge = gauges[id]
+            gauge.node.heard(frame[4], at)
+            found[id] = gauge.value(frame[5 : gauge.end])
+        self._last = answer, found.copy()  # what is given away may be changed by who gets it
+        return Positions(found, answer.missing, at)
+
+    def places(self, answer: Answer) -> Mapping[int, float]:
+        """The same as `Exchange.tells_position` says it: by the settings that they have now, where those are known."""
+        last = self._last
+        if last is not None and last[0] is answer and self._settled():
+            return last[1]
+        return self._places(answer)
+
+    def _settled(self) -> bool:
+        """Whether all have the settings by which they were read last."""
+        for gauge in self._gauges.values():
+            if gauge.node.settings is not gauge.settings:
+                return False
+        return True
 
 
 def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> Exchange[None]:

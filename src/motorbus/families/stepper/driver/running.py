@@ -122,14 +122,14 @@ def run(
     course = _Course(timeout, checked(watch))
     guard = Watch(node)
     branches = (_launched(node, asked, course, guard), _listening(course), _following(node, course))
-    yield from honest(guard, _waited(node, project, course, branches))
+    yield from honest(guard, _waited(node, project, course, guard, branches))
     assert course.wait is not None, "a start that fails raises"
     assert course.wait.ran is not None, "a wait ends with an outcome"
     return course.wait.ran
 
 
 def _waited(
-    node: Node, project: int, course: _Course, branches: Iterable[Operation[None]]
+    node: Node, project: int, course: _Course, watch: Watch, branches: Iterable[Operation[None]]
 ) -> Operation[None]:
     """Carry the branches out; the journal is told of an end that is known, whatever else goes wrong."""
     try:
@@ -137,7 +137,7 @@ def _waited(
     except MotorbusError:
         raise
     except BaseException as interruption:
-        if course.wait is not None:
+        if watch.ordered:
             interruption.add_note(f"project {project} was started and goes on: nothing was sent to stop it")
         raise
     finally:

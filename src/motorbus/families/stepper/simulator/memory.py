@@ -56,7 +56,11 @@ class Memory:
     def copy(self) -> Memory:
         """One that goes its own way from now on."""
         twin = copy(self)
-        twin.stored, twin.flags, twin._stored_flags = dict(self.stored), dict(self.flags), dict(self._stored_flags)
+        twin.stored, twin.flags, twin._stored_flags = (
+            dict(self.stored),
+            dict(self.flags),
+            dict(self._stored_flags),
+        )
         return twin
 
     @property

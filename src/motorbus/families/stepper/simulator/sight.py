@@ -1,4 +1,4 @@
-"""All that a host could learn of a controller at a moment, and what it was last commanded, cheap to make and to compare.
+"""All that a host could learn of a controller at a moment, and what it has on its pins, cheap to make and to compare.
 
 By name: each row of the project that is being edited; `image_1` to `image_4`, the bytes that reading a project brings;
 `input_1` to `input_5`, `output_1` to `output_3` and `leds`, 1 when active; `selected`; and `phase`, what it is doing.

@@ -1,0 +1,1 @@
+"""Mutation testing: each small fault that can be put into a module, and whether a fast test of it notices."""

@@ -1,0 +1,89 @@
+"""Tries every small fault in the modules of scripts/mutants.toml, and says which of them no fast test notices.
+
+    python -m scripts.mutants                        every module
+    python -m scripts.mutants kst-wire journal       some
+    python -m scripts.mutants safety --only fence.py  only faults with this text in their name
+    python -m scripts.mutants safety --sample 0.1    a tenth of the faults, always the same one
+    python -m scripts.mutants --keep                 all, and docs/reference/mutants.* made of it
+    python -m scripts.mutants --write | --check      the page of what is kept: make it, or see that it is current
+
+The exit code is 1 when a fault survives that mutants.toml has no reason for, when fewer than 95 % of a module are
+noticed, or when a reason is for none. A new import for every fault (`--anew`) is slower and must give the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from scripts import pages
+from scripts.mutants.record import PAGE, complaints, keep, kept, outcome, page, share
+from scripts.mutants.subjects import Subject, Verdict, Wish, subjects
+from scripts.mutants.trial import trial
+
+
+def main() -> int:
+    """Run what is asked for. Gives the exit code."""
+    told = _asked()
+    known = subjects()
+    if told.write or told.check:
+        status = pages.kept({PAGE: page(known, kept())})
+        return status or int(any(_say(known[name], one) for name, one in kept().items()))
+    failed, found = False, {}
+    for name in told.modules or known:
+        found[name] = verdicts = _tried(known[name], told)
+        result = outcome(verdicts)
+        whole = told.sample == 1 and not told.only
+        failed |= bool(_say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole))
+        if told.keep and whole:
+            keep(name, result)
+    if told.json:
+        Path(told.json).write_text(json.dumps(found, indent=1, ensure_ascii=False), encoding="utf-8")
+    if told.keep:
+        PAGE.write_text(page(known, kept()), encoding="utf-8")
+    return int(failed)
+
+
+def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
+    begun = time.monotonic()
+
+    def tell(text: str) -> None:
+        if text:
+            print(f"  {time.monotonic() - begun:5.0f} s  {text}", file=sys.stderr, flush=True)
+
+    print(subject.name, file=sys.stderr)
+    verdicts = trial(subject, Wish(told.sample, told.only, told.anew, told.jobs, tell))
+    result = outcome(verdicts)
+    took = time.monotonic() - begun
+    print(f"{subject.name}: {result['noticed']} of {result['faults']} faults noticed ({share(result)}) in {took:.0f} s")
+    return verdicts
+
+
+def _say(subject: Subject, told: dict[str, Any], *, whole: bool = True) -> list[str]:
+    """Print what is wrong; of a part only what survives without a reason."""
+    wrong = [line for line in complaints(subject, told) if whole or "nobody says why" in line]
+    for line in wrong:
+        print(line)
+    return wrong
+
+
+def _asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m scripts.mutants", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
+    parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
+    parser.add_argument("--only", default="", help="a text that the name of a fault must have")
+    parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--json", default="", help="a file for every verdict")
+    parser.add_argument("--keep", action="store_true", help="keep the result and make the page")
+    parser.add_argument("--write", action="store_true", help="make the page of what is kept")
+    parser.add_argument("--check", action="store_true", help="see that the page is made of what is kept")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""What the trials have shown, as data (docs/reference/mutants.json) and as a page (docs/reference/mutants.md)."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from scripts.mutants.subjects import ROOT, Subject, Verdict
+from scripts.pages import listed
+
+PAGE: Final = ROOT / "docs" / "reference" / "mutants.md"
+KEPT: Final = ROOT / "docs" / "reference" / "mutants.json"
+WANTED: Final = 0.95
+"""The share of faults that must be noticed."""
+
+HEAD = """# Mutants
+
+A test that passes says little until it is known to fail. So small faults are put one at a time into the modules on
+which everything else rests: `<` becomes `<=`, `and` becomes `or`, a number changes by one, a statement, an exception
+or a bound goes. For each the fast tests of that module are run; at least one has to fail. What no test notices stands
+below with the reason, by far most often that the changed program does the same.
+
+Left alone is what no run can show: annotations, docstrings, `assert`, imports, and prose (a string with a space in it
+is a sentence for people; a test that repeats it proves nothing).
+
+`python -m scripts.mutants --keep` runs all of them anew and makes this page; `python -m scripts.mutants kst-wire` tries
+one module and prints what lives.
+"""
+
+
+def outcome(verdicts: Sequence[Verdict]) -> dict[str, Any]:
+    """What is kept of the trial of one module."""
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "python": platform.python_version(),
+        "faults": len(verdicts),
+        "noticed": sum(bool(one.by) for one in verdicts),
+        "without end": sum(one.by == "time" for one in verdicts),
+        "survivors": sorted(one.fault for one in verdicts if not one.by),
+    }
+
+
+def kept() -> dict[str, Any]:
+    """What is known of each module."""
+    found = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    assert isinstance(found, dict)
+    return found
+
+
+def keep(name: str, told: dict[str, Any]) -> None:
+    """Put the outcome of this module in place of what was known of it."""
+    text = json.dumps({**kept(), name: told}, indent=1, ensure_ascii=False, sort_keys=True)
+    KEPT.write_text(f"{text}\n", encoding="utf-8")
+
+
+def complaints(subject: Subject, told: dict[str, Any]) -> Iterator[str]:
+    """What is not as it should be: too few noticed, survivors that nobody has explained, reasons for none."""
+    if told["noticed"] < WANTED * told["faults"]:
+        yield f"{subject.name}: {share(told)} of the faults are noticed, wanted are {WANTED:.0%}"
+    for name in told["survivors"]:
+        if name not in subject.reasons:
+            yield f"{subject.name}: no test notices, and nobody says why: {name}"
+    for name in sorted(set(subject.reasons) - set(told["survivors"])):
+        yield f"{subject.name}: there is a reason for what does not survive: {name}"
+
+
+def share(told: dict[str, Any]) -> str:
+    """How much is noticed, rounded down."""
+    return f"{int(1000 * told['noticed'] / max(1, told['faults'])) / 10:.1f} %"
+
+
+def page(subjects: dict[str, Subject], known: dict[str, Any]) -> str:
+    """The whole page."""
+    both = [(subject, known[name]) for name, subject in subjects.items() if name in known]
+    columns = ("module", "files", "faults", "noticed", "share", "survive", "date", "Python")
+    return "\n".join(
+        [HEAD, *listed(columns, map(_row, *zip(*both, strict=True))), *(line for one in both for line in _section(*one))]
+    )
+
+
+def _row(subject: Subject, told: dict[str, Any]) -> list[object]:
+    files = f"`{_common(subject)}`"
+    alive = len(told["survivors"])
+    return [subject.name, files, told["faults"], told["noticed"], share(told), alive, told["date"], told["python"]]
+
+
+def _common(subject: Subject) -> str:
+    file = Path(subject.files[0]).relative_to("src/motorbus")
+    return (file if len(subject.files) == 1 else file.parent).as_posix()
+
+
+def _section(subject: Subject, told: dict[str, Any]) -> Iterator[str]:
+    if told["survivors"]:
+        yield f"## {subject.name}\n"
+        rows = ((_code(name), subject.reasons.get(name, "**not explained yet**")) for name in told["survivors"])
+        yield from listed(("fault", "why no test notices it"), rows)
+
+
+def _code(name: str) -> str:
+    file, _, rest = name.partition(" ")
+    text = rest.replace("|", "\\|")
+    return f"{file}: ``{text}``"

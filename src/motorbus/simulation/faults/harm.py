@@ -1,0 +1,90 @@
+"""What the faults at the bytes of one packet make of it: pieces, each with how much later it comes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import groupby
+from typing import Final, NamedTuple
+
+from motorbus.simulation.faults.fault import Fault
+
+INSTANT: Final = 1e-6
+"""s between what comes before something that happens to the bus, that, and what comes after it."""
+GAP: Final = 0.001
+"""s between the pieces of a packet that is split, where nobody says how much."""
+
+
+class Strike(NamedTuple):
+    """A fault by position that strikes a packet: at which of its bytes, -1 for the whole; `rank` orders a script."""
+
+    place: int
+    rank: int
+    fault: Fault
+
+
+class Harmed(NamedTuple):
+    """What is left of the bytes: pieces with how much later they come (s). `later` is what later packets suffer too,
+    `lost` that nothing follows in this exchange, `stalled` until when after the packet nothing passes (s)."""
+
+    pieces: list[tuple[float, bytes]]
+    later: float
+    lost: bool
+    stalled: float
+
+
+def harmed(
+    body: bytes,
+    strikes: Iterable[Strike],
+    later: float,
+    lost: bool,
+    happen: Callable[[Fault, float], None],
+) -> Harmed:
+    """Do all that is to be done to the bytes of one packet, which come `later`, or are `lost`, by what was done before.
+
+    `happen` is told what happens to the bus, and how much later than the packet (s).
+    """
+    rest, run, start = bytearray(body), b"", 0
+    pieces: list[tuple[float, bytes]] = []
+    shift, stalled = later, 0.0
+    for place, group in groupby(strikes, key=lambda strike: strike.place):
+        run += bytes(rest[start:place]) if not lost else b""
+        byte, start = bytes(rest[place : place + 1]), place + 1
+        for _, _, fault in group:
+            if fault.action in ("delay", "stall", "split") or fault.word.world:
+                pieces.append((shift, run))
+                run = b""
+            if fault.word.world:
+                happen(fault, shift + INSTANT)
+                shift += 2 * INSTANT
+            elif fault.action in ("delay", "stall", "split"):
+                shift += fault.seconds or GAP
+                later += fault.seconds if fault.action == "delay" else 0.0
+                stalled = shift if fault.action == "stall" else stalled
+            elif fault.action == "truncate":
+                lost = True
+            elif fault.action == "reorder":
+                byte = _swapped(rest, place, byte)
+            else:
+                byte = changed(fault, byte)
+        run += byte if not lost else b""
+    pieces.append((shift, run + (bytes(rest[start:]) if not lost else b"")))
+    return Harmed([(when, piece) for when, piece in pieces if piece], later, lost, stalled)
+
+
+def changed(fault: Fault, byte: bytes) -> bytes:
+    """A byte (or none, where one is lost already) after a fault that changes it."""
+    if fault.action == "insert":
+        return bytes([fault.value]) + byte
+    if fault.action in ("corrupt", "flip"):
+        bits = fault.value if fault.action == "corrupt" else 1 << fault.value
+        return bytes([byte[0] ^ bits]) + byte[1:] if byte else byte
+    return byte * 2 if fault.action == "duplicate" else b""
+
+
+def _swapped(rest: bytearray, place: int, byte: bytes) -> bytes:
+    """Put what is here into the next place, and give what was there."""
+    after = bytes(rest[place + 1 : place + 2])
+    if len(byte) != 1 or not after:
+        return byte
+    rest[place + 1] = byte[0]
+    return after

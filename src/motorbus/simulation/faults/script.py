@@ -1,0 +1,187 @@
+"""A script of faults as text: one a line or between semicolons, `#` begins a remark.
+
+    seed 42
+    exchange 17 byte 3: drop
+    exchange 17 byte 0 to device: corrupt 80
+    exchange 18: delay 0.02
+    1% of bytes: corrupt
+    at 2.5 s: power-cycle 3
+
+It prints itself as a text that parses to an equal script, so a failing case can be kept, sent and run again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any, Final
+
+from motorbus.errors import RequestError
+from motorbus.link.base import Side
+from motorbus.simulation.faults.fault import ANY, Fault
+from motorbus.simulation.faults.words import WORDS, Takes
+
+EXAMPLES: Final = (
+    "for example `exchange 17 byte 3: drop`, `1% of bytes: corrupt` or `at 2.5 s: power-cycle 3`"
+)
+_KEYS: Final = ("seed", "exchange", "packet", "byte", "bytes", "host", "device", "adapter", "all")
+_WHERE: Final = re.compile(
+    r"(?:at\s+)?(?:exchange\s+(?P<exchange>\d+)(?:\s+(?:byte\s+(?P<byte>\d+)|packet\s+(?P<packet>\d+)))?"
+    r"|(?P<percent>[\d.]+(?:e[+-]?\d+)?)\s*%(?:\s+of\s+(?P<unit>bytes|packets))?"
+    r"|(?P<moment>[\d.]+(?:e[+-]?\d+)?)\s*s)"
+    r"(?:\s+to\s+(?P<to>host|device))?(?P<adapter>\s+on\s+adapter)?",
+    re.ASCII,
+)
+_SPAN: Final = re.compile(r"(?P<low>[\d.]+(?:e[+-]?\d+)?)-(?P<high>[\d.]+(?:e[+-]?\d+)?)", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """Faults in order, and what chance begins with; None: nobody said."""
+
+    faults: tuple[Fault, ...] = ()
+    seed: int | None = None
+
+    def __str__(self) -> str:
+        return "\n".join(
+            ([] if self.seed is None else [f"seed {self.seed}"]) + [str(one) for one in self.faults]
+        )
+
+    def __iter__(self) -> Iterator[Fault]:
+        return iter(self.faults)
+
+    def __len__(self) -> int:
+        return len(self.faults)
+
+    @property
+    def by_chance(self) -> bool:
+        """Whether the seed decides anything."""
+        return any(fault.by_chance for fault in self.faults)
+
+    @property
+    def line(self) -> str:
+        """The same in one line, for a flag or an order."""
+        return "; ".join(str(self).splitlines())
+
+    def seeded(self, seed: int) -> Script:
+        """With this seed if it has none."""
+        return self if self.seed is not None else replace(self, seed=seed)
+
+
+def parse(text: str) -> Script:
+    """A script from its text. Raises RequestError with the line, what is expected there, and what is near."""
+    faults: list[Fault] = []
+    seed: int | None = None
+    for count, line in enumerate(text.splitlines(), start=1):
+        for part in line.partition("#")[0].split(";"):
+            said = part.strip()
+            if re.fullmatch(r"seed\s+\d+", said, re.ASCII):
+                seed = _one_seed(seed, said, count)
+            elif said:
+                faults.append(_fault(said, count))
+    return Script(tuple(faults), seed)
+
+
+def script_of(script: Script | str | Iterable[Fault]) -> Script:
+    """Whatever says a script as one."""
+    if isinstance(script, str):
+        return parse(script)
+    return script if isinstance(script, Script) else Script(tuple(script))
+
+
+def _one_seed(before: int | None, said: str, count: int) -> int:
+    if before is not None:
+        raise RequestError(f"line {count}: {said!r}: the seed is {before} already", expected="one seed")
+    return int(said.split()[1])
+
+
+def _fault(said: str, count: int) -> Fault:
+    where, colon, what = said.partition(":")
+    match = _WHERE.fullmatch(where.strip())
+    words = what.split()
+    if not colon or match is None or not words:
+        raise _nonsense(said, count)
+    if words[0] not in WORDS:
+        raise _unknown(words[0], said, count)
+    try:
+        return _made(match, words)
+    except RequestError as error:
+        raise RequestError(
+            f"line {count}: {said!r} is not a fault: {error.summary}", expected=error.expected
+        ) from None
+
+
+def _made(match: re.Match[str], words: list[str]) -> Fault:
+    place: dict[str, Any] = {name: int(match[name]) for name in ("exchange", "byte", "packet") if match[name]}
+    place |= {name: _float(match[name]) for name in ("percent", "moment") if match[name]}
+    if match["percent"] and not place["percent"]:
+        raise RequestError("impossible chance", expected="more than 0 and at most 100 %")
+    if match["to"]:
+        place["to"] = Side(match["to"])
+    place["per_byte"] = match["unit"] == "bytes"
+    place["adapter"] = bool(match["adapter"])
+    return Fault(action=words[0], **place, **_arguments(words[0], words[1:], loose=not match["byte"]))
+
+
+def _arguments(action: str, said: list[str], *, loose: bool) -> dict[str, Any]:
+    """What stands behind a word; `loose`: what is not said there is left to chance."""
+    takes = WORDS[action].takes
+    most = {Takes.NOTHING: 0, Takes.SECONDS_NODE: 2}.get(takes, 1)
+    optional = takes.name.startswith("PERHAPS") or takes is Takes.NOTHING
+    if not said and loose and takes in (Takes.BITS, Takes.BIT, Takes.BYTE):
+        return {"value": ANY}
+    if len(said) > most or (not said and not optional):
+        raise RequestError(f"{action} takes {takes.value or 'nothing more'}")
+    try:
+        return _values(takes, said)
+    except ValueError:
+        raise RequestError(f"impossible {' '.join(said)!r}", expected=takes.value) from None
+
+
+def _values(takes: Takes, said: list[str]) -> dict[str, Any]:
+    if not said:
+        return {}
+    if takes in (Takes.BITS, Takes.BYTE):
+        return {"value": int(said[0], 16)}
+    if takes in (Takes.BIT, Takes.PERHAPS_COUNT):
+        return {"value": int(said[0])}
+    if takes in (Takes.NODE, Takes.NODES):
+        every = takes is Takes.NODES and said[0] == "all"
+        return {"node": None if every else int(said[0], 0)}
+    if takes is Takes.SECONDS_NODE:
+        whom = said[1] if len(said) > 1 else "all"
+        return {"seconds": float(said[0]), "node": None if whom == "all" else int(whom, 0)}
+    span = _SPAN.fullmatch(said[0]) if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) else None
+    if span:
+        return {"seconds": float(span["low"]), "until": float(span["high"])}
+    return {"seconds": float(said[0])}
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise RequestError(f"{text} is no number") from None
+
+
+def _nonsense(said: str, count: int) -> RequestError:
+    """What is near: a word of the grammar that one of these could have been meant to be."""
+    unknown = [
+        word for word in re.findall(r"[a-z][a-z-]*", said.lower()) if word not in (*_KEYS, *WORDS, "at", "to")
+    ]
+    near = [match for word in unknown for match in get_close_matches(word, [*_KEYS, *WORDS], n=1)]
+    return RequestError(
+        f"line {count}: {said!r} is not a fault",
+        expected=EXAMPLES,
+        cause=f"perhaps {' and '.join(f'`{word}`' for word in near)} was meant" if near else "",
+    )
+
+
+def _unknown(word: str, said: str, count: int) -> RequestError:
+    near = get_close_matches(word, WORDS, n=3)
+    return RequestError(
+        f"line {count}: {said!r} is not a fault: there is no {word!r}",
+        expected=f"perhaps {' or '.join(near)}" if near else f"one of {', '.join(WORDS)}",
+    )

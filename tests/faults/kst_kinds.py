@@ -1,0 +1,241 @@
+"""Every exchange that the driver has with KST servos; each judges what it is told.
+
+What is read and what is written is another value each time. Success must mean that it is so; what nobody answers (a
+save, a start) has no success but that it was sent, and is judged by what the servo has made of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from motorbus.bus.pace import SHOWN
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import Runnable
+from motorbus.errors import DeviceError, MotorbusError, NoReply
+from motorbus.families.kst import (
+    FAMILY,
+    Servo,
+    broadcast_bit_rate,
+    broadcast_position,
+    broadcast_read,
+    broadcast_save,
+)
+from motorbus.families.kst.driver.exchanges import download, order, upload
+from motorbus.families.kst.simulator import KstBus
+from motorbus.families.kst.table import BIT_RATES
+from motorbus.link.base import Line
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+
+NODES = (0x25, 0x26, 0x27)
+NODE = NODES[0]
+VERSION = "KST X8 1.2.3-beta"
+MISSING = 0x5FFF
+NO_OBJECT, READ_ONLY = 0x0602_0000, 0x0601_0002
+
+
+class KstRig:
+    """A bus, the servos at its end, and a counter that makes every read have another right answer."""
+
+    def __init__(self, profile: str = "kst-ext", **options: Any) -> None:
+        simulator = FAMILY.simulator(NODES, profile=profile, firmware=VERSION, **options)
+        assert isinstance(simulator, KstBus)
+        self.servos = simulator.nodes
+        self.link = MemoryLink(simulator, rate=500_000, pace=True)
+        self.family = FAMILY.configured(profile=profile)
+        self.bus = Bus(self.link, self.family, admit=Gate(), report=lambda event: None)
+        self.dialect = Servo(self.bus, NODE).dialect
+        self.count = self.here = 0
+        for _ in range(SHOWN + 1):  # by then it shows that this link takes its bit time
+            read_2(self)
+
+    def put(self, line: Line) -> None:
+        """Another line between host and servos."""
+        self.link.line = line
+
+    def stir(self) -> int:
+        """Put every servo where it has not been lately; returns that."""
+        self.count += 1
+        raw = self.count * 719 % 1400 - 700
+        self.here = raw
+        for servo in self.servos.values():
+            servo.raw_position = raw
+        return raw
+
+    def run(self, operation: Runnable[Any]) -> Any:
+        """Carry out an operation."""
+        return self.bus.run(operation)
+
+    @property
+    def servo(self) -> Servo:
+        """A servo that nothing is known of yet."""
+        return Servo(self.bus, NODE)
+
+
+class Kind(NamedTuple):
+    """An exchange; `sure` where it may be said again, so that it gets over any single fault; `alone` where it is
+    for one servo. `profile`, `options`: of the servos that have it."""
+
+    act: Callable[[KstRig], None]
+    sure: bool = True
+    alone: bool = True
+    profile: str = "kst-ext"
+    options: dict[str, object] = {}  # noqa: RUF012 - never changed
+
+
+def ping(rig: KstRig) -> None:
+    """Silence is the answer no, which only a fault can bring about."""
+    if not rig.servo.ping():
+        raise NoReply("nobody is there", node=NODE)
+
+
+def read_1(rig: KstRig) -> None:
+    rig.count += 1
+    rig.servos[NODE].values["function_enable"] = rig.count % 32
+    assert rig.servo.read_raw("function_enable") == {"function_enable": rig.count % 32}
+
+
+def read_2(rig: KstRig) -> None:
+    raw = rig.stir()
+    assert rig.servo.read_raw("present_position") == {"present_position": raw}
+
+
+def read_4(rig: KstRig) -> None:
+    """Current and temperature."""
+    rig.count += 1
+    rig.servos[NODE].temperature = 20.0 + rig.count % 60
+    assert rig.servo.temperature() == 20.0 + rig.count % 60
+
+
+def read_segments(rig: KstRig) -> None:
+    """A text of more than four letters; newer firmware tells it in segments."""
+    assert rig.servo.version() == VERSION
+
+
+def refused_read(rig: KstRig) -> None:
+    """A refusal is an answer, and never a value."""
+    _refused(rig, upload(rig.servo, MISSING, 0, lambda reply: reply), NO_OBJECT)
+
+
+def refused_write(rig: KstRig) -> None:
+    row = rig.servo.table["present_position"]
+    _refused(rig, download(rig.servo, row, b"\1\2", states_length=False), READ_ONLY)
+
+
+def _refused(rig: KstRig, operation: Runnable[Any], code: int) -> None:
+    try:
+        told = rig.run(operation)
+    except DeviceError as refusal:
+        assert refusal.code == code
+    else:
+        raise AssertionError(f"told {told!r} by a servo that refuses")
+
+
+def _written(rig: KstRig, say: Callable[[], object], name: str, new: int) -> None:
+    values = rig.servos[NODE].values
+    old, others = values[name], [rig.servos[node].values[name] for node in NODES[1:]]
+    try:
+        say()
+    except MotorbusError:
+        assert values[name] in (old, new), "it holds what nobody has sent"
+        raise
+    finally:
+        assert others == [rig.servos[node].values[name] for node in NODES[1:]], "somebody else has obeyed"
+    assert values[name] == new, "a false success"
+
+
+def write_1(rig: KstRig) -> None:
+    rig.count += 1
+    raw = 10 + rig.count % 200
+    _written(rig, lambda: rig.servo.write(report_interval=raw / 1000), "report_interval", raw)
+
+
+def write_2(rig: KstRig) -> None:
+    raw = rig.stir() // 2
+    row = rig.servo.table["goal_position"]
+    _written(rig, lambda: rig.servo.move(float(row.to_value(raw)), wait=False), "goal_position", raw)
+
+
+def write_4(rig: KstRig) -> None:
+    """A mid point, which must not be written again in silence."""
+    rig.count += 1
+    sim = rig.servos[NODE]
+    sim.raw_position = 100 + rig.count % 200
+    before = sim.raw_position
+    try:
+        rig.run(order(rig.servo, rig.servo.table["mid_point"], 0))
+    except MotorbusError:
+        assert sim.raw_position in (0, before)
+        raise
+    assert sim.raw_position == 0, "a false success"
+
+
+def set_bit_rate(rig: KstRig) -> None:
+    rig.count += 1
+    code = rig.count % len(BIT_RATES)
+    _written(rig, lambda: rig.servo.set_bit_rate(BIT_RATES[code]), "bit_rate_code", code)
+
+
+def save(rig: KstRig) -> None:
+    """Nobody answers it: that it was saved shows after a restart only, and nothing says so before."""
+    rig.servo.save()
+    rig.link.advance(0.5)
+
+
+def start_reports(rig: KstRig) -> None:
+    """Nobody answers a start or a stop."""
+    rig.servo.start_reports()
+    rig.servo.stop_reports()
+
+
+def broadcast_reading(rig: KstRig) -> None:
+    raw = rig.stir()
+    row = rig.servo.table["present_position"]
+    told = rig.run(broadcast_read("present_position", rig.dialect))
+    assert set(told) <= set(NODES)
+    assert set(told.values()) <= {row.to_value(raw)}
+
+
+def broadcast_move(rig: KstRig) -> None:
+    """Who acknowledges has got the target."""
+    raw = rig.stir() // 2
+    row = rig.servo.table["goal_position"]
+    acknowledged = rig.run(broadcast_position(float(row.to_value(raw)), NODES, rig.dialect))
+    assert all(rig.servos[node].values["goal_position"] == raw for node in acknowledged)
+
+
+def broadcast_rate(rig: KstRig) -> None:
+    rig.count += 1
+    code = rig.count % len(BIT_RATES)
+    acknowledged = rig.run(broadcast_bit_rate(BIT_RATES[code], rig.dialect))
+    assert all(rig.servos[node].values["bit_rate_code"] == code for node in acknowledged)
+
+
+def broadcast_saving(rig: KstRig) -> None:
+    rig.run(broadcast_save(rig.dialect))
+    rig.link.advance(0.5)
+
+
+KINDS: dict[str, Kind] = {
+    "ping": Kind(ping),
+    "read 1 byte": Kind(read_1),
+    "read 2 bytes": Kind(read_2),
+    "read 4 bytes": Kind(read_4),
+    "read in segments": Kind(read_segments, sure=False),
+    "refused read": Kind(refused_read),
+    "refused write": Kind(refused_write),
+    "write 1 byte": Kind(write_1),
+    "write 2 bytes": Kind(write_2),
+    "write 4 bytes": Kind(write_4, sure=False),
+    "write 1 byte that is kept": Kind(set_bit_rate),
+    "save": Kind(save),
+    "save that is acknowledged": Kind(save, options={"save_reply": "ack"}),
+    "start and stop of reports": Kind(start_reports),
+    "start and move": Kind(write_2, profile="xqpower"),
+    "broadcast read": Kind(broadcast_reading, alone=False),
+    "broadcast write": Kind(broadcast_move, alone=False),
+    "broadcast of a bit rate": Kind(broadcast_rate, alone=False),
+    "broadcast save": Kind(broadcast_saving, alone=False),
+}
+"""Every exchange there is, by name."""

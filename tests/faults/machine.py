@@ -1,0 +1,278 @@
+"""What the machines of all families share: a bus whose line, supply and devices can be struck, and what must hold then.
+
+A step is a call of some verb, a fault that will strike one of the next exchanges, or a rest. Faults are those of
+`motorbus.simulation.faults`, so what has happened is a script: a failure prints it, by position. Time is virtual, and
+what a step chooses comes from one number, so the same steps are the same run.
+
+Every call has to end by a moment that is reckoned before it; what it says is held against the history of the devices; a
+call that no fault has touched is right at once and never said twice; and two calls after the last fault the bus is as
+good as new.
+
+Left out, because docs/explanation/taint.md says that no host can know better on these wires:
+- replies that overtake each other by more than the quiet time, and copies that come later than at once;
+- two faults in one packet, or two bytes that change places, for a sum of 8 bits; more bytes after a reply that was shifted by one;
+- the copy of an acknowledgement in place of the next one: nothing is struck right behind a copy;
+- a level of an input that is read once; what two devices with one id say together.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from math import inf
+from random import Random
+from typing import Any, ClassVar, Final
+
+from hypothesis import note
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from hypothesis.strategies import integers, sampled_from
+
+from motorbus.bus.pump import Bus
+from motorbus.bus.turns import RETRIES
+from motorbus.core.family import Family, Simulator
+from motorbus.core.operation import Exchange
+from motorbus.errors import MotorbusError
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
+from motorbus.simulation.faults import FaultyLine, World, parse
+from motorbus.simulation.history import History
+from tests.faults.oracle import FalseWord, Oracle, Outcome, Window
+
+BUFFER: Final = 4096
+LOTS: Final = 1 << 16
+KEPT: Final = 20_000
+"""Changes of a device that are remembered; a call takes a few."""
+
+Verb = Callable[[Random], Window]
+
+
+class Line(FaultyLine):
+    """One whose script goes on being written."""
+
+    def add(self, text: str) -> None:
+        """So much more."""
+        for fault in parse(text):
+            self._check(fault)
+            self.faults += (fault,)
+            self._place(len(self.faults) - 1, fault)
+
+    @property
+    def calm(self) -> bool:
+        """Nothing of what has passed is still to come."""
+        return not any(way.front or way.behind for way in self._ways.values())
+
+    @property
+    def due(self) -> bool:
+        """A fault may still happen; one whose byte did not come never will."""
+        return any(exchange > self.exchange for exchange in self._waiting if self._waiting[exchange])
+
+    def clear_until(self) -> float:
+        """When the last of what it has delayed arrives (s)."""
+        return max(way.floor for way in self._ways.values())
+
+
+class Rig:
+    """A bus of one family under fire. `verbs` are what is called, `faults` what strikes, each by its name.
+
+    A fault is a text of a script without its exchange, where `{byte}`, `{bits}`, `{late}` and `{node}` are by lot.
+    """
+
+    faults: ClassVar[Mapping[str, str]]
+    exchanges: ClassVar[int]
+    """What a verb takes at most."""
+
+    def __init__(self, family: Family, simulator: Simulator, rate: int, **how: Any) -> None:
+        self.simulator: Any = simulator
+        self.history = History(simulator, keep=KEPT)
+        self.world = World(self.history)
+        self.line = Line((), self.world, most=1000)
+        self.link = MemoryLink(self.world, rate=rate, line=self.line, **how)
+        self.bus = Bus(self.link, family.configured(), admit=Gate(), report=lambda event: None)
+        self.family = self.bus.family
+        self.oracle = Oracle(self.link, self.history, lambda: self.world._ahead)
+        self.verbs: dict[str, Verb] = {}
+        self.calls: Counter[str] = Counter()
+        self.untouched = 0
+        self.quarantine = 0
+        self.twins = False
+        self.bound = self.exchanges * self.longest()
+
+    def slowest(self) -> Exchange[Any]:
+        """The exchange that takes longest."""
+        raise NotImplementedError
+
+    def longest(self) -> float:
+        """s after which an exchange is over whatever the line does: each try with its quiet time and a probe."""
+        rate = self.link.rate
+        each = [
+            self.family.air_time(one, rate) + self.family.turnaround(one) + 0.02
+            for one in (self.slowest(), self.family.probe(1, 0))
+        ]
+        quiet = self.family.quiet_time(rate)
+        return (RETRIES + 2) * (sum(each) + 2 * quiet) + quiet
+
+    # -- steps --------------------------------------------------------------------------------------------------------
+
+    def call(self, name: str, lot: int) -> None:
+        """Call a verb and judge it."""
+        touched, fired, again = self.troubled, self.line.count, self.again
+        window = self.verbs[name](Random(lot))
+        self.calls[name] += 1
+        self.quarantine = max(0, self.quarantine - 1)
+        if touched or self.line.count > fired or self.troubled:
+            return
+        self.untouched += 1
+        if window.says in (Outcome.UNREAD, Outcome.UNKNOWN):
+            raise FalseWord(f"{name}: no fault has touched it, and it failed") from window.error
+        if self.again > again:
+            raise FalseWord(f"{name}: no fault has touched it, and it was said twice")
+
+    def strike(self, name: str, lot: int) -> None:
+        """Let this fault happen in one of the next exchanges; not right behind another one."""
+        if self.line.due or self.quarantine:
+            return
+        random = Random(lot)
+        place = {
+            "byte": random.randrange(11),
+            "bits": f"{random.randrange(1, 256):02X}",
+            "late": f"{10 ** random.uniform(-4, -0.2):.6f}",
+            "near": f"{10 ** random.uniform(-4, -1.6):.6f}",
+            "node": random.choice([*self.history.nodes]),
+        }
+        where, _, what = self.faults[name].partition(":")
+        self.line.add(f"exchange {self.line.exchange + random.randrange(1, 4)} {where.format(**place)}:{what.format(**place)}")
+        if "duplicate" in name or "copy" in name:
+            self.quarantine = 3
+
+    def rest(self) -> None:
+        """Let everything that is late arrive; then the second call at most is right."""
+        self.plug()
+        for _ in range(8):
+            if self.line.due or not self.line.calm:
+                self.spend()
+        self.settle()
+        self.spend()
+        window = self.probe()
+        if window.error is not None and not self.twins:
+            raise FalseWord("the second call after the last fault failed") from window.error
+        if not self.bus.turns.idle:
+            raise FalseWord("the bus is not idle")
+
+    def settle(self) -> None:
+        """Let time pass until nothing is under way."""
+        self.link.advance(max(0.0, min(self.line.clear_until(), self.link.now() + 10.0) - self.link.now()) + 2.0)
+
+    def spend(self) -> None:
+        """Make an exchange that may fail."""
+        self.probe()
+
+    def probe(self) -> Window:
+        """The plainest call there is, judged."""
+        raise NotImplementedError
+
+    def pull(self, later: float) -> None:
+        """The adapter is pulled so many seconds from now."""
+        self.link.unplug(self.link.now() + later)
+
+    def plug(self) -> None:
+        """And put back."""
+        self.link.plug()
+
+    # -- what must hold -----------------------------------------------------------------------------------------------
+
+    @property
+    def troubled(self) -> bool:
+        """Something that was struck is still under way, or something is away."""
+        return bool(
+            self.link._under_way
+            or self.link._arrived
+            or self.link._gone_at < inf
+            or not self.line.calm
+            or self.line.clear_until() > self.link.now()
+            or self.world._events
+            or self.twins
+        )
+
+    @property
+    def again(self) -> int:
+        """How often the bus has said something twice."""
+        return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
+
+    def sound(self) -> None:
+        """Nobody holds the bus, and what the receiver keeps is little."""
+        turns = self.bus.turns
+        if turns.lock._is_owned():  # type: ignore[attr-defined]  # of a lock that can be taken again
+            raise FalseWord("the lock of the bus is still held")
+        if turns.waiting:
+            raise FalseWord("something still waits for the bus")
+        if (held := kept(turns.receiver)) > BUFFER:
+            raise FalseWord(f"the receiver keeps {held} bytes")
+
+    def told(self) -> str:
+        """What has happened, as a script."""
+        return f"{self.line.record}\n# {self.oracle.judged} judged, {dict(self.calls)}"
+
+
+def kept(receiver: object) -> int:
+    """Bytes that a receiver holds, and what it is made of."""
+    inside = getattr(receiver, "__dict__", {}).values()
+    own = sum(len(value) for value in inside if isinstance(value, bytes | bytearray))
+    return own + sum(kept(value) for value in inside if type(value).__module__.startswith("motorbus"))
+
+
+class Machine(RuleBasedStateMachine):
+    """The steps of one family; `make` builds its rig."""
+
+    make: ClassVar[Callable[[], Rig]]
+
+    @initialize()
+    def begin(self) -> None:
+        self.rig = type(self).make()
+
+    def teardown(self) -> None:
+        rig = getattr(self, "rig", None)
+        if rig is not None:
+            note(rig.told())
+            rig.rest()
+
+
+def machine(make: Callable[[], Rig], verbs: list[str], faults: list[str]) -> type[Machine]:
+    """The machine of a family."""
+
+    class Steps(Machine):
+        @rule(name=sampled_from(verbs), lot=integers(0, LOTS - 1))
+        def call(self, name: str, lot: int) -> None:
+            self.rig.call(name, lot)
+
+        @rule(name=sampled_from(faults), lot=integers(0, LOTS - 1))
+        def strike(self, name: str, lot: int) -> None:
+            self.rig.strike(name, lot)
+
+        @rule()
+        def rest(self) -> None:
+            self.rig.rest()
+
+        @invariant()
+        def sound(self) -> None:
+            if hasattr(self, "rig"):
+                self.rig.sound()
+
+    Steps.make = staticmethod(make)
+    return Steps
+
+
+def walk(rig: Rig, seed: int, exchanges: int, often: float = 0.02) -> None:
+    """Steps by chance until so many exchanges have been made; `often` is the share of steps that are faults."""
+    random = Random(seed)
+    verbs, faults = [*rig.verbs], [*rig.faults]
+    while rig.line.exchange < exchanges:
+        if random.random() < often:
+            rig.strike(random.choice(faults), random.randrange(LOTS))
+        elif random.random() < 0.001:
+            rig.rest()
+        else:
+            rig.call(random.choice(verbs), random.randrange(LOTS))
+        rig.sound()
+    with suppress(MotorbusError):
+        rig.rest()

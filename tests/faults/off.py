@@ -1,0 +1,49 @@
+"""Switches every fault off, so that it can be seen that no test of a fault passes without its fault.
+
+What a line does to what it carries, a plug that is pulled, a supply that is cut and an interruption at a line: none of
+it happens any more under `--faults-off`. Tests are not changed; they have to fail by what they assert.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import pytest
+
+from motorbus.families.feetech.simulator.servo import Servo as FeetechServo
+from motorbus.families.kst.simulator.servo import Servo as KstServo
+from motorbus.families.stepper.simulator.controller import Controller
+from motorbus.link.base import PerfectLine
+from motorbus.link.memory import MemoryLink
+from motorbus.simulation.course import Course
+
+WIRE = PerfectLine()
+faults_are_off = False
+"""What a source of faults that is none of these asks before it does harm."""
+
+
+class Carried:
+    """A line of a test that is there, is told nothing, and does nothing."""
+
+    def __get__(self, owner: Any, kind: type | None = None) -> Any:
+        return WIRE
+
+    def __set__(self, owner: Any, line: object) -> None:
+        """It is not put in."""
+
+
+def switch_off(patch: pytest.MonkeyPatch) -> None:
+    """From here on nothing goes wrong any more."""
+    patch.setattr(sys.modules[__name__], "faults_are_off", True)
+    for place in (MemoryLink, Course):
+        patch.setattr(place, "line", Carried(), raising=False)
+    patch.setattr(MemoryLink, "unplug", _nothing)
+    for node in (FeetechServo, KstServo, Controller):
+        for fault in ("unplug", "power_cycle", "restart", "brown_out"):
+            patch.setattr(node, fault, _nothing, raising=False)
+    patch.setattr(sys, "settrace", _nothing)
+
+
+def _nothing(*given: Any, **options: Any) -> None:
+    """What would have gone wrong."""

@@ -1,0 +1,83 @@
+"""Rows L1 and L2 on CAN, where a byte of a frame cannot change: one frame lost, doubled, late or out of order.
+
+Every exchange that there is with KST servos, each frame of it, in both directions.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import pytest
+
+from motorbus.bus.trust import EQUAL_RUN
+from motorbus.errors import MotorbusError
+from motorbus.link.base import Side
+from tests.conftest import Figures
+from tests.faults.frames import LATE, FrameFault, FrameLine, every_fault
+from tests.faults.kst_kinds import KINDS, NODE, Kind, KstRig
+from tests.faults.single import suffer
+
+LEFT_ALONE = 0.002
+"""s after which a servo that was asked twice has said all that it has to say."""
+AT_MOST = 1.5
+
+
+def frames_of(kind: Kind) -> dict[Side, int]:
+    """How many frames it has to each side when nothing goes wrong."""
+    rig = KstRig(kind.profile, **kind.options)
+    rig.put(line := FrameLine())
+    kind.act(rig)
+    return line.counts
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_l1_l2_each_fault_of_each_frame_tells_nothing_false(name: str, figures: Figures) -> None:
+    kind = KINDS[name]
+    counts = frames_of(kind)
+
+    def settle(rig: KstRig, fault: FrameFault) -> None:
+        """The line goes on holding up what follows the frame, for a queue has an order."""
+        if fault.seconds and kind.alone:
+            with suppress(MotorbusError):
+                kind.act(rig)
+        rig.link.advance(fault.seconds or LEFT_ALONE)
+
+    # What everyone was told must not come after what everyone is told next: nobody could say which of the two is meant.
+    last = {FrameFault(to, count - 1, "swapped") for to, count in counts.items()} if not kind.alone else set()
+    faults = [fault for fault in every_fault(counts) if fault not in last]
+    tally = suffer(
+        KstRig(kind.profile, **kind.options),
+        kind.act,
+        faults,
+        line_of=FrameLine,
+        settle=settle,
+        at_most=AT_MOST,
+    )
+    assert tally.faults >= sum(counts.values()) * (2 + len(LATE)) > 0
+    late = sum(fault.seconds == max(LATE) for fault in faults)
+    if kind.sure:
+        assert tally.succeeded >= tally.faults - late, "what may be said again gets over any but the longest wait"
+    figures(f"L1 L2 single frame faults, {name}", family="kst", promise=1, **tally.told)
+
+
+@pytest.mark.parametrize("thinks", [0.0001, 0.001])
+def test_a_request_that_can_doubles_is_the_known_limit(thinks: float, figures: Figures) -> None:
+    """A servo that gets a question twice answers twice, and nothing tells the second answer from that to the next one.
+
+    See docs/explanation/taint.md. It is over as soon as the servo is left alone for as long as an answer takes, or
+    after 128 reads, for then it is probed.
+    """
+    rig = KstRig(turnaround=thinks)
+    rig.put(line := FrameLine(FrameFault(Side.DEVICE, 0, "doubled")))
+    wrong = 0
+    for _ in range(2 * EQUAL_RUN):
+        wrong += rig.servo.read_raw("present_position") != {"present_position": rig.here}
+        rig.stir()
+    assert len(line.fired) == 1
+    assert wrong <= EQUAL_RUN
+    rig.link.advance(LEFT_ALONE)
+    for _ in range(2 * EQUAL_RUN):
+        rig.stir()
+        assert rig.servo.read_raw("present_position") == {"present_position": rig.here}
+    assert rig.servos[NODE].raw_position == rig.here
+    figures("L7 reads behind a request that was doubled, answers one read old", family="kst", wrong=wrong)

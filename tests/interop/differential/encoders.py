@@ -1,0 +1,93 @@
+"""The same request, made by us and by others: the bytes must be the same, or the difference must have a name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from random import Random
+from typing import Any, Final
+
+from motorbus.families.feetech import wire
+from motorbus.families.kst import wire as sdo
+from tests.interop.differential.cases import Case, Request, SdoCase, SdoRequest
+from tests.interop.differential.judging import UNEXPLAINED
+from tests.interop.differential.outside import Decoder
+from tests.interop.differential.sdo_streams import NODE, packet
+
+SDK_LONGEST: Final = 250
+
+
+def requests(seed: int, count: int) -> Iterator[Case]:
+    """FEETECH requests by lot, each answered as a servo would, so that nobody has to wait."""
+    random = Random(seed)
+    for _ in range(count):
+        request = _request(random)
+        yield Case(request, _answer(request), "a request")
+
+
+def _request(random: Random) -> Request:
+    kind = random.choice(("ping", "read", "write", "reg_write", "sync_read", "sync_write", "action"))
+    node, address = random.randrange(254), random.randrange(200)
+    longest = 256 - address if random.random() < 0.1 else 16
+    size = random.randrange(1, min(longest, 252))
+    nodes = tuple(random.sample(range(254), random.randrange(1, 13)))
+    if kind == "read":
+        return Request(kind, node, address, size)
+    if kind in ("write", "reg_write"):
+        return Request(kind, node, address, data=random.randbytes(size))
+    if kind == "sync_read":
+        return Request(kind, wire.BROADCAST, address, size, nodes=nodes)
+    if kind == "sync_write":
+        size = min(size, 8)
+        return Request(kind, wire.BROADCAST, address, data=random.randbytes(size * len(nodes)), nodes=nodes)
+    return Request(kind, wire.BROADCAST if kind == "action" else node)
+
+
+def _answer(request: Request) -> bytes:
+    """What a servo would say; no packet has more than 259 bytes."""
+    if request.kind in ("sync_write", "action"):
+        return b""
+    return b"".join(wire.encode_status(node, 0, bytes(length - wire.OVERHEAD)) for node, length in request.due())
+
+
+def classes(decoder: Decoder, case: Case, sent: str) -> set[str]:
+    """Why these are not our bytes; empty where they are."""
+    ours = case.request.packet()
+    if bytes.fromhex(sent) == ours:
+        return set()
+    if not sent and len(ours) > SDK_LONGEST:
+        return {"frame-of-250"}
+    return {UNEXPLAINED}
+
+
+def sdo_requests(seed: int, count: int) -> Iterator[SdoCase]:
+    """Uploads and downloads of any object, acknowledged; every tenth is not answered at all."""
+    random = Random(seed)
+    for _ in range(count):
+        index, subindex = random.randrange(0x10000), random.randrange(256)
+        data = random.randbytes(random.randrange(1, 5))
+        if random.random() < 0.5:
+            request = SdoRequest("upload", NODE, index, subindex)
+            frame = sdo.encode_upload_reply(NODE, index, subindex, data)
+        else:
+            request = SdoRequest("download", NODE, index, subindex, data)
+            frame = sdo.encode_download_reply(NODE, index, subindex)
+        silent = random.random() < 0.1
+        yield SdoCase(request, () if silent else (((frame.id, frame.data),),), "a request")
+
+
+def sdo_classes(case: SdoCase, sent: list[Any]) -> set[str]:
+    """Why these are not our frames; empty where they are."""
+    ours = packet(case.request)
+    first, *rest = ((identifier, bytes.fromhex(data)) for identifier, data in sent)
+    if first != (ours.id, ours.data):
+        return {UNEXPLAINED}
+    names = set()
+    if case.request.kind == "download":
+        names.add("length-stated")
+        plain = sdo.encode_download(NODE, case.request.index, case.request.subindex, case.request.data)
+        if (plain.id, plain.data[1:]) != (first[0], first[1][1:]):
+            return {UNEXPLAINED}
+    if rest:
+        abort = sdo.encode_abort(NODE, 0, 0, 0x0504_0000)
+        names.add("abort-of-silence" if not case.steps and rest == [(abort.id, abort.data)] else UNEXPLAINED)
+    return names

@@ -1,0 +1,348 @@
+"""Scripted harm: exactly this byte, exactly this way, and a record of it that does the same again."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motorbus.core.operation import CanFrame, Data
+from motorbus.errors import RequestError
+from motorbus.link.base import Delivery, Side
+from motorbus.simulation.faults import WORDS, Fault, FaultyLine, Script
+from motorbus.simulation.faults.line import BROKEN
+from tests.simulation.faults.scripts import faults
+
+REPLY = bytes.fromhex("FF FF 01 02 00 FC")
+WHOLE = [(0.0, "FF FF 01 02 00 FC")]
+FRAME = CanFrame(0x581, bytes.fromhex("43 03 60 00 11 22 33 44"))
+
+
+def carried(line: FaultyLine, data: bytes = REPLY, at: float = 1.0) -> list[tuple[float, str]]:
+    """What the host gets of a reply, with how much later."""
+    got = []
+    for delivery in line.carry(Side.DEVICE, data, at):
+        assert delivery.to is Side.HOST
+        assert isinstance(delivery.data, bytes)
+        got.append((round(delivery.at - at, 9), delivery.data.hex(" ").upper()))
+    return got
+
+
+def asked(script: str, exchange: int = 1) -> FaultyLine:
+    line = FaultyLine(script)
+    for _ in range(exchange):
+        line.carry(Side.HOST, b"\x01\x02\x03", 0.5)
+    return line
+
+
+@pytest.mark.parametrize(
+    ("action", "got"),
+    [
+        ("drop", [(0.0, "FF FF 01 00 FC")]),
+        ("duplicate", [(0.0, "FF FF 01 02 02 00 FC")]),
+        ("corrupt 80", [(0.0, "FF FF 01 82 00 FC")]),
+        ("flip 0", [(0.0, "FF FF 01 03 00 FC")]),
+        ("insert 00", [(0.0, "FF FF 01 00 02 00 FC")]),
+        ("truncate", [(0.0, "FF FF 01")]),
+        ("delay 0.02", [(0.0, "FF FF 01"), (0.02, "02 00 FC")]),
+        ("stall 0.02", [(0.0, "FF FF 01"), (0.02, "02 00 FC")]),
+        ("split", [(0.0, "FF FF 01"), (0.001, "02 00 FC")]),
+        ("split 0.1", [(0.0, "FF FF 01"), (0.1, "02 00 FC")]),
+        ("reorder", [(0.0, "FF FF 01 00 02 FC")]),
+    ],
+)
+def test_each_harm_at_byte_3(action: str, got: list[tuple[float, str]]) -> None:
+    line = asked(f"exchange 1 byte 3: {action}")
+    assert carried(line) == got
+    assert [(fired.at, fired.fault, fired.to, fired.data) for fired in line.fired] == [
+        (1.0, f"exchange 1 byte 3: {action}", Side.HOST, REPLY)
+    ]
+    assert line.pending == ()
+    assert str(line.record) == f"exchange 1 byte 3: {action}"
+    assert carried(asked("", 2)) == WHOLE
+
+
+@pytest.mark.parametrize(
+    ("action", "first", "second"),
+    [
+        ("drop", [], WHOLE),
+        ("duplicate", WHOLE * 2, WHOLE),
+        ("delay 0.02", [(0.02, "FF FF 01 02 00 FC")], [(0.02, "FF FF 01 02 00 FC")]),
+        ("stall 0.02", [(0.02, "FF FF 01 02 00 FC")], [(0.02, "FF FF 01 02 00 FC")]),
+        ("reorder", [], WHOLE * 2),
+        ("reorder 0.5", [(0.5, "FF FF 01 02 00 FC")], WHOLE),
+        ("merge", [], [(0.0, "FF FF 01 02 00 FC FF FF 01 02 00 FC")]),
+        (
+            "split",
+            [(i / 1000, byte) for i, byte in enumerate(["FF", "FF", "01", "02", "00", "FC"])],
+            [(0.005, WHOLE[0][1])],
+        ),
+    ],
+)
+def test_each_harm_to_a_packet(
+    action: str, first: list[tuple[float, str]], second: list[tuple[float, str]]
+) -> None:
+    line = asked(f"exchange 1: {action}")
+    assert carried(line) == first
+    assert carried(line) == second
+    assert carried(line, at=9.0) == WHOLE
+    assert str(line.record) == f"exchange 1: {action}"
+
+
+@pytest.mark.parametrize("action", ["corrupt", "flip", "insert", "truncate"])
+def test_a_packet_without_a_byte_suffers_at_one_that_chance_takes(action: str) -> None:
+    line = asked(f"exchange 1: {action}")
+    assert (hurt := carried(line)) != WHOLE
+    (fault,) = line.record
+    assert fault.byte is not None
+    again = FaultyLine(line.record)
+    again.carry(Side.HOST, b"\x01\x02\x03", 0.5)
+    assert carried(again) == hurt
+
+
+def test_an_echo_comes_to_the_host_and_does_not_count() -> None:
+    line = FaultyLine("exchange 1: echo; exchange 2: echo 2; exchange 2 byte 5: drop")
+    assert line.carry(Side.HOST, b"\x01\x02\x03", 0.0) == [
+        Delivery(0.0, Side.HOST, b"\x01\x02\x03"),
+        Delivery(0.0, Side.DEVICE, b"\x01\x02\x03"),
+    ]
+    assert line.carry(Side.HOST, b"\x01\x02\x03", 0.0)[0] == Delivery(0.0, Side.HOST, b"\x01\x02")
+    assert carried(line) == [(0.0, "FF FF 01 02 00")]
+
+
+def test_the_nth_packet_of_an_exchange() -> None:
+    line = asked("exchange 1 packet 2: drop")
+    assert [carried(line), carried(line), carried(line)] == [WHOLE, [], WHOLE]
+
+
+def test_what_devices_say_before_the_host_says_anything_is_exchange_0() -> None:
+    line = FaultyLine("exchange 0 packet 2: drop")
+    assert [carried(line), carried(line)] == [WHOLE, []]
+
+
+def test_only_its_own_exchange_suffers() -> None:
+    line = FaultyLine("exchange 2 byte 0: truncate")
+    for exchange in (1, 2, 3):
+        line.carry(Side.HOST, b"\x01", 0.0)
+        assert carried(line) == ([] if exchange == 2 else WHOLE)
+    assert line.exchange == 3
+
+
+def test_toward_the_device() -> None:
+    line = FaultyLine("exchange 1 byte 1 to device: corrupt FF")
+    assert line.carry(Side.HOST, b"\x01\x02\x03", 2.0) == [Delivery(2.0, Side.DEVICE, b"\x01\xfd\x03")]
+    assert carried(line) == WHOLE
+
+
+def test_bytes_count_through_the_whole_exchange() -> None:
+    line = asked("exchange 1 byte 7: drop")
+    assert carried(line) == WHOLE
+    assert carried(line) == [(0.0, "FF 01 02 00 FC")]
+
+
+def test_truncating_and_delaying_last_to_the_end_of_the_exchange() -> None:
+    line = asked("exchange 1 byte 4: truncate")
+    assert carried(line) == [(0.0, "FF FF 01 02")]
+    assert carried(line) == []
+    line = asked("exchange 1 byte 0: delay 0.5")
+    assert carried(line) == carried(line) == [(0.5, "FF FF 01 02 00 FC")]
+    line.carry(Side.HOST, b"\x01", 0.0)
+    assert carried(line, at=1.2) == [(0.3, "FF FF 01 02 00 FC")]  # it does not overtake what is still to come
+    assert carried(line, at=1.6) == WHOLE
+
+
+def test_a_stall_holds_both_ways() -> None:
+    line = asked("exchange 1: stall 0.5")
+    carried(line)
+    assert line.carry(Side.HOST, b"\x01", 1.1) == [Delivery(1.5, Side.DEVICE, b"\x01")]
+    assert carried(line, at=1.2) == [(0.3, "FF FF 01 02 00 FC")]
+    assert line.carry(Side.HOST, b"\x01", 1.6) == [Delivery(1.6, Side.DEVICE, b"\x01")]
+
+
+def test_insert_behind_the_last_byte_happens_once() -> None:
+    line = asked("exchange 1 byte 6: insert AA")
+    assert carried(line) == [(0.0, "FF FF 01 02 00 FC AA")]
+    assert carried(line) == WHOLE
+
+
+@pytest.mark.parametrize("script", ["exchange 1 byte 6: drop", "exchange 1 byte 5: reorder"])
+def test_other_harm_behind_the_last_byte_waits_for_a_byte(script: str) -> None:
+    line = asked(script)
+    assert carried(line) == WHOLE
+    assert len(line.pending) == 1
+    assert line.fired == []
+
+
+@pytest.mark.parametrize(
+    ("script", "got"),
+    [
+        ("exchange 1 byte 5: corrupt 01; exchange 1 byte 5: duplicate", "FF FF 01 02 00 FD FD"),
+        ("exchange 1 byte 5: drop; exchange 1 byte 5: insert 11", "FF FF 01 02 00 11"),
+        ("exchange 1 byte 5: drop; exchange 1 byte 5: corrupt 11", "FF FF 01 02 00"),
+        ("exchange 1 byte 4: insert 11; exchange 1 byte 2: drop", "FF FF 02 11 00 FC"),
+        ("exchange 1 byte 3: reorder; exchange 1 byte 4: corrupt FF", "FF FF 01 00 FD FC"),
+        ("exchange 1 byte 3: drop; exchange 1 byte 3: reorder", "FF FF 01 00 FC"),
+    ],
+)
+def test_several_at_once_in_the_order_of_the_bytes_and_of_the_script(script: str, got: str) -> None:
+    line = asked(script)
+    assert carried(line) == [(0.0, got)]
+    assert len(line.fired) == 2
+
+
+def test_the_same_fault_twice_happens_twice() -> None:
+    line = asked("exchange 1 byte 0: insert 00; exchange 1 byte 0: insert 00")
+    assert carried(line) == [(0.0, "00 00 FF FF 01 02 00 FC")]
+    assert len(line.fired) == 2
+
+
+def test_what_waits_in_the_adapter_stays_there_while_nothing_comes() -> None:
+    line = asked("exchange 1: merge; exchange 2: drop")
+    assert carried(line) == []
+    line.carry(Side.HOST, b"\x01", 2.0)
+    assert carried(line) == []
+    line.carry(Side.HOST, b"\x01", 3.0)
+    assert carried(line, at=3.0) == [(0.0, "FF FF 01 02 00 FC FF FF 01 02 00 FC")]
+
+
+@pytest.mark.parametrize(
+    ("script", "got"),
+    [
+        ("exchange 1: drop", []),
+        ("exchange 1: duplicate", [FRAME, FRAME]),
+        ("exchange 1: split", [FRAME]),
+        ("exchange 1: corrupt", [BROKEN]),
+        ("exchange 1: flip", [BROKEN]),
+        ("exchange 1 byte 4: corrupt FF", [FRAME._replace(data=bytes.fromhex("43 03 60 00 EE 22 33 44"))]),
+        ("exchange 1 byte 4: drop", [FRAME._replace(data=bytes.fromhex("43 03 60 00 22 33 44"))]),
+        ("exchange 1 byte 4: insert 77", [FRAME._replace(data=bytes.fromhex("43 03 60 00 77 11 22 33"))]),
+        ("exchange 1 byte 4: truncate", [FRAME._replace(data=bytes.fromhex("43 03 60 00"))]),
+        ("exchange 1 byte 8: drop", [FRAME]),
+    ],
+)
+def test_of_a_can_frame_the_data_bytes_count(script: str, got: list[CanFrame]) -> None:
+    line = FaultyLine(script)
+    assert line.carry(Side.HOST, FRAME, 0.0) == [Delivery(0.0, Side.DEVICE, FRAME)]
+    assert line.carry(Side.DEVICE, FRAME, 1.0) == [Delivery(1.0, Side.HOST, frame) for frame in got]
+
+
+def test_frames_wait_for_each_other_too() -> None:
+    line = asked("exchange 1: merge; exchange 1 packet 2: delay 0.5; exchange 2: reorder")
+    other = FRAME._replace(id=0x582)
+    assert line.carry(Side.DEVICE, FRAME, 1.0) == []
+    assert line.carry(Side.DEVICE, other, 1.0) == [Delivery(1.5, Side.HOST, one) for one in (FRAME, other)]
+    line.carry(Side.HOST, FRAME, 2.0)
+    assert line.carry(Side.DEVICE, FRAME, 2.0) == []
+    assert line.carry(Side.DEVICE, other, 2.0) == [Delivery(2.0, Side.HOST, one) for one in (other, FRAME)]
+
+
+def test_at_a_moment_it_is_the_first_packet_from_then_on() -> None:
+    line = FaultyLine("at 2.5 s: drop")
+    line.carry(Side.HOST, b"\x01", 0.0)
+    assert carried(line, at=2.4) == WHOLE
+    assert len(line.pending) == 1
+    assert carried(line, at=2.6) == []
+    assert carried(line, at=2.7) == WHOLE
+    assert str(line.record) == "exchange 1 packet 2: drop"
+
+
+def test_one_in_a_hundred_is_about_that_many_and_another_seed_takes_others() -> None:
+    struck = []
+    for seed in (1, 2):
+        line = FaultyLine(f"seed {seed}; 1% of bytes: corrupt; 2%: delay 0.02-0.5; 3% to device: drop")
+        for exchange in range(4000):
+            line.carry(Side.HOST, b"\x01\x02", float(exchange))
+            line.carry(Side.DEVICE, REPLY, float(exchange))
+        assert 180 < line.counts["corrupt"] < 300
+        assert 50 < line.counts["delay"] < 115
+        assert 85 < line.counts["drop"] < 160
+        assert line.count == len(line.fired) == len(line.record)
+        struck.append(str(line.record))
+    assert struck[0] != struck[1]
+
+
+def test_every_packet_at_a_hundred_percent() -> None:
+    line = FaultyLine("100%: duplicate")
+    line.carry(Side.HOST, b"\x01", 0.0)
+    assert carried(line) == carried(line) == WHOLE * 2
+
+
+def test_a_fault_that_is_taken_out_leaves_the_chance_of_the_others() -> None:
+    def delays(script: str) -> list[str]:
+        line = FaultyLine(script)
+        for exchange in range(300):
+            line.carry(Side.HOST, b"\x01", float(exchange))
+            line.carry(Side.DEVICE, REPLY, float(exchange))
+        return [str(one) for one in line.record if one.action == "delay"]
+
+    assert delays("seed 5; 10%: drop; 10%: delay 0.1-0.9") == delays("seed 5; 10%: delay 0.1-0.9") != []
+
+
+def test_only_the_latest_are_kept_when_asked() -> None:
+    line = FaultyLine("100%: duplicate", most=10)
+    for exchange in range(100):
+        line.carry(Side.HOST, b"\x01", float(exchange))
+        line.carry(Side.DEVICE, REPLY, float(exchange))
+    assert line.count == 100
+    assert 10 <= len(line.fired) < 20
+    assert line.fired[-1].fault == "exchange 100: duplicate"
+
+
+def test_what_happens_to_a_bus_needs_one() -> None:
+    for name, word in WORDS.items():
+        if word.world:
+            with pytest.raises(RequestError, match="there is none"):
+                FaultyLine([Fault(1, None, name, seconds=1.0, node=1)])
+
+
+def test_what_is_for_the_text_of_an_adapter_is_for_another_line() -> None:
+    script = "exchange 1 on adapter: drop; exchange 2: drop"
+    assert [str(fault) for fault in FaultyLine(script).faults] == ["exchange 2: drop"]
+    assert [str(fault) for fault in FaultyLine(script, adapter=True).faults] == [
+        "exchange 1 on adapter: drop"
+    ]
+
+
+WIRE = [name for name, word in WORDS.items() if not word.world]
+FRAMES = st.builds(CanFrame, st.integers(0, 0x7FF), st.binary(max_size=8))
+TRAFFIC = st.lists(st.tuples(st.sampled_from(Side), st.floats(0, 3)), max_size=20)
+
+
+def passed(line: FaultyLine, traffic: list[tuple[Side, Data, float]]) -> list[Delivery]:
+    now, got = 0.0, []
+    for sender, data, pause in traffic:
+        now += pause
+        got += line.carry(sender, data, now)
+    return got
+
+
+@given(
+    st.lists(faults(*WIRE), max_size=6),
+    st.integers(0, 1000),
+    TRAFFIC,
+    st.data(),
+)
+def test_the_record_does_the_same_again(
+    script: list[Fault], seed: int, course: list[tuple[Side, float]], data: st.DataObject
+) -> None:
+    kind: st.SearchStrategy[Data] = data.draw(st.sampled_from([FRAMES, st.binary(min_size=1, max_size=12)]))
+    traffic = [(sender, data.draw(kind), pause) for sender, pause in course]
+    line = FaultyLine(Script(tuple(script), seed))
+    got = passed(line, traffic)
+    again = FaultyLine(str(line.record))
+    assert passed(again, traffic) == got
+    assert str(again.record) == str(line.record)
+    assert passed(FaultyLine(str(line)), traffic) == got
+    assert len(again.fired) == line.count == len(line.fired)
+
+
+@given(st.lists(faults(*WIRE), max_size=20), st.lists(st.binary(min_size=1, max_size=20), max_size=10))
+def test_what_has_a_place_fires_once_or_is_pending(script: list[Fault], traffic: list[bytes]) -> None:
+    placed = [fault for fault in script if not fault.percent and not fault.adapter]
+    line = FaultyLine(placed)
+    for data in traffic:
+        line.carry(Side.HOST, data, 0.0)
+        for delivery in line.carry(Side.DEVICE, data, 0.0):
+            assert delivery.at >= 0.0
+    assert len(line.fired) + len(line.pending) == len(placed)
+    assert all((fault.exchange or 0) <= len(traffic) for fault in placed if fault not in line.pending)
