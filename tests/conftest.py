@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -84,12 +83,25 @@ def _is_quick(item: pytest.Item) -> bool:
     return _is_usual(item) and (inside or item.get_closest_marker("quick") is not None)
 
 
+class Rounds(Protocol):
+    """How often to repeat: the full count in the long runs, else at most as often as is usual."""
+
+    def __call__(self, full: int, usual: int = USUAL_ROUNDS) -> int: ...
+
+
 @pytest.fixture(scope="session")
-def rounds(pytestconfig: pytest.Config) -> Callable[[int], int]:
-    """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`."""
-    most = {"soak": None, "test": USUAL_ROUNDS, "quick": QUICK_ROUNDS}[_profile(pytestconfig)]
-    most = QUICK_ROUNDS if pytestconfig.getoption("--faults-off") else most
-    return lambda full: full if most is None else min(full, most)
+def rounds(pytestconfig: pytest.Config) -> Rounds:
+    """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`, 10 000 at most in `make test`.
+
+    What takes long may say that fewer are usual: `rounds(100_000, 2_500)`.
+    """
+    few = pytestconfig.getoption("--faults-off") or _profile(pytestconfig) == "quick"
+
+    def count(full: int, usual: int = USUAL_ROUNDS) -> int:
+        most = full if _profile(pytestconfig) == "soak" else usual
+        return min(full, most, QUICK_ROUNDS if few else most)
+
+    return count
 
 
 class Figures(Protocol):

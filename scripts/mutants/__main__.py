@@ -4,6 +4,7 @@
     python -m scripts.mutants kst-wire journal       some
     python -m scripts.mutants safety --only fence.py  only faults with this text in their name
     python -m scripts.mutants safety --sample 0.1    a tenth of the faults, always the same one
+    python -m scripts.mutants kst-wire --json x.json, then --again x.json   what survived, once more
     python -m scripts.mutants --keep                 all, and docs/reference/mutants.* made of it
     python -m scripts.mutants --write | --check      the page of what is kept: make it, or see that it is current
 
@@ -38,7 +39,9 @@ def main() -> int:
         found[name] = verdicts = _tried(known[name], told)
         result = outcome(verdicts)
         whole = told.sample == 1 and not told.only
-        failed |= bool(_say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole))
+        failed |= bool(
+            _say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole)
+        )
         if told.keep and whole:
             keep(name, result)
     if told.json:
@@ -56,11 +59,19 @@ def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
             print(f"  {time.monotonic() - begun:5.0f} s  {text}", file=sys.stderr, flush=True)
 
     print(subject.name, file=sys.stderr)
-    verdicts = trial(subject, Wish(told.sample, told.only, told.anew, told.jobs, tell))
+    verdicts = trial(subject, Wish(told.sample, told.only, told.anew, told.jobs, _known(subject, told), tell))
     result = outcome(verdicts)
     took = time.monotonic() - begun
-    print(f"{subject.name}: {result['noticed']} of {result['faults']} faults noticed ({share(result)}) in {took:.0f} s")
+    print(
+        f"{subject.name}: {result['noticed']} of {result['faults']} faults noticed ({share(result)}) in {took:.0f} s"
+    )
     return verdicts
+
+
+def _known(subject: Subject, told: argparse.Namespace) -> dict[str, str]:
+    """What an earlier run has seen noticed."""
+    before = json.loads(Path(told.again).read_text(encoding="utf-8")) if told.again else {}
+    return {fault: by for fault, by in before.get(subject.name, ()) if by}
 
 
 def _say(subject: Subject, told: dict[str, Any], *, whole: bool = True) -> list[str]:
@@ -72,13 +83,16 @@ def _say(subject: Subject, told: dict[str, Any], *, whole: bool = True) -> list[
 
 
 def _asked() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m scripts.mutants", description=(__doc__ or "").split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m scripts.mutants", description=(__doc__ or "").split("\n")[0]
+    )
     parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
     parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
     parser.add_argument("--only", default="", help="a text that the name of a fault must have")
     parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--json", default="", help="a file for every verdict")
+    parser.add_argument("--again", default="", help="such a file: only what survived there is tried")
     parser.add_argument("--keep", action="store_true", help="keep the result and make the page")
     parser.add_argument("--write", action="store_true", help="make the page of what is kept")
     parser.add_argument("--check", action="store_true", help="see that the page is made of what is kept")

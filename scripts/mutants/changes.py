@@ -16,8 +16,25 @@ from typing import Any, NamedTuple
 WIDEST = 72
 """Characters of source that a name shows at most."""
 NAMELESS = re.compile(r"\S*")
-TYPING = {"TypeVar", "ParamSpec", "NewType", "TypeAlias", "TYPE_CHECKING", "__slots__", "__all__", "__match_args__"}
-LEFT_ALONE = ("annotation", "returns", "decorator_list", "bases", "keywords_of_class", "format_spec", "type_params")
+TYPING = {
+    "TypeVar",
+    "ParamSpec",
+    "NewType",
+    "TypeAlias",
+    "TYPE_CHECKING",
+    "__slots__",
+    "__all__",
+    "__match_args__",
+}
+LEFT_ALONE = (
+    "annotation",
+    "returns",
+    "decorator_list",
+    "bases",
+    "keywords_of_class",
+    "format_spec",
+    "type_params",
+)
 
 Swapped = dict[type[ast.AST], tuple[type[ast.AST], ...]]
 COMPARISONS: Swapped = {
@@ -61,12 +78,12 @@ class Mutant(NamedTuple):
     swapped: bool
     parent: ast.AST
     field: str
-    index: int | None
+    at: int | None
     new: object
 
     def put(self) -> object:
         """Change the tree, and give what was there before."""
-        return _put(self.parent, self.field, self.index, self.new)
+        return _put(self.parent, self.field, self.at, self.new)
 
     def code(self, tree: ast.Module, path: str) -> Any:
         """The module with this fault, compiled; the tree is left as it was."""
@@ -74,7 +91,7 @@ class Mutant(NamedTuple):
         try:
             return compile(ast.fix_missing_locations(tree), path, "exec")
         finally:
-            _put(self.parent, self.field, self.index, before)
+            _put(self.parent, self.field, self.at, before)
 
 
 def mutants(tree: ast.Module) -> list[Mutant]:
@@ -137,6 +154,7 @@ class _Walk:
         old = _put(node, field, index, new)
         after = "nothing" if isinstance(new, ast.Pass) else _text(new if shown is child else shown)
         _put(node, field, index, old)
+        before, after = _cut(before, after)
         where = ".".join(self.names)
         name = f"{where}: {before} → {after}" if where else f"{before} → {after}"
         return Mutant(name, self._lines(child), self.inside > 0, node, field, index, new)
@@ -167,8 +185,19 @@ class _Walk:
 
 
 def _text(node: object) -> str:
-    text = " ".join(ast.unparse(node).split()) if isinstance(node, ast.AST) else str(node)
-    return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
+    return " ".join(ast.unparse(node).split()) if isinstance(node, ast.AST) else str(node)
+
+
+def _cut(before: str, after: str) -> tuple[str, str]:
+    """Both as long as a name may show, around the place where they begin to differ."""
+    alike = next((at for at, (one, two) in enumerate(zip(before, after, strict=False)) if one != two), 0)
+    start = max(0, alike - WIDEST // 2) if max(len(before), len(after)) > WIDEST else 0
+    return _window(before, start), _window(after, start)
+
+
+def _window(text: str, start: int) -> str:
+    end = start + WIDEST
+    return f"{'...' if start else ''}{text[start:end]}{'...' if len(text) > end else ''}"
 
 
 def _left_alone(node: ast.AST) -> bool:
@@ -177,7 +206,9 @@ def _left_alone(node: ast.AST) -> bool:
             return True
         case ast.AnnAssign(annotation=ast.Name(id="TypeAlias")):
             return True
-        case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)) if name in TYPING:
+        case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)) if (
+            name in TYPING
+        ):
             return True
         case ast.Assign(value=ast.Call(func=ast.Name(id=name))) if name in TYPING:
             return True

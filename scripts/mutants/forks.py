@@ -104,7 +104,7 @@ def _result(child: Child) -> Any:
     """What it said; whatever it has left behind ends with it."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child.pid, signal.SIGKILL)
-    _, status = os.waitpid(child.pid, 0)
+    os.waitpid(child.pid, 0)
     os.close(child.pipe)
     try:
         return pickle.loads(b"".join(child.said))

@@ -66,7 +66,9 @@ class Order:
             lines = ((fault.path, line) for line in fault.mutant.lines)
             found = set[str]().union(*(self._by_line[line] for line in lines))
         else:
-            found = set[str]().union(*(tests for line, tests in self._by_line.items() if line[0] == fault.path))
+            found = set[str]().union(
+                *(tests for line, tests in self._by_line.items() if line[0] == fault.path)
+            )
         return sorted(found, key=lambda name: (-self.kills[name], self.lasted[name], name))
 
 
@@ -231,7 +233,7 @@ class _Traced:
 
     def __exit__(self, *_: object) -> None:
         sys.settrace(None)
-        threading.settrace(None)  # type: ignore[arg-type]
+        threading.settrace(None)
 
     def _call(self, frame: FrameType, event: str, argument: object) -> Any:
         return self._line if frame.f_code.co_filename in self.files else None
@@ -258,7 +260,9 @@ class Anew(_Tests):
         sys.meta_path.insert(0, changed)
         sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
         try:
-            importlib.import_module(changed.module)  # before pytest has a hook of its own, which would come first
+            importlib.import_module(
+                changed.module
+            )  # before pytest has a hook of its own, which would come first
         except Exception as error:
             return f"import: {type(error).__name__}"
         files = list(dict.fromkeys(name.split("::")[0] for name in self.names))
@@ -279,7 +283,9 @@ class _Changed(MetaPathFinder):
 
     def __init__(self, fault: Fault) -> None:
         self.fault = fault
-        self.module = fault.file.removeprefix("src/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+        self.module = (
+            fault.file.removeprefix("src/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+        )
 
     def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
         """Its loader, when it is this one."""

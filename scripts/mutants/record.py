@@ -77,15 +77,25 @@ def page(subjects: dict[str, Subject], known: dict[str, Any]) -> str:
     """The whole page."""
     both = [(subject, known[name]) for name, subject in subjects.items() if name in known]
     columns = ("module", "files", "faults", "noticed", "share", "survive", "date", "Python")
-    return "\n".join(
-        [HEAD, *listed(columns, map(_row, *zip(*both, strict=True))), *(line for one in both for line in _section(*one))]
-    )
+    lines = [HEAD, *listed(columns, (_row(*one) for one in both))]
+    for one in both:
+        lines += _section(*one)
+    return "\n".join(lines)
 
 
 def _row(subject: Subject, told: dict[str, Any]) -> list[object]:
     files = f"`{_common(subject)}`"
     alive = len(told["survivors"])
-    return [subject.name, files, told["faults"], told["noticed"], share(told), alive, told["date"], told["python"]]
+    return [
+        subject.name,
+        files,
+        told["faults"],
+        told["noticed"],
+        share(told),
+        alive,
+        told["date"],
+        told["python"],
+    ]
 
 
 def _common(subject: Subject) -> str:
@@ -96,7 +106,9 @@ def _common(subject: Subject) -> str:
 def _section(subject: Subject, told: dict[str, Any]) -> Iterator[str]:
     if told["survivors"]:
         yield f"## {subject.name}\n"
-        rows = ((_code(name), subject.reasons.get(name, "**not explained yet**")) for name in told["survivors"])
+        rows = (
+            (_code(name), subject.reasons.get(name, "**not explained yet**")) for name in told["survivors"]
+        )
         yield from listed(("fault", "why no test notices it"), rows)
 
 

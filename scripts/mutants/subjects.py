@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import random
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,12 +54,16 @@ class Verdict(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """How much is tried and how: a part of it by chance (0 to 1), names with a text in them, all imported anew."""
+    """How much is tried and how: a part of it by chance (0 to 1), names with a text in them, all imported anew.
+
+    `known` are tests that have noticed faults in an earlier run, by the faults; these are not tried again.
+    """
 
     sample: float = 1.0
     only: str = ""
     anew: bool = False
     at_once: int = 2
+    known: Mapping[str, str] = {}
     tell: Callable[[str], None] = lambda _: None
 
 
@@ -72,7 +76,8 @@ def subjects() -> dict[str, Subject]:
 def _subject(name: str, told: dict[str, object]) -> Subject:
     files, tests = (_found(name, told[key]) for key in ("files", "tests"))
     longest, reasons = told.get("longest", 0.5), told.get("survivors", {})
-    assert isinstance(longest, float) and isinstance(reasons, dict)
+    assert isinstance(longest, float)
+    assert isinstance(reasons, dict)
     return Subject(name, files, tests, longest, reasons)
 
 

@@ -19,15 +19,17 @@ LONG = 36_000.0
 
 def trial(subject: Subject, wish: Wish) -> list[Verdict]:
     """A verdict on every fault. Raises RuntimeError when a test fails without any."""
-    told = faults(subject, wish)
+    everything = faults(subject, wish)
+    before = [Verdict(one.name, wish.known[one.name]) for one in everything if one.name in wish.known]
+    told = [one for one in everything if one.name not in wish.known]
     with tempfile.TemporaryDirectory(dir=_memory()) as scratch:
         swapped = [one for one in told if one.mutant.swapped and not wish.anew]
         seen, found = _alone(lambda: Gathered(subject, wish, scratch).judge(swapped))
         _import_others(seen)
         noticed = [one for one in found if one.by]
         found = noticed + _anew(subject, told, noticed, seen, wish, scratch)
-    order = {one.name: at for at, one in enumerate(told)}
-    return sorted(found, key=lambda verdict: order[verdict.fault])
+    order = {one.name: at for at, one in enumerate(everything)}
+    return sorted(before + found, key=lambda verdict: order[verdict.fault])
 
 
 def _anew(
@@ -60,10 +62,10 @@ def _memory() -> str | None:
 
 def _alone(work: Callable[[], Any]) -> Any:
     """The result of this, done in a child. Raises RuntimeError for what hindered it."""
-    for _, said in each([work], lambda work: work(), LONG, at_once=1):
-        if not said or isinstance(said, str):
-            raise RuntimeError(said or "the tests could not be run")
-        return said
+    ((_, said),) = each([work], lambda work: work(), LONG, at_once=1)
+    if not said or isinstance(said, str):
+        raise RuntimeError(said or "the tests could not be run")
+    return said
 
 
 def _import_others(seen: Seen) -> None:

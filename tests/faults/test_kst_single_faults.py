@@ -14,7 +14,7 @@ from motorbus.errors import MotorbusError
 from motorbus.link.base import Side
 from tests.conftest import Figures
 from tests.faults.frames import LATE, FrameFault, FrameLine, every_fault
-from tests.faults.kst_kinds import KINDS, NODE, Kind, KstRig
+from tests.faults.kst_kinds import KINDS, NODE, Kind, KstRig, read_segments
 from tests.faults.single import suffer
 
 LEFT_ALONE = 0.002
@@ -30,6 +30,16 @@ def frames_of(kind: Kind) -> dict[Side, int]:
     return line.counts
 
 
+def _disordered(kind: Kind, fault: FrameFault) -> bool:
+    """Would a request come behind one of a later call, to everyone, or amid the segments of another transfer?
+
+    Frames of one identifier never do so on CAN; where that would only make an exchange fail, it is tried all the same.
+    """
+    if fault.kind != "swapped" or fault.to is Side.HOST:
+        return False
+    return kind.act is read_segments or not kind.alone
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_l1_l2_each_fault_of_each_frame_tells_nothing_false(name: str, figures: Figures) -> None:
     kind = KINDS[name]
@@ -42,9 +52,8 @@ def test_l1_l2_each_fault_of_each_frame_tells_nothing_false(name: str, figures: 
                 kind.act(rig)
         rig.link.advance(fault.seconds or LEFT_ALONE)
 
-    # What everyone was told must not come after what everyone is told next: nobody could say which of the two is meant.
-    last = {FrameFault(to, count - 1, "swapped") for to, count in counts.items()} if not kind.alone else set()
-    faults = [fault for fault in every_fault(counts) if fault not in last]
+    faults = [fault for fault in every_fault(counts) if not _disordered(kind, fault)]
+
     tally = suffer(
         KstRig(kind.profile, **kind.options),
         kind.act,
@@ -56,7 +65,9 @@ def test_l1_l2_each_fault_of_each_frame_tells_nothing_false(name: str, figures: 
     assert tally.faults >= sum(counts.values()) * (2 + len(LATE)) > 0
     late = sum(fault.seconds == max(LATE) for fault in faults)
     if kind.sure:
-        assert tally.succeeded >= tally.faults - late, "what may be said again gets over any but the longest wait"
+        assert tally.succeeded >= tally.faults - late, (
+            "what may be said again gets over any but the longest wait"
+        )
     figures(f"L1 L2 single frame faults, {name}", family="kst", promise=1, **tally.told)
 
 

@@ -33,11 +33,12 @@ def suffered(
     *,
     bytewise: bool = False,
     actions: tuple[str, ...] = (),
+    places: Iterable[int] | None = None,
 ) -> Tally:
     kind = KINDS[model][name]
     faults = [
         fault
-        for fault in every_fault(_length(kind, to), values, to)
+        for fault in every_fault(_length(kind, to), values, to, places)
         if not actions or fault.action in actions
     ]
     tally = suffer(

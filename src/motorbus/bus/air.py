@@ -292,7 +292,8 @@ class Air:
 
         On a byte line both would be the same bytes in one stream, so there the try is lost at once.
         """
-        if not pace.suspects(now - flight.sent_at, least_time(flight.exchange, self.family, self.rate)):
+        due = least_time(flight.exchange, self.family, self.rate, flight.unbelieved)
+        if not pace.suspects(now - flight.sent_at, due):
             return False
         if not isinstance(flight.exchange.request, CanFrame) or len(flight.got) != 1:
             flight.spoiled = "early"

@@ -54,7 +54,6 @@ class _Pumped(Part[Bus]):
         take_in(self.link, turns, -inf)  # the one who pumps may wait for something far away
         return False, 0.0 if turns.settled != known else min(NAP, max(self.due - now, SHORT))
 
-
     def _without(self) -> float:
         """The link is gone: what is due is settled without it; how long (s) until something is."""
         with self.turns.lock:

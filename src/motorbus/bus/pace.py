@@ -8,6 +8,7 @@ no bit time. (Once, the true one may have been lost.)
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from motorbus.core.can_bits import bits, least
@@ -60,9 +61,17 @@ class Pace:
         return self.refuted
 
 
-def least_time(exchange: Exchange[Any], family: Family, rate: int) -> float:
-    """s: the least time in which an answer can be here; a family's air time of frames may count the most bits."""
+def least_time(
+    exchange: Exchange[Any], family: Family, rate: int, without: Collection[int] = ()
+) -> float:
+    """s: the least time in which an answer can be here; a family's air time of frames may count the most bits.
+
+    `without` are nodes that nobody waits for: they may be silent, and then the others are here sooner.
+    """
     request, dues = exchange.request, exchange.replies
+    if without and dues is not ANY:
+        dues = tuple(due for due in dues if due.node not in without)
+        exchange = Exchange(request, dues, timeout=exchange.timeout)
     if not isinstance(request, CanFrame) or dues is ANY:
         return family.air_time(exchange, rate)
     return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / rate

@@ -14,8 +14,9 @@ from __future__ import annotations
 import atexit
 import contextlib
 import json
+import os
 import socket
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
@@ -31,6 +32,7 @@ from motorbus.errors import DeviceError, LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
 
 ROUNDS = 5
+TRIES = 3  # of a stop that is interrupted
 ROUND_TIME = 0.25  # s for all frames of one round, beyond what they need
 BREATH = 0.05  # s; the shortest round after which something is missing
 CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
@@ -94,6 +96,15 @@ class Stopper:
                 self._ready.wait(PATIENCE)
                 atexit.register(self.close)  # a process that ends lets a stop that has begun come to its end
 
+    def move(self, path: Path | None) -> None:
+        """Other processes reach it by this path from now on; None: by none, for the old one is somebody else's."""
+        before = self.socket_path
+        if before is None:
+            return
+        self.socket_path = path or before.with_name(f".{os.getpid()}-{before.name}")
+        with contextlib.suppress(OSError):  # nobody listens there, as where the disk is full
+            before.replace(self.socket_path)
+
     def trigger(self) -> None:
         """Ask for the stop and return at once; safe in a signal handler. Does nothing before `start`."""
         self._wake(STOP)
@@ -117,12 +128,43 @@ class Stopper:
         self._wishes.append(wish)
         self.trigger()
         wish.fulfilled.wait(PATIENCE)
-        return wish.outcome or StopOutcome(
-            (), tuple(self.turns.known), 0, "nothing: the stop thread gave no sign"
-        )
+        return wish.outcome or self._nothing("nothing: the stop thread gave no sign")
 
     def stop(self) -> StopOutcome:
-        """Latch and send the stop frames; runs in the stop thread, or in the caller's where time is virtual."""
+        """Latch and send the stop frames; runs in the stop thread, or in the caller's where time is virtual.
+
+        Who is interrupted meanwhile sends them once more from the beginning; then the interruption is raised.
+        """
+        outcome, interruption = self._insist()
+        if interruption is not None:
+            raise interruption
+        return outcome
+
+    def _insist(self) -> tuple[StopOutcome, BaseException | None]:
+        """Stop, whatever interrupts it; what came of it, and the interruption."""
+        caught: BaseException | None = None
+        for _ in range(TRIES):
+            try:
+                if caught is not None:
+                    self._let_go()
+                return self._stop(), caught
+            except BaseException as interruption:  # dealt with above, where another one is caught too
+                caught = interruption
+        self._let_go()
+        return self._nothing(f"nothing: {type(caught).__name__} cut it short again and again"), caught
+
+    def _let_go(self) -> None:
+        """After an interruption: let go of the lock as often as it is held, and of the bus."""
+        with contextlib.suppress(RuntimeError):  # not held (any more)
+            while True:
+                self.turns.lock.release()
+        with self.turns.lock:
+            self.turns.stopped()
+
+    def _nothing(self, promise: str) -> StopOutcome:
+        return StopOutcome((), tuple(self.turns.known), 0, promise)
+
+    def _stop(self) -> StopOutcome:
         with self.turns.lock:
             frames = self.turns.latch(self.link.now())
         self._back_to_known_rate()
@@ -226,7 +268,7 @@ class Stopper:
     def _serve(self) -> None:
         assert self._pair is not None
         wish = self._pair[0]
-        with _listening(self.socket_path) as listener, DefaultSelector() as ready:
+        with _listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
             ready.register(wish, EVENT_READ)
             if listener is not None:
                 ready.register(listener, EVENT_READ)
@@ -264,7 +306,8 @@ class Stopper:
 
     def _stop_and_tell(self) -> StopOutcome:
         wishes, self._wishes = self._wishes, []
-        self.outcome = outcome = self.stop()
+        outcome, _ = self._insist()
+        self.outcome = outcome
         for wish in wishes:  # who asked after that has woken the thread once more
             wish.outcome = outcome
             wish.fulfilled.set()
@@ -325,8 +368,8 @@ def _answered(exchanges: Iterable[Exchange[Answer]]) -> bool:
 
 
 @contextlib.contextmanager
-def _listening(path: Path | None) -> Iterator[socket.socket | None]:
-    """A local socket at this path, mode 0600, or None where there is none to serve."""
+def _listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[socket.socket | None]:
+    """A local socket at this path, mode 0600, or None where there is none to serve; `now` tells where it is by then."""
     if path is None or not hasattr(socket, "AF_UNIX"):
         yield None
         return
@@ -342,7 +385,7 @@ def _listening(path: Path | None) -> Iterator[socket.socket | None]:
         try:
             yield listener
         finally:
-            path.unlink(missing_ok=True)
+            (now() or path).unlink(missing_ok=True)
 
 
 def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:

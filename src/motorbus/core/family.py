@@ -231,7 +231,8 @@ class SimulatedNode(Protocol):
     What only some have: `set_input(number, active)`. `log`, their latest `Remark`s in order. `notice()`, which lets the
     device say what it says unasked although nothing has caused it. `switch(**changes)`, which changes switches while it
     runs, as far as that makes sense, and gives all such switches as they are then; for an impossible name or value it
-    raises RequestError and has changed nothing.
+    raises RequestError and has changed nothing. `midway()`, when (s) the step by which it stores something is half done,
+    infinity while it stores nothing: a power cut at that moment tears what is stored.
     """
 
     @property
@@ -247,7 +248,8 @@ class Simulator(Protocol):
     """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own.
 
     One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s). One whose
-    devices have inputs takes what happens there as `script(text)`.
+    devices have inputs takes what happens there as `script(text)`. One on whose line there may be two devices with one
+    id takes `duplicate(id)`: from now on there are two.
     """
 
     @property

@@ -26,7 +26,7 @@ from motorbus.link.can_slcan import SlcanWire, command_of, open_slcan
 from motorbus.link.can_socketcand import open_socketcand
 from motorbus.link.can_wire import BusWire, Wire, build
 from motorbus.link.foreign import who_holds
-from motorbus.link.lock import PortLock
+from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, not_found
 from motorbus.link.serial import could_be_a_port, ports
 
@@ -61,7 +61,8 @@ class CanLink:
     back end's constructor takes. `shared`: takes part beside a host of this machine, as simulated devices on a
     SocketCAN interface do, so that one is not locked. Raises RequestError for an unknown interface or option,
     PortNotFound, PortBusy, or LinkError: for a bit rate that this adapter does not really have, a missing driver, a
-    refusal. `lock_name` is the name of the adapter by which it is locked and listens for an emergency stop.
+    refusal. `kept` is a lock that we have already, maybe this one. `lock_name` is the name of the adapter by which it
+    is locked and listens for an emergency stop.
     """
 
     paced = False  # adapters say nothing of when a frame was on the wire
@@ -76,6 +77,7 @@ class CanLink:
         usual: int = 0,
         options: Mapping[str, object] | None = None,
         shared: bool = False,
+        kept: PortLock | None = None,
     ) -> None:
         self.name = port
         self._can = python_can(port)
@@ -88,13 +90,12 @@ class CanLink:
         self._tuning = False
         self._told = (0, 0)
         self.lock_name = _lock_name(self._config)
-        self._lock = PortLock(self.lock_name or port)
-        if self.lock_name and not (shared and self._config.interface == "socketcan"):
-            self._lock.acquire()
+        alone = self.lock_name and not (shared and self._config.interface == "socketcan")
+        self.lock = taken(self.lock_name, kept) if alone else PortLock(self.lock_name or port)
         try:
             self._wire: Wire = self._opened(self.rate, self.listen_only)
         except BaseException:
-            self._lock.release()
+            self.lock.release()
             raise
 
     def _class(self) -> Any:
@@ -193,6 +194,17 @@ class CanLink:
             )
 
     # -- the link -------------------------------------------------------------------------------------------
+
+    @property
+    def device(self) -> str:
+        """The serial port of this machine that the adapter is; "" for any other channel."""
+        serial = self._config.interface in SERIAL_PORTS and "://" not in self.lock_name
+        return self.lock_name if serial else ""
+
+    def port_at(self, device: str) -> str:
+        """The port, as an address says it, where that serial port is called so."""
+        _, at, baud = str(self._config.channel).partition("@")
+        return f"can://{self._config.interface}/{device.lstrip('/')}{at}{baud}"
 
     @property
     def damaged(self) -> int:
@@ -301,7 +313,7 @@ class CanLink:
 
     def close(self) -> None:
         self._wire.close()
-        self._lock.release()
+        self.lock.release()
 
 
 def lock_name(port: str, options: Mapping[str, object]) -> str:

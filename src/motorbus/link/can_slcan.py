@@ -22,7 +22,7 @@ from motorbus.link.can_config import CanConfig
 from motorbus.link.can_port import Descriptor, Port, SerialObject
 from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.can_wire import TextWire, build, quietly
-from motorbus.link.serial import PSEUDO_TERMINALS
+from motorbus.link.identity import PSEUDO_TERMINALS
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
 
 LISTENING: Final = 0.015

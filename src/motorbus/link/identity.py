@@ -1,7 +1,7 @@
 """Which adapter a port belongs to, so that it is found again under another name, and no other one is taken for it.
 
-A name such as /dev/ttyUSB0 goes to whoever is plugged in first. What stays is the serial number of the adapter; where it
-has none, its vendor and product, and the place on the USB to which it is plugged. Two ports in one adapter differ by
+A name such as /dev/ttyUSB0 goes to whoever is plugged in first. What stays is the serial number of the adapter; where
+it has none, its vendor and product, and the place on the USB where it is plugged in. Two ports in one adapter differ by
 their interface. A pseudo-terminal is known by the link that leads to it, for its own number goes to the next terminal.
 """
 

@@ -135,6 +135,15 @@ class PortLock:
                 self.path.unlink(missing_ok=True)
             os.close(descriptor)
 
+    @property
+    def held(self) -> bool:
+        """This process has it, by this."""
+        return self._descriptor is not None
+
+    def lent(self) -> PortLock:
+        """The same right for whoever opens the port meanwhile; its release gives nothing back."""
+        return _Lent(self.port)
+
     def owner(self) -> Owner | None:
         """The process that holds the port now, or None."""
         return _owner(self.path)
@@ -144,6 +153,22 @@ class PortLock:
 
     def __exit__(self, *exc: object) -> None:
         self.release()
+
+
+class _Lent(PortLock):
+    """A lock that another object holds, and goes on holding."""
+
+    def acquire(self) -> Self:
+        return self
+
+
+def taken(port: str, kept: PortLock | None = None) -> PortLock:
+    """The lock of this port, which is ours from now on; `kept` is one that we have, maybe of this port.
+
+    Raises PortBusy, as `PortLock.acquire`.
+    """
+    lock = PortLock(port)
+    return kept.lent() if kept is not None and kept.held and kept.path == lock.path else lock.acquire()
 
 
 def holders() -> list[Owner]:

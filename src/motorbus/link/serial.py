@@ -24,7 +24,8 @@ from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link import adapters
 from motorbus.link.adapters import PortInfo
 from motorbus.link.foreign import who_holds
-from motorbus.link.lock import PortLock
+from motorbus.link.identity import PSEUDO_TERMINALS
+from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, forbidden, full, lost, not_found, wrong_rate
 from motorbus.link.speed import line_speed
 from motorbus.link.tcp import CONNECT_TIME, split_address
@@ -37,7 +38,6 @@ CHUNK = 4096
 TOLERANCE = 0.025  # of the rate; beyond it the stop bit of a byte is missed
 ASK_AGAIN = 0.001  # s between two looks at a port that has no descriptor
 REMOTE_LATENCY = 0.020  # s for an RFC 2217 server: the network, and whatever adapter is at its other end
-PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 MEMORY_DEVICES = 1  # Linux Documentation/admin-guide/devices.txt
 GONE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
 UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
@@ -45,12 +45,15 @@ UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
 
 def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[PortInfo]:
     """The serial ports of this machine, USB adapters first, and what each of them probably is."""
-    if lister is None:
-        import serialx
-
-        lister = serialx.list_serial_ports
-    found = [_about(port) for port in lister()]
+    found = [_about(port) for port in (lister or listed)()]
     return sorted(found, key=lambda port: (port.vid is None, port.device))
+
+
+def listed() -> list[SerialPortInfo]:
+    """The serial ports of this machine, as the system tells of them."""
+    import serialx
+
+    return list(serialx.list_serial_ports())
 
 
 def _about(port: SerialPortInfo) -> PortInfo:
@@ -70,13 +73,15 @@ class SerialLink:
     """A serial port of a POSIX system: a real device or a pseudo-terminal.
 
     Nobody else can open it meanwhile. Raises PortNotFound (naming the ports there are), PortBusy (naming the owner)
-    or LinkError. `sysfs` is where the kernel tells about adapters.
+    or LinkError. `sysfs` is where the kernel tells about adapters; `kept` a lock that we have already, maybe this one.
     """
 
     virtual = False
     simulated = False
 
-    def __init__(self, port: str, *, rate: int, sysfs: Path = Path("/sys")) -> None:
+    def __init__(
+        self, port: str, *, rate: int, sysfs: Path = Path("/sys"), kept: PortLock | None = None
+    ) -> None:
         self.name = port
         self.rate = rate
         self.warnings: tuple[str, ...] = ()
@@ -89,7 +94,7 @@ class SerialLink:
             raise not_found(port, ports())
         if not could_be_a_port(self._device):
             raise LinkError(f"{port} is not a serial port")
-        self._lock = PortLock(port).acquire()
+        self.lock = taken(port, kept)
         try:
             self._open(sysfs)
         except BaseException:
@@ -162,7 +167,7 @@ class SerialLink:
             self._descriptor = -1
             with contextlib.suppress(OSError):
                 serial.close()
-        self._lock.release()
+        self.lock.release()
 
 
 class PolledLink:
@@ -174,7 +179,7 @@ class PolledLink:
     virtual = False
     simulated = False
 
-    def __init__(self, port: str, *, rate: int) -> None:
+    def __init__(self, port: str, *, rate: int, kept: PortLock | None = None) -> None:
         remote = "://" in port
         if remote:
             split_address(port)
@@ -185,11 +190,11 @@ class PolledLink:
         self.warnings: tuple[str, ...] = ()
         self._turn = Lock()
         self._closed = False
-        self._lock = PortLock(port).acquire()
+        self.lock = taken(port, kept)
         try:
             self._serial = _opened(port, port, rate)
         except BaseException:
-            self._lock.release()
+            self.lock.release()
             raise
         _send_at_once(self._serial)
 
@@ -238,18 +243,18 @@ class PolledLink:
         with self._turn, contextlib.suppress(OSError):
             self._closed = True
             self._serial.close()
-        self._lock.release()
+        self.lock.release()
 
     def _check(self) -> None:
         if self._closed:
             raise lost(self.name, "it is closed")
 
 
-def open_serial(port: str, *, rate: int) -> SerialLink | PolledLink:
+def open_serial(port: str, *, rate: int, kept: PortLock | None = None) -> SerialLink | PolledLink:
     """Open a device, a COM port or an rfc2217:// URL. Errors as for `SerialLink`."""
     if "://" in port or os.name == "nt":
-        return PolledLink(port, rate=rate)
-    return SerialLink(port, rate=rate)
+        return PolledLink(port, rate=rate, kept=kept)
+    return SerialLink(port, rate=rate, kept=kept)
 
 
 # -- opening ----------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from motorbus.core.operation import Data
 from motorbus.errors import LinkError, PortNotFound, RequestError
-from motorbus.link.lock import PortLock
+from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import full, lost
 from motorbus.link.waiting import wait_readable
 
@@ -50,7 +50,8 @@ class TcpLink:
     """A raw TCP connection, `socket://host:port`. `rate` is what the line behind it is set to, for its air time.
 
     Raises RequestError for a bad address, PortNotFound when nobody listens there, PortBusy when another motorbus
-    process of this machine has it.
+    process of this machine has it. `kept` is a lock that we have already, maybe this one; a host is waited for so many
+    s of `patience`.
     """
 
     paced = False  # what is behind it cannot be known
@@ -58,15 +59,17 @@ class TcpLink:
     simulated = False
     warnings: tuple[str, ...] = ()
 
-    def __init__(self, url: str, *, rate: int) -> None:
+    def __init__(
+        self, url: str, *, rate: int, kept: PortLock | None = None, patience: float = CONNECT_TIME
+    ) -> None:
         self.name = url
         self.rate = rate
         host, port = split_address(url)
-        self._lock = PortLock(url).acquire()
+        self.lock = taken(url, kept)
         try:
-            self._socket = _connected(url, host, port)
+            self._socket = _connected(url, host, port, patience)
         except BaseException:
-            self._lock.release()
+            self.lock.release()
             raise
         self.latency = LOOPBACK_LATENCY if _is_loopback(self._socket) else NETWORK_LATENCY
 
@@ -110,14 +113,14 @@ class TcpLink:
 
     def close(self) -> None:
         self._socket.close()
-        self._lock.release()
+        self.lock.release()
 
 
-def _connected(url: str, host: str, port: int) -> socket.socket:
+def _connected(url: str, host: str, port: int, patience: float) -> socket.socket:
     try:
-        connection = socket.create_connection((host, port), timeout=CONNECT_TIME)
+        connection = socket.create_connection((host, port), timeout=patience)
     except TimeoutError as error:
-        raise PortNotFound(f"{url}: no answer within {CONNECT_TIME:g} s") from error
+        raise PortNotFound(f"{url}: no answer within {patience:g} s") from error
     except (OSError, UnicodeError) as error:
         raise PortNotFound(
             f"{url} cannot be reached: {error}",

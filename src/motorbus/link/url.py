@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from motorbus.errors import RequestError
 from motorbus.link.base import Link
+from motorbus.link.lock import PortLock
 
 SCHEMES = ("socket://HOST:PORT", "rfc2217://HOST:PORT")
 
@@ -17,27 +18,31 @@ def open_link(
     usual: int = 0,
     kind: str = "bytes",
     options: Mapping[str, object] | None = None,
+    kept: PortLock | None = None,
+    patience: float | None = None,
 ) -> Link:
     """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://…` or `can://INTERFACE/CHANNEL`.
 
     `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
     wants: bytes or frames; `options` are for the CAN adapter. Raises RequestError for what is no port,
-    PortNotFound, PortBusy (naming its owner) or LinkError.
+    PortNotFound, PortBusy (naming its owner) or LinkError. `kept` is a lock that we have already, maybe of this port;
+    `patience` how long (s) the host of a socket is waited for.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
     if scheme == "can" and kind == "frames" and "\0" not in port:
         from motorbus.link.can import CanLink
 
-        return CanLink(port, rate=rate, usual=usual, options=options or {})
+        return CanLink(port, rate=rate, usual=usual, options=options or {}, kept=kept)
     rate = rate or usual
     _check(port, scheme, rate, kind)
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
 
-        return TcpLink(port, rate=rate)
+        more = {} if patience is None else {"patience": patience}
+        return TcpLink(port, rate=rate, kept=kept, **more)
     from motorbus.link.serial import open_serial
 
-    return open_serial(port, rate=rate)
+    return open_serial(port, rate=rate, kept=kept)
 
 
 def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:

@@ -20,6 +20,7 @@ from motorbus.journal import BusJournal
 from motorbus.link.base import Link
 from motorbus.link.lock import socket_path
 from motorbus.link.memory import MemoryLink
+from motorbus.link.reconnect import Reconnecting, reconnecting
 from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
 from motorbus.session.address import parse_address, parse_ids
@@ -92,6 +93,7 @@ def _opened(
             journal=journal,
             stop_socket=_stop_socket(opening, link),
         )
+        _look_for(bus, opening)
         _warn(bus, journal)
     except BaseException:
         link.close()
@@ -127,13 +129,22 @@ def _link(opening: Opening) -> Link:
         return MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
     if opening.port.startswith("sim:"):
         return find(opening.port.removeprefix("sim:"), family.name).link(rate)
-    return open_link(
-        opening.port,
-        rate=opening.rate,
-        usual=family.link.rate,
-        kind=family.link.kind,
-        options=opening.options,
-    )
+    said: Any = {
+        "rate": opening.rate,
+        "usual": family.link.rate,
+        "kind": family.link.kind,
+        "options": opening.options,
+    }
+    link = open_link(opening.port, **said)
+    return reconnecting(link, **said) if opening.reconnect else link
+
+
+def _look_for(bus: BusFace, opening: Opening) -> None:
+    """A port that comes back under another name is to be reached by an emergency stop under that one."""
+    if not opening.reconnect:
+        bus.turns.renewal = None
+    elif isinstance(bus.link, Reconnecting):
+        bus.link.moved = lambda name: bus.stopper.move(socket_path(name) if name else None)
 
 
 def _stop_socket(opening: Opening, link: Link) -> Path | None:

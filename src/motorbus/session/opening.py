@@ -14,17 +14,22 @@ from motorbus.session.address import parse_address
 ADAPTER = "can://"
 """Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
 
+RECONNECT = "reconnect"
+"""The option of every bus that says whether a port that was lost is looked for."""
+
 
 class Opening(NamedTuple):
     """Everything needed to open a bus, found out and checked beforehand.
 
     `family` as this bus speaks it; `rate` in bit/s, 0 when nobody said; `options` for the simulator or the link.
+    `reconnect`: a port that is lost is opened anew when it is there again.
     """
 
     family: Family
     port: str
     rate: int
     options: dict[str, object]
+    reconnect: bool = True
 
 
 def prepare(address: str, options: dict[str, object]) -> Opening:
@@ -34,17 +39,26 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     merged: dict[str, object] = {**spot.options, **options}
     word = "baud" if family.link.kind == "bytes" else "bitrate"
     rate = _rate(word, merged.pop(word)) if word in merged else 0
+    reconnect = _yes(RECONNECT, merged.pop(RECONNECT, True))
     settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
     known = {"ids", "model", *(option.name for option in family.link.options)} if simulated else set()
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
-        allowed = {word, *known, *(option.name for option in family.link.settings)}
+        allowed = {word, RECONNECT, *known, *(option.name for option in family.link.settings)}
         raise RequestError(
             f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
         )
-    return Opening(family.configured(**settings), spot.port, rate, rest)
+    return Opening(family.configured(**settings), spot.port, rate, rest, reconnect)
+
+
+def _yes(word: str, said: object) -> bool:
+    if isinstance(said, bool):
+        return said
+    if said not in ("yes", "no"):
+        raise RequestError(f"{word}={said}: neither yes nor no", expected="yes or no")
+    return said == "yes"
 
 
 def _rate(word: str, said: object) -> int:

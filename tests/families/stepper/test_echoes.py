@@ -6,8 +6,6 @@ line echoes, and whatever is acknowledged then is forged.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from motorbus.core.operation import Data
@@ -15,6 +13,7 @@ from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, Side
+from tests.conftest import Figures, Rounds
 from tests.families.stepper.fault_rig import MOTIONS, FalseWord, Rig
 from tests.families.stepper.mischief import BYTE, Mischief
 from tests.families.stepper.test_single_faults import ask
@@ -118,9 +117,9 @@ def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learn
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("pace", [True, False])
-def test_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Callable[[int], int]) -> None:
+def test_l8_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Rounds, figures: Figures) -> None:
     """With requests that are not heard and replies that are lost; every acknowledgement is held against what was."""
-    total = rounds(100_000)
+    total = rounds(100_000, 2_500)
     line = Echoing(OFF, pace=pace)
     line.share = 0.05
     rig = rig_on(line, opened=True)
@@ -129,22 +128,24 @@ def test_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Callable[[int
             line.mode = line.random.choice((OFF, FULL, LATE, SIX) if pace else (OFF, FULL, LATE))
             line.piece = line.random.choice((1, 11))
         rig.anything()
-    print(
-        f"\n{rig.calls} calls, {line.echoes} requests echoed in full, late or in part, on and off; "
-        f"{line.count} requests or replies lost: 0 forged, {sum(rig.right.values()) / rig.calls:.2%} succeeded"
-    )
+    share = sum(rig.right.values()) / rig.calls
+    what = f"L8 echoes in full, late or in part, on and off; {'at 9600 baud' if pace else 'on a link without a rate'}"
+    faults = line.echoes + line.count
+    figures(what, family="stepper", exchanges=rig.calls, faults=faults, wrong=0, succeeded=f"{share:.2%}")
     assert line.echoes > total / 2
     assert line.count > total / 50
 
 
-def test_six_bytes_of_an_echo_come_too_soon_on_a_line_of_its_own_baud(rounds: Callable[[int], int]) -> None:
+def test_l8_six_bytes_of_an_echo_come_too_soon_on_a_line_of_its_own_baud(
+    rounds: Rounds, figures: Figures
+) -> None:
     """A reply cannot be there before the request has left, so on a real serial port even this forges nothing."""
     total = rounds(10_000) // 10
     line = Echoing(SIX, deaf=True)
     rig = rig_on(line, opened=True)
     for _ in range(total):
         assert not rig.anything()
-    print(f"\n{total} calls to nobody, six bytes of each request echoed at 9600 baud: 0 forged")
+    figures("L8 six bytes echoed by nobody, at 9600 baud", family="stepper", exchanges=total, wrong=0)
     assert line.echoes > total
 
 

@@ -7,7 +7,6 @@ project that is said to be written is stored as it was meant; a project that nob
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -16,6 +15,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.driver.waiting import Outcome, Ran
 from motorbus.families.stepper.program import Program
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
+from tests.conftest import Figures, Rounds
 from tests.families.stepper.fault_rig import UNMOVED, FalseWord, Rig
 from tests.families.stepper.mischief import NOTICES, REPLIES, REQUESTS, Mischief
 
@@ -153,7 +153,9 @@ ENOUGH = 5_000
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("share", [0.01, 0.1])
-def test_jobs_among_all_faults_are_as_they_are_told(share: float, rounds: Callable[[int], int]) -> None:
+def test_l7_jobs_among_all_faults_are_as_they_are_told(
+    share: float, rounds: Rounds, figures: Figures
+) -> None:
     total = max(rounds(100_000), ENOUGH) // 10
     line = Mischief(31, share, *FAULTS)
     jobs = Jobs(line)
@@ -161,11 +163,16 @@ def test_jobs_among_all_faults_are_as_they_are_told(share: float, rounds: Callab
     for _ in range(total):
         jobs.job()
     sent = sum(ledger.sent for ledger in jobs.bus.statistics.nodes.values())
-    told = ", ".join(f"{outcome.value} {count}" for outcome, count in sorted(jobs.outcomes.items(), key=str))
-    print(
-        f"\n{total} jobs, {sent} exchanges, {line.count} faults of {len(line.fired)} kinds: 0 false; runs: {told}, "
-        f"{jobs.refused} without steps refused; {jobs.untouched} jobs without a fault, all of which succeeded; the "
-        f"longest took {jobs.longest:.1f} s of its own time"
+    ends = {outcome.value: count for outcome, count in sorted(jobs.outcomes.items(), key=str)}
+    figures(
+        f"L7 L18 whole jobs, {share:.0%} of all that is said struck",
+        family="stepper",
+        exchanges=sent,
+        faults=line.count,
+        wrong=0,
+        jobs=total,
+        without_a_fault_and_done=jobs.untouched,
+        **{f"runs_{name}": count for name, count in ends.items()},
     )
     assert line.count > total / 10
     assert set(jobs.outcomes) >= {Outcome.COMPLETED, *([Outcome.UNKNOWN] if share >= 0.1 else [])}

@@ -26,9 +26,9 @@ def requests(seed: int, count: int) -> Iterator[Case]:
 
 def _request(random: Random) -> Request:
     kind = random.choice(("ping", "read", "write", "reg_write", "sync_read", "sync_write", "action"))
-    node, address = random.randrange(254), random.randrange(200)
-    longest = 256 - address if random.random() < 0.1 else 16
-    size = random.randrange(1, min(longest, 252))
+    node, address, size = random.randrange(254), random.randrange(200), random.randrange(1, 17)
+    if random.random() < 0.1:
+        address, size = 0, random.randrange(230, 253)
     nodes = tuple(random.sample(range(254), random.randrange(1, 13)))
     if kind == "read":
         return Request(kind, node, address, size)
@@ -46,7 +46,9 @@ def _answer(request: Request) -> bytes:
     """What a servo would say; no packet has more than 259 bytes."""
     if request.kind in ("sync_write", "action"):
         return b""
-    return b"".join(wire.encode_status(node, 0, bytes(length - wire.OVERHEAD)) for node, length in request.due())
+    return b"".join(
+        wire.encode_status(node, 0, bytes(length - wire.OVERHEAD)) for node, length in request.due()
+    )
 
 
 def classes(decoder: Decoder, case: Case, sent: str) -> set[str]:

@@ -15,7 +15,6 @@ from tests.interop.differential.outside import NEW, OLD, RUST, Decoder
 
 UNEXPLAINED: Final = "unexplained"
 SDK_MOST_ERROR: Final = 0x7F
-SDK_MOST_LENGTH: Final = 250
 
 
 class Packet(NamedTuple):
@@ -34,9 +33,9 @@ def packets(stream: bytes) -> list[Packet]:
     for at in range(len(stream) - wire.OVERHEAD + 1):
         end = at + stream[at + 3] + 4
         packet = stream[at:end]
-        if packet[:2] == wire.HEADER and packet[2] <= wire.MAX_ID and packet[3] > 1 and len(packet) == end - at:
-            if wire.is_sound(packet):
-                found.append(Packet(at, packet[2], packet[4], list(packet[5:-1]), end))
+        whole = packet[:2] == wire.HEADER and packet[3] > 1 and len(packet) == end - at
+        if whole and packet[2] <= wire.MAX_ID and wire.is_sound(packet):
+            found.append(Packet(at, packet[2], packet[4], list(packet[5:-1]), end))
     return found
 
 
@@ -72,7 +71,7 @@ def _class(
     return next(names, UNEXPLAINED)
 
 
-# --- they take what we do not ------------------------------------------------------------------------------------------
+# --- they take what we do not -------------------------------------------------------------------------------
 
 
 def _taken(decoder: Decoder, case: Case, node: int, value: Any, why: str) -> Iterator[str]:
@@ -112,7 +111,7 @@ def _begins(case: Case, packet: Packet, value: Any, stream: bytes) -> bool:
     return bool(data == behind[: len(data)])
 
 
-# --- we take what they do not ------------------------------------------------------------------------------------------
+# --- we take what they do not -------------------------------------------------------------------------------
 
 
 def _left(decoder: Decoder, case: Case, node: int, value: Any, others: Mapping[int, Any]) -> Iterator[str]:

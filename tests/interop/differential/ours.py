@@ -57,7 +57,7 @@ class Failed(Exception):
 
 
 def sdo_decoded(case: SdoCase) -> Outcome:
-    """A transfer, as the driver carries it out. The value is the data in hexadecimal, as `canopen_decoder.py` has it."""
+    """A transfer, as the driver carries it out. The value is the data in hexadecimal."""
     request, node = case.request, Node(case.request.node)
     turns, steps = Turns(KST.configured(), rate=500_000), iter(case.steps)
     row = replace(node.table["present_position"], address=request.index, subindex=request.subindex)

@@ -16,7 +16,7 @@ from tests.interop.feetech.peer import NEW_SDK, OLD_SDK, PEERS, RUSTYPOT, PeerEr
 
 HERE: Final = Path(__file__).resolve().parent
 PATIENCE: Final = 0.05
-"""s that rustypot gets where it found nothing within its usual 4 ms: a busy machine may say a stream later than that."""
+"""s that rustypot gets where it found nothing within its usual 4 ms: a busy machine may be later than that."""
 
 
 class Decoder(NamedTuple):
@@ -69,9 +69,7 @@ def heard_patiently(decoder: Decoder, cases: Sequence[Case], wanted: Sequence[bo
     A busy machine may say a stream later than after 4 ms.
     """
     found = heard(decoder, cases)
-    places = [
-        place for place, want in enumerate(wanted) if want and "timed out" in found[place].outcome.why
-    ]
+    places = [place for place, want in enumerate(wanted) if want and "timed out" in found[place].outcome.why]
     if decoder is RUST and places:
         again = heard(RUST, [cases[place] for place in places], patience=PATIENCE)
         for place, one in zip(places, again, strict=True):

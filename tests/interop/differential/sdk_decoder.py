@@ -134,9 +134,7 @@ class Decoder:
         data, nodes = bytes.fromhex(case["data"]), case["nodes"]
         size = len(data) // len(nodes)
         handler = self._handler(port)
-        group = self.sdk.GroupSyncWrite(
-            *((port, handler) if self.old else (handler,)), case["address"], size
-        )
+        group = self.sdk.GroupSyncWrite(*((port, handler) if self.old else (handler,)), case["address"], size)
         for place, node in enumerate(nodes):
             group.addParam(node, list(data[place * size : (place + 1) * size]))
         result = group.txPacket()

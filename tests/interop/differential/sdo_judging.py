@@ -1,4 +1,4 @@
-"""Where python-canopen and motorbus differ on an SDO stream, and why: each difference gets the name of its class, or none.
+"""Where python-canopen and motorbus differ on an SDO stream, and why: each difference has a class with a name, or none.
 
 A refusal by the servo is an answer too, so an abort that only one of them takes is a difference.
 """

@@ -1,7 +1,7 @@
 """SDO streams: what our simulated servos answer, what a server with segments would, and what may become of either.
 
-A CAN controller drops damaged frames, so what goes wrong is which frame comes, not what became of its bits; changed bits
-are drawn nevertheless, for a gateway may have them.
+A CAN controller drops damaged frames, so what goes wrong is which frame comes, not what became of its bits; changed
+bits are drawn nevertheless, for a gateway may have them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ def recorded() -> tuple[SdoCase, ...]:
     bus = Bus(MemoryLink(FAMILY.simulator((NODE,)), rate=500_000), FAMILY.configured())
     trace = bus.turns.trace.subscribe()
     reads = [SdoRequest("upload", NODE, index, subindex) for index, subindex in OBJECTS]
-    writes = [SdoRequest("download", NODE, index, 0, data) for index, data in ((0x6003, b"\x64\0"), (0x7FFF, b"\1"))]
+    writes = [
+        SdoRequest("download", NODE, index, 0, data) for index, data in ((0x6003, b"\x64\0"), (0x7FFF, b"\1"))
+    ]
     cases = []
     for request in (*reads, *writes):
         bus.run(Exchange(packet(request), (_due(request),), lane=NODE))
@@ -110,7 +112,9 @@ def _toggled(random: Random, frame: Frame) -> Step:
 def _expedited(random: Random, frame: Frame) -> Step:
     """Any size, stated or not."""
     identifier, data = frame
-    return ((identifier, bytes((random.choice((0x42, 0x43, 0x46, 0x47, 0x4B, 0x4F, 0x40, 0x41)),)) + data[1:]),)
+    return (
+        (identifier, bytes((random.choice((0x42, 0x43, 0x46, 0x47, 0x4B, 0x4F, 0x40, 0x41)),)) + data[1:]),
+    )
 
 
 def _acknowledged(random: Random, frame: Frame) -> Step:

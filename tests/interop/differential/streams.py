@@ -41,7 +41,9 @@ def _session(name: str) -> Iterator[Case]:
         bus.run(exchange)
         sent, *arrived = trace
         assert sent.data == request.packet()
-        yield Case(request, b"".join(bytes(one.data) for one in arrived if isinstance(one.data, bytes)), AS_RECORDED)
+        yield Case(
+            request, b"".join(bytes(one.data) for one in arrived if isinstance(one.data, bytes)), AS_RECORDED
+        )
 
 
 def _requests(name: str) -> Iterator[Request]:
@@ -126,7 +128,9 @@ def _remade(reply: bytes, make: Callable[[wire.StatusPacket], bytes]) -> bytes:
 
 
 def _of_another(random: Random, request: Request, reply: bytes) -> bytes:
-    return _remade(reply, lambda one: wire.frame((one.id + random.randrange(1, 250)) % 254, one.error, one.parameters))
+    return _remade(
+        reply, lambda one: wire.frame((one.id + random.randrange(1, 250)) % 254, one.error, one.parameters)
+    )
 
 
 def _foreign_in_front(random: Random, request: Request, reply: bytes) -> bytes:

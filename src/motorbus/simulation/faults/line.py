@@ -105,7 +105,8 @@ class FaultyLine:
         left = [pair for waiting in self._waiting.values() for pair in waiting]
         left += [pair for way in self._ways.values() for pair in way.moments]
         left += [(index, self.faults[index]) for index in self._timed]
-        return tuple(fault for _, fault in sorted(left, key=lambda pair: pair[0]))
+        armed = self._world.armed if self._world is not None else ()
+        return (*armed, *(fault for _, fault in sorted(left, key=lambda pair: pair[0])))
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         """What arrives of this, and when."""
@@ -153,7 +154,7 @@ class FaultyLine:
         if self._world is not None:
             self._timed.discard(index)
             self._note(fault, moment, fault.to, b"")
-            self._world.happen(fault, moment)
+            self._happen(fault, moment)
 
     def _strikes(self, to: Side, way: _Way, size: int, at: float, data: Data) -> list[Strike]:
         found: list[Strike] = []
@@ -315,9 +316,11 @@ class FaultyLine:
 
     def _happen(self, fault: Fault, at: float) -> None:
         if self._world is not None:
-            self._world.happen(fault, at)
+            self._world.happen(fault, at, lambda moment: self._note(fault, moment, fault.to, b"", torn=True))
 
-    def _note(self, fault: Fault, at: float, to: Side, data: Data) -> None:
+    def _note(self, fault: Fault, at: float, to: Side, data: Data, *, torn: bool = False) -> None:
+        if fault.action == "torn-eeprom" and not torn:
+            return  # it has happened when something was stored and torn
         self.count += 1
         self._record.append(fault)
         self.fired.append(Fired(at, str(fault), to, data))

@@ -36,6 +36,14 @@ class _Event(NamedTuple):
     act: Callable[[float], None]
 
 
+class _Armed(NamedTuple):
+    """Whose next store is cut, by which fault, and who is told when it is."""
+
+    node: SimulatedNode
+    fault: Fault
+    tell: Callable[[float], None]
+
+
 class World:
     """A `Simulator` around another, to which things happen.
 
@@ -54,7 +62,7 @@ class World:
         self._ahead = 0.0
         self._events: list[_Event] = []
         self._order = count()
-        self._armed: list[SimulatedNode] = []
+        self._armed: list[_Armed] = []
         self._out: list[tuple[float, Data]] = []
 
     @property
@@ -85,13 +93,18 @@ class World:
         ):
             raise RequestError(f"fault {fault}: what these devices store cannot be cut")
 
-    def happen(self, fault: Fault, at: float) -> None:
-        """Let this happen at this moment (s)."""
-        self.at(at, partial(self._do, fault))
+    def happen(self, fault: Fault, at: float, tell: Callable[[float], None] = lambda moment: None) -> None:
+        """Let this happen at this moment (s). `tell` is called when something stored was torn, with the moment."""
+        self.at(at, partial(self._do, fault, tell))
 
     def at(self, moment: float, act: Callable[[float], None]) -> None:
         """Do this at a moment to come, which it is given."""
         heappush(self._events, _Event(moment, next(self._order), act))
+
+    @property
+    def armed(self) -> tuple[Fault, ...]:
+        """Whose turn has come, but nothing was stored since that could be torn."""
+        return tuple(dict.fromkeys(one.fault for one in self._armed))
 
     def forget(self) -> None:
         """Nothing of what was to come happens any more, but a supply that is away comes back."""
@@ -145,7 +158,7 @@ class World:
         if self._armed:
             self._look()
 
-    def _do(self, fault: Fault, moment: float) -> None:
+    def _do(self, fault: Fault, tell: Callable[[float], None], moment: float) -> None:
         if fault.action == "unplug":
             if self.port is not None:
                 self.port.unplug(fault.seconds)
@@ -162,7 +175,7 @@ class World:
             if fault.node in self.nodes:
                 twin.duplicate(fault.node)
         elif fault.action == "torn-eeprom":
-            self._armed += self._whom(fault)
+            self._armed += [_Armed(node, fault, tell) for node in self._whom(fault)]
             self._look()
         elif fault.action == "clock-step":
             self._sleep(fault.seconds, moment)
@@ -181,12 +194,13 @@ class World:
 
     def _look(self) -> None:
         """Whoever stores something now has its supply cut in the middle of that."""
-        for node in tuple(self._armed):
-            middle: Callable[[], float] = getattr(node, _STORES)
+        for one in tuple(self._armed):
+            middle: Callable[[], float] = getattr(one.node, _STORES)
             moment = middle() - self._ahead
             if moment < inf:
-                self._armed.remove(node)
-                self.at(max(moment, self.now), partial(self._cut, node))
+                self._armed.remove(one)
+                self.at(max(moment, self.now), partial(self._cut, one))
 
-    def _cut(self, node: SimulatedNode, moment: float) -> None:
-        node.power_cycle()
+    def _cut(self, one: _Armed, moment: float) -> None:
+        one.node.power_cycle()
+        one.tell(moment)

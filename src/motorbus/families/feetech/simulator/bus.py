@@ -109,6 +109,25 @@ class FeetechBus:
         """The servos by the id they have now; of two with one id the first."""
         return {id: servos[0] for id, servos in self._ids().items()}
 
+    def duplicate(self, id: int) -> None:
+        """A second servo with this id is there from now on, like the first and as it ships but for id and rate.
+
+        Raises RequestError when there is none.
+        """
+        if id not in self._ids():
+            raise RequestError(f"no servo has the id {id}")
+        first = self._ids()[id][0]
+        twin = Servo(
+            id, first.model, first.memory.layout, self.switches, lambda: self.now, self._forget_ids, None
+        )
+        twin.memory["baud_rate"] = twin.memory.stored[twin.memory.layout.table["baud_rate"].address] = (
+            first.memory["baud_rate"]
+        )
+        self.servos = (*self.servos, twin)
+        self._fate = Fate(self.servos, self.switches)
+        self._fate.expect(self.now)
+        self._forget_ids()
+
     def tune(self, rate: int) -> None:
         """The host's rate; servos set to another one neither hear nor are heard."""
         self.rate = rate

@@ -93,6 +93,11 @@ class Servo(Body):
         if self.plugged:
             self.power_up(self._now())
 
+    def midway(self) -> float:
+        """When the EEPROM cell under work is half done; infinity while none is."""
+        flash = self.memory.flash
+        return flash.moment_of(flash.done + 0.5)
+
     def status(self) -> dict[str, object]:
         """How it is, as plain data."""
         now = self._now()

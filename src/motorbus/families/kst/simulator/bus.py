@@ -77,6 +77,19 @@ class KstBus:
             found[TWIN + servo.unit if servo.node in found else servo.node] = servo
         return found
 
+    def duplicate(self, node: int) -> None:
+        """A second servo with this id is there from now on, like the first and as it ships but for id and rate.
+
+        Raises RequestError when there is none.
+        """
+        if node not in self.nodes:
+            raise RequestError(f"no servo has the id {node}")
+        first = self.nodes[node]
+        twin = Servo(len(self.servos) + 1, node, first.profile, self.switches, lambda: self.now, self._say)
+        twin.delay = self.switches.duplicate_delay
+        twin.bit_rate = first.bit_rate
+        self.servos = (*self.servos, twin)
+
     def tune(self, rate: int) -> None:
         """The host's rate in bit/s; servos set to another one neither hear nor are heard. 0: whichever they have."""
         self.rate = rate or None

@@ -8,6 +8,7 @@ node id must be saved, and count after the restart).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 
 from motorbus.families.kst.table import REVERSED
 
@@ -29,7 +30,7 @@ class Memory:
         self._live = dict(factory)
         self._stored = {name: raw for name, raw in factory.items() if name in KEPT}
         self._picture: dict[str, int] | None = None
-        self._done_at = 0.0
+        self._begun_at = self._done_at = 0.0
 
     def __getitem__(self, name: str) -> int:
         return self._live[name]
@@ -56,13 +57,17 @@ class Memory:
         if without_reverse and "function_enable" in self._picture:
             kept = self._stored["function_enable"] & REVERSE
             self._picture["function_enable"] = self._picture["function_enable"] & ~REVERSE | kept
-        self._done_at = at + takes
+        self._begun_at, self._done_at = at, at + takes
         self._settle(at)
 
     def saving(self, at: float) -> bool:
         """Whether the flash is being written at this moment."""
         self._settle(at)
         return self._picture is not None
+
+    def midway(self, at: float) -> float:
+        """When the flash is written to the half; infinity while it is not."""
+        return (self._begun_at + self._done_at) / 2 if self.saving(at) else inf
 
     def saved(self, at: float) -> bool:
         """Whether a restart would bring back what is worth keeping as it is now."""

@@ -102,6 +102,10 @@ class Servo:
 
     restart = power_cycle
 
+    def midway(self) -> float:
+        """When its flash is written to the half; infinity while it is not."""
+        return self.values.midway(self._now())
+
     def alarm(self, data: bytes = wire.LOW_VOLTAGE) -> None:
         """Say an alarm of four bytes now; the usual one is low voltage (public demo of a newer protocol)."""
         if self.plugged:

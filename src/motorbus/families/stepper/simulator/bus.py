@@ -54,6 +54,7 @@ class StepperBus:
         self._busy_until = -inf
         self._waiting = 0
         self.storing: int | None = None
+        self._half_stored_at = inf
         self.controller = Controller(switches, self)
         self._nodes = {node: self.controller}
 
@@ -147,6 +148,10 @@ class StepperBus:
         """Seconds since the first moment it was told."""
         return 0.0 if self._began is None else self.now - self._began
 
+    def midway(self) -> float:
+        """When what is being stored is half written; infinity while nothing is."""
+        return inf if self.storing is None else self._half_stored_at
+
     def behave(self, switches: Switches, *, reseed: bool) -> None:
         """From now on as these say; with `reseed` chance begins afresh."""
         self.switches = switches
@@ -223,6 +228,7 @@ class StepperBus:
         if said.store is not None:
             ready += self.switches.save_time
             self.storing = said.reply[3]
+            self._half_stored_at = ready - self.switches.save_time / 2
             self._later(ready, partial(self._stored, said))
         if said.reply:
             self._busy_until = ready

@@ -49,6 +49,9 @@ class Surroundings(Protocol):
     def age(self) -> float:
         """Seconds since the simulation began."""
 
+    def midway(self) -> float:
+        """When that is half done; infinity while nothing is saved or cleared."""
+
     def behave(self, switches: Switches, *, reseed: bool) -> None:
         """From now on as these say; with `reseed` chance begins afresh. The controller is told to `rewire`."""
 
@@ -175,6 +178,10 @@ class Controller:
         if self.powered:
             self.unplug()
             self.plug()
+
+    def midway(self) -> float:
+        """When the project that is being saved or cleared is half written; infinity while none is."""
+        return self._around.midway()
 
     def status(self) -> dict[str, object]:
         """How it is, as plain data; position in pulses."""

@@ -1,0 +1,85 @@
+"""All cases of a run, judged: how often each class came up with whom, and what has no class."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+from tests.interop.differential import encoders, judging, ours, outside, sdo_judging, sdo_streams, streams
+from tests.interop.differential.cases import Case, Outcome, SdoCase
+from tests.interop.differential.outside import CANOPEN, FEETECH, Decoder
+
+SHOWN: Final = 5
+
+
+class Found(NamedTuple):
+    """`counts` by class; `unexplained` in words, the first few; `cases` how many there were."""
+
+    counts: Counter[str]
+    unexplained: list[str]
+    cases: int
+
+
+def feetech(decoder: Decoder, cases: Sequence[Case]) -> Found:
+    """These streams, through this decoder and through ours."""
+    mine = [case for case in cases if case.request.kind in decoder.kinds]
+    made = [ours.decoded(case) for case in mine]
+    heard = outside.heard_patiently(decoder, mine, [one.taken for one in made])
+    names = (
+        judging.classes(decoder, case, one, theirs.outcome) | encoders.classes(decoder, case, theirs.sent)
+        for case, one, theirs in zip(mine, made, heard, strict=True)
+    )
+    return _found(mine, made, [one.outcome for one in heard], names)
+
+
+def sdo(cases: Sequence[SdoCase]) -> Found:
+    """These streams, through python-canopen and through ours."""
+    made = [ours.sdo_decoded(case) for case in cases]
+    heard = [one.outcome for one in outside.heard(CANOPEN, cases)]
+    names = (sdo_judging.classes(*each) for each in zip(cases, made, heard, strict=True))
+    return _found(cases, made, heard, names)
+
+
+def requests(decoder: Decoder, seed: int, count: int) -> Found:
+    """So many requests by lot: the bytes that they send and ours."""
+    if decoder is CANOPEN:
+        frames = list(encoders.sdo_requests(seed, count))
+        said = [one.sent for one in outside.heard(decoder, frames)]
+        return _sent(frames, [encoders.sdo_classes(*each) for each in zip(frames, said, strict=True)])
+    cases = [case for case in encoders.requests(seed, count) if case.request.kind in decoder.kinds]
+    sent = [one.sent for one in outside.heard(decoder, cases)]
+    return _sent(cases, [encoders.classes(decoder, *each) for each in zip(cases, sent, strict=True)])
+
+
+def usual(seed: int, count: int) -> list[Case]:
+    """What was recorded with the first map, at every place of it; then so many by lot, of all maps."""
+    return [*streams.systematic(streams.recorded()[:10]), *streams.recorded(), *streams.drawn(seed, count)]
+
+
+def usual_sdo(seed: int, count: int) -> list[SdoCase]:
+    """What was recorded, then so many by lot."""
+    return list(sdo_streams.drawn(seed, count))
+
+
+DECODERS: Final = (*FEETECH, CANOPEN)
+
+
+def _found(
+    cases: Sequence[Case] | Sequence[SdoCase],
+    made: Sequence[Outcome],
+    heard: Sequence[Outcome],
+    names: Iterator[set[str]],
+) -> Found:
+    counts: Counter[str] = Counter()
+    unexplained = []
+    for case, one, theirs, found in zip(cases, made, heard, names, strict=True):
+        counts.update(found)
+        if judging.UNEXPLAINED in found and len(unexplained) < SHOWN:
+            unexplained.append(f"{case.line()} ({case.change}): ours {one}, theirs {theirs}")
+    return Found(counts, unexplained, len(cases))
+
+
+def _sent(cases: Sequence[Case] | Sequence[SdoCase], names: Sequence[set[str]]) -> Found:
+    nothing = [Outcome(None)] * len(cases)
+    return _found(cases, nothing, nothing, iter(names))
