@@ -77,7 +77,7 @@ def _feetech() -> Iterator[str]:
     examples = [note.example for note in NOTES.values()]
     mine = [ours.decoded(case) for case in examples]
     theirs = {
-        decoder: [one.outcome for one in outside.heard_patiently(decoder, examples, [True] * len(examples))]
+        decoder: [one.outcome for one in outside.heard(decoder, examples, patience=outside.AT_EASE)]
         for decoder in FEETECH
     }
     for place, (name, note) in enumerate(NOTES.items()):

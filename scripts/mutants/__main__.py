@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -38,7 +39,7 @@ def main() -> int:
     for name in told.modules or known:
         found[name] = verdicts = _tried(known[name], told)
         result = outcome(verdicts)
-        whole = told.sample == 1 and not told.only
+        whole = told.sample == 1 and not told.only and not told.functions
         failed |= bool(
             _say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole)
         )
@@ -52,14 +53,16 @@ def main() -> int:
 
 
 def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
-    begun = time.monotonic()
+    begun, voice = time.monotonic(), os.dup(sys.stderr.fileno())  # what forks is silent but for this
 
     def tell(text: str) -> None:
         if text:
-            print(f"  {time.monotonic() - begun:5.0f} s  {text}", file=sys.stderr, flush=True)
+            os.write(voice, f"  {time.monotonic() - begun:5.0f} s  {text}\n".encode())
 
     print(subject.name, file=sys.stderr)
-    verdicts = trial(subject, Wish(told.sample, told.only, told.anew, told.jobs, _known(subject, told), tell))
+    wish = Wish(told.sample, told.only, told.anew, told.functions, told.jobs, _known(subject, told), tell)
+    verdicts = trial(subject, wish)
+    os.close(voice)
     result = outcome(verdicts)
     took = time.monotonic() - begun
     print(
@@ -89,6 +92,9 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
     parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
     parser.add_argument("--only", default="", help="a text that the name of a fault must have")
+    parser.add_argument(
+        "--functions", action="store_true", help="leave out what happens at import, which is slow"
+    )
     parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--json", default="", help="a file for every verdict")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import pickle
 import resource
 import selectors
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
@@ -16,6 +18,8 @@ J = TypeVar("J")
 GIGABYTE = 1 << 30
 MEMORY = 4 * GIGABYTE
 """Bytes of addresses that a child may have: a fault can make a list that never ends."""
+START = 3.0
+"""s by the clock that a child may take to begin."""
 LATE = 4.0
 """Times as much by the clock as of processor time: the machine has others to serve."""
 
@@ -64,7 +68,7 @@ def _fork(work: Callable[[J], Any], job: J, seconds: float) -> Child:
         os.close(answer)
         _in_child(work, job, seconds, tell)
     os.close(tell)
-    return Child(pid, answer, time.monotonic() + 3 + LATE * seconds, [])
+    return Child(pid, answer, time.monotonic() + START + LATE * seconds, [])
 
 
 def _in_child(work: Callable[[J], Any], job: J, seconds: float, tell: int) -> None:
@@ -72,6 +76,7 @@ def _in_child(work: Callable[[J], Any], job: J, seconds: float, tell: int) -> No
     code = 1
     try:
         os.setpgid(0, 0)
+        _end_with_parent()
         most = round(seconds) + 2
         resource.setrlimit(resource.RLIMIT_CPU, (most, most))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -82,6 +87,12 @@ def _in_child(work: Callable[[J], Any], job: J, seconds: float, tell: int) -> No
         code = 0
     finally:
         os._exit(code)
+
+
+def _end_with_parent() -> None:
+    """Where the system can do it, this process is killed as soon as its parent is gone."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
 def _ended(ready: selectors.BaseSelector, running: dict[int, tuple[Any, Child]]) -> list[int]:

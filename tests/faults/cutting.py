@@ -9,8 +9,9 @@ from __future__ import annotations
 import gc
 import re
 import sys
-import threading
+from collections import Counter
 from collections.abc import Callable
+from dis import opmap
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -38,14 +39,29 @@ def ours(file: str) -> bool:
     return found
 
 
-class Scissors:
-    """Raises this before the nth executed line; `where` is that line, None when there were fewer."""
+def leaving(frame: FrameType) -> bool:
+    """Whether a `with` is about to be left: nothing can fall there but what a tracer throws.
 
-    def __init__(self, at: int, error: type[BaseException]) -> None:
+    No signal is looked at, and nothing is allocated, between its body and its end. An interruption there would be made
+    good as any other; an error that is dealt with on its way up would leave the lock behind.
+    """
+    code = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 6 : 2]
+    return set(code) == {opmap["LOAD_CONST"]}
+
+
+class Scissors:
+    """Raises this before the nth executed line, and `later` lines on once more.
+
+    `where` is the first of the two, None when there were fewer lines.
+    """
+
+    def __init__(self, at: int, error: type[BaseException], later: int = 0) -> None:
         self.at = at
+        self.again = at + later
         self.error = error
         self.count = 0
         self.where: str | None = None
+        self.walked: list[tuple[object, int]] = []
         self._outside: FrameType | None = None
 
     def __call__(self, frame: FrameType, event: str, argument: object) -> Any:
@@ -64,27 +80,34 @@ class Scissors:
         return self._world
 
     def _line(self, frame: FrameType, event: str, argument: object) -> Any:
-        if event == "line":
+        if event == "line" and not (self.error is MemoryError and leaving(frame)):
             self.count += 1
-            if self.count == self.at:
+            if self.at == NEVER:
+                self.walked.append((frame.f_code, frame.f_lineno))
+            elif self.count in (self.at, self.again):
                 name = Path(frame.f_code.co_filename).relative_to(PACKAGE)
-                self.where = f"{name}:{frame.f_lineno} in {frame.f_code.co_name}"
+                self.where = self.where or f"{name}:{frame.f_lineno} in {frame.f_code.co_name}"
                 raise self.error
         return self._line
 
 
 class Outcome(NamedTuple):
-    """What came of a call that was cut: its value, or what it raised; where it was cut, and in how many lines."""
+    """What came of a call that was cut: its value, or what it raised; where it was cut, or all lines if it was not."""
 
     value: Any
     error: BaseException | None
     where: str | None
-    lines: int
+    walked: list[tuple[object, int]]
 
 
-def cut(act: Callable[[], Any], at: int = NEVER, error: type[BaseException] = KeyboardInterrupt) -> Outcome:
-    """Do it, cut at this line."""
-    scissors, before = Scissors(at, error), sys.gettrace()
+def cut(
+    act: Callable[[], Any],
+    at: int = NEVER,
+    error: type[BaseException] = KeyboardInterrupt,
+    later: int = 0,
+) -> Outcome:
+    """Do it, cut at this line, and so many lines later once more."""
+    scissors, before = Scissors(at, error, later), sys.gettrace()
     value, raised = None, None
     gc.disable()  # what an earlier call has left behind is no line of this one
     sys.settrace(scissors)
@@ -95,18 +118,18 @@ def cut(act: Callable[[], Any], at: int = NEVER, error: type[BaseException] = Ke
     finally:
         sys.settrace(before)
         gc.enable()
-    return Outcome(value, raised, scissors.where, scissors.count)
+    return Outcome(value, raised, scissors.where, scissors.walked)
 
 
-def free(lock: Any) -> bool:
-    """Whether another thread can have this lock."""
-    if lock._is_owned():
-        return False
-    got: list[bool] = []
-    thread = threading.Thread(target=lambda: got.append(lock.acquire(timeout=5) and not lock.release()))
-    thread.start()
-    thread.join()
-    return got == [True]
+def places(walked: list[tuple[object, int]], visits: int, most: int) -> list[int]:
+    """Where to cut: every line, at the first so many visits of it; at most so many places, evenly spread."""
+    seen: Counter[tuple[object, int]] = Counter()
+    found = []
+    for number, line in enumerate(walked, 1):
+        seen[line] += 1
+        if seen[line] <= visits:
+            found.append(number)
+    return found[:: -(-len(found) // most)] if len(found) > most else found
 
 
 def told(error: BaseException | None) -> str:

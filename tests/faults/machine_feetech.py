@@ -94,10 +94,10 @@ class FeetechRig(Rig):
 
     def ping(self, random: Random) -> Window:
         servo, there = self.one(random), None
-        fired = self.line.count
+        fired, troubled = self.line.count, self.troubled
         with self.oracle.call(self.bound) as window:
             there = servo.ping()
-        if there is False and fired == self.line.count and not self.troubled:
+        if there is False and not troubled and fired == self.line.count and not self.troubled:
             raise FalseWord(f"servo {servo.node} is there, and ping says that it is not")
         return window
 

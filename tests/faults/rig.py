@@ -28,9 +28,10 @@ class Rig:
     count: int = 0
     model: str = "sts3215"
     switches: dict[str, Any] = field(default_factory=dict)
+    ids: tuple[int, ...] = IDS
 
     def __post_init__(self) -> None:
-        self.simulator = FAMILY.simulator(IDS, self.model, servo_baud=1_000_000, **self.switches)
+        self.simulator = FAMILY.simulator(self.ids, self.model, servo_baud=1_000_000, **self.switches)
         assert isinstance(self.simulator, FeetechBus)
         self.servos = self.simulator.nodes
         self.link = MemoryLink(self.simulator, line=self.line, **self.options)

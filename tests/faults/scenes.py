@@ -1,8 +1,8 @@
 """What is done to one bus of each family: every kind of transaction, and whether what came of it is true.
 
-A scene is a simulated bus with the real bus on it. Its kinds are operations that can be carried out blocking and async;
-each says afterwards whether the device did it. What a scene reads to see whether its bus is right is another value every
-time, so an answer to an older question is a wrong one.
+A scene is a simulated bus with the real bus on it. Its kinds are operations that can be carried out blocking and
+async; each says afterwards whether the device did it. What a scene reads to see whether its bus is right is another
+value every time, so an answer to an older question is a wrong one.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ KINDS: dict[str, Kind] = {
     "kst stop": Kind("kst", lambda there: there.said("stop"), stands, off),
     "kst home": Kind("kst", lambda there: there.said("set_mid_point"), at(0.0)),
     "kst run": Kind("kst", lambda there: there.said("move", 0.2), at(0.2)),
-    "stepper read": Kind("stepper", Scene.asked, Scene.true),
+    "stepper read": Kind("stepper", Scene.asked, Scene.true, Scene.stir),
     "stepper write": Kind(
         "stepper",
         lambda there: there.said("set_output", 1, 1),

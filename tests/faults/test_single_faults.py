@@ -132,6 +132,7 @@ def test_l1_l5_a_write_that_is_read_back_is_never_called_done_when_it_is_not() -
     assert tally.misled > 0, "the servo heard another request, and reading back told so"
 
 
+@pytest.mark.faultless("it is about bytes, and no line carries them")
 def test_l2_a_byte_too_many_can_make_another_request(figures: Figures) -> None:
     """A changed byte never gets past the sum. One too many can, behind the id, where it passes for a shorter length.
 

@@ -61,9 +61,7 @@ class Pace:
         return self.refuted
 
 
-def least_time(
-    exchange: Exchange[Any], family: Family, rate: int, without: Collection[int] = ()
-) -> float:
+def least_time(exchange: Exchange[Any], family: Family, rate: int, without: Collection[int] = ()) -> float:
     """s: the least time in which an answer can be here; a family's air time of frames may count the most bits.
 
     `without` are nodes that nobody waits for: they may be silent, and then the others are here sooner.

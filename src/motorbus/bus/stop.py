@@ -16,19 +16,20 @@ import contextlib
 import json
 import os
 import socket
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
 from typing import NamedTuple
 
+from motorbus.bus import obedience
 from motorbus.bus.air import MARGIN
 from motorbus.bus.crank import crank, retune
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.family import Stop
-from motorbus.core.operation import ANY, Answer, Due, Exchange, Timeout, Tune
-from motorbus.errors import DeviceError, LinkError, LinkLost, PortNotFound
+from motorbus.core.operation import Answer, Exchange, Timeout, Tune
+from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
 
 ROUNDS = 5
@@ -131,9 +132,9 @@ class Stopper:
         return wish.outcome or self._nothing("nothing: the stop thread gave no sign")
 
     def stop(self) -> StopOutcome:
-        """Latch and send the stop frames; runs in the stop thread, or in the caller's where time is virtual.
+        """Latch and send the stop frames, whatever interrupts it: from the beginning then, and only then it is raised.
 
-        Who is interrupted meanwhile sends them once more from the beginning; then the interruption is raised.
+        It runs in the stop thread, or in the caller's where time is virtual.
         """
         outcome, interruption = self._insist()
         if interruption is not None:
@@ -141,7 +142,6 @@ class Stopper:
         return outcome
 
     def _insist(self) -> tuple[StopOutcome, BaseException | None]:
-        """Stop, whatever interrupts it; what came of it, and the interruption."""
         caught: BaseException | None = None
         for _ in range(TRIES):
             try:
@@ -151,7 +151,7 @@ class Stopper:
             except BaseException as interruption:  # dealt with above, where another one is caught too
                 caught = interruption
         self._let_go()
-        return self._nothing(f"nothing: {type(caught).__name__} cut it short again and again"), caught
+        return self._nothing("nothing: it was cut short again and again"), caught
 
     def _let_go(self) -> None:
         """After an interruption: let go of the lock as often as it is held, and of the bus."""
@@ -171,7 +171,9 @@ class Stopper:
         acknowledged: list[int] = []
         rounds = 0
         wanting = frames.exchanges
-        while rounds < ROUNDS and not self.turns.listening and (not acknowledged or _answered(wanting)):
+        while (
+            rounds < ROUNDS and not self.turns.listening and (not acknowledged or obedience.answered(wanting))
+        ):
             rounds += 1
             self._round(wanting, acknowledged)
             wanting = self._wanting(wanting, acknowledged)
@@ -206,7 +208,9 @@ class Stopper:
             frames = self._frames(missing)
         except Exception:  # the family's own; the frames it made before do
             frames = before
-        return tuple(one for one in frames if not one.replies or not set(_nodes(one)) <= set(acknowledged))
+        return tuple(
+            one for one in frames if not one.replies or not set(obedience.nodes(one)) <= set(acknowledged)
+        )
 
     def _round(self, exchanges: Iterable[Exchange[Answer]], acknowledged: list[int]) -> None:
         """Send each once, and whatever can be sent once a node has said where it is."""
@@ -220,13 +224,13 @@ class Stopper:
                 asking.remove(flight)
                 limit = self._submit(self._following(flight), flights, limit)
         missing = [flight for flight in flights if not self._settled(flight)]
-        obeyed = _obeyed(flights, missing, acknowledged)
+        obeyed = obedience.obeyed(flights, missing, acknowledged)
         acknowledged += obeyed
         with self.turns.lock:
             for node in obeyed:
                 self.turns.known.accepted(node)
         again = [flight.exchange for flight in missing if self._may_come(flight)]
-        while _answered(again) and self.link.now() < begun + BREATH:
+        while obedience.answered(again) and self.link.now() < begun + BREATH:
             crank(self.link, self.turns, begun + BREATH)  # a port that was full may have room then
 
     def _may_come(self, flight: Flight) -> bool:
@@ -244,11 +248,11 @@ class Stopper:
 
     def _following(self, asked: Flight) -> list[Exchange[Answer]]:
         """This node has said where it is: the frames that hold it there."""
-        nodes = _nodes(asked.exchange)
+        nodes = obedience.nodes(asked.exchange)
         if asked.error is not None or not nodes:
             return []
         with contextlib.suppress(Exception):  # the family's own; the next round asks again
-            return [one for one in self._frames(nodes) if one.effect in GATED and _nodes(one)]
+            return [one for one in self._frames(nodes) if one.effect in GATED and obedience.nodes(one)]
         return []
 
     def _time(self, exchange: Exchange[Answer]) -> float:
@@ -261,7 +265,9 @@ class Stopper:
         with self.turns.lock:
             if not flight.done:
                 self.turns.abandon(flight)
-        return flight.error is None and bool(_nodes(flight.exchange)) and not _refused(flight)
+        return (
+            flight.error is None and bool(obedience.nodes(flight.exchange)) and not obedience.refused(flight)
+        )
 
     # -- the thread -----------------------------------------------------------------------------------------
 
@@ -306,8 +312,7 @@ class Stopper:
 
     def _stop_and_tell(self) -> StopOutcome:
         wishes, self._wishes = self._wishes, []
-        outcome, _ = self._insist()
-        self.outcome = outcome
+        self.outcome = outcome = self._insist()[0]
         for wish in wishes:  # who asked after that has woken the thread once more
             wish.outcome = outcome
             wish.fulfilled.set()
@@ -329,42 +334,6 @@ class Stopper:
             self._thread.join(PATIENCE)
         for end in self._pair or ():
             end.close()
-
-
-def _nodes(exchange: Exchange[Answer]) -> list[int]:
-    """Who acknowledges this."""
-    return [] if exchange.replies is ANY else [due.node for due in exchange.replies]
-
-
-def _obeyed(flights: Iterable[Flight], missing: Sequence[Flight], before: Sequence[int]) -> list[int]:
-    """Who has given every kind of reply that stopping it calls for; several frames may call for one and the same.
-
-    A frame that only asks stops nobody.
-    """
-    wanted: dict[int, set[Due]] = {}
-    given: set[Due] = set()
-    for flight in flights:
-        dues = flight.exchange.replies
-        if flight.exchange.effect in GATED and dues is not ANY:
-            given |= set(dues) if flight not in missing else set()
-            for due in dues:
-                wanted.setdefault(due.node, set()).add(due)
-    return [node for node, dues in wanted.items() if dues <= given and node not in before]
-
-
-def _refused(flight: Flight) -> bool:
-    """Did the device answer, and say no?"""
-    try:
-        if flight.exchange.read is not None:
-            flight.exchange.read(flight.value)
-    except DeviceError:
-        return True
-    return False
-
-
-def _answered(exchanges: Iterable[Exchange[Answer]]) -> bool:
-    """Is one of them acknowledged by somebody?"""
-    return any(exchange.replies for exchange in exchanges)
 
 
 @contextlib.contextmanager

@@ -25,6 +25,11 @@ class PtyMaster:
     """
 
     def __init__(self) -> None:
+        self._links: list[Path] = []
+        self._pulled: list[Path] = []
+        self._open()
+
+    def _open(self) -> None:
         try:
             import tty
 
@@ -36,7 +41,6 @@ class PtyMaster:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.slave_name = os.ttyname(self._slave)
-        self._links: list[Path] = []
 
     def fileno(self) -> int:
         """Turns readable when a client has written."""
@@ -86,6 +90,28 @@ class PtyMaster:
                 cause="another simulator serves it, or it is something else",
                 advice="choose another name, or remove it",
             )
+
+    @property
+    def fixed(self) -> str:
+        """Why it cannot be pulled and come back; "" when it can."""
+        return (
+            ""
+            if self._links or self._pulled
+            else "without a symbolic link nobody would find the terminal again"
+        )
+
+    def unplug(self) -> None:
+        """Vanish, symbolic links included, until `plug`: whoever has it open is told that it has hung up."""
+        links = list(self._links)
+        self.close()
+        self._pulled = links
+
+    def plug(self) -> None:
+        """Come back, as another terminal behind the same symbolic links. Raises as making it does."""
+        self._open()
+        links, self._pulled = self._pulled, []
+        for link in links:
+            self.symlink(link)
 
     def close(self) -> None:
         """Hang up and take the symbolic links away; calling it again does nothing."""

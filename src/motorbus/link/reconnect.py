@@ -36,12 +36,6 @@ PATIENCE: Final = 0.1
 AGAIN: Final = "it is looked for again whenever something is asked for; nothing of before is sent again"
 
 
-class Locked(Link, Protocol):
-    """A link on a port with a lock."""
-
-    lock: PortLock
-
-
 class Again(Protocol):
     """Opens a port anew, at a rate (bit/s), only listening or not, with the lock that is kept for it."""
 
@@ -204,7 +198,7 @@ def _nobody(_: str) -> None:
 
 
 def reconnecting(
-    link: Locked,
+    link: Link,
     *,
     rate: int = 0,
     usual: int = 0,
@@ -217,7 +211,8 @@ def reconnecting(
 
     A pseudo-terminal that was called by its own number is not: the next terminal gets that. Nor is what nobody owns.
     """
-    if not link.lock.held:
+    lock: PortLock | None = getattr(link, "lock", None)
+    if lock is None or not lock.held:
         return link
     ways = _Ways(link, rate, usual, kind, dict(options or {}))
     if not ways.device:

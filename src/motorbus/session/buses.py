@@ -25,8 +25,9 @@ from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
 from motorbus.session.address import parse_address, parse_ids
 from motorbus.session.keeping import kept_for
-from motorbus.session.opening import Opening, prepare
-from motorbus.simulation.named import Simulation, find
+from motorbus.session.opening import FAULTS, Opening, prepare
+from motorbus.simulation.faults import strike
+from motorbus.simulation.named import Faults, Simulation, find
 
 LOG = logging.getLogger("motorbus.session")
 logging.getLogger("motorbus").addHandler(
@@ -108,16 +109,17 @@ def simulate(
     model: str = "",
     clock: str = "virtual",
     name: str | None = None,
+    faults: Faults = "",
     **options: object,
 ) -> Simulation:
     """A simulated bus in this process; use it in a `with`, open it by its `url`, poke its nodes by `sim[3]`.
 
-    `clock` is "virtual" (time passes only while somebody waits) or "real". Raises RequestError for an unknown
-    family, model or option.
+    `clock` is "virtual" (time passes only while somebody waits) or "real"; `faults` is a script of what goes wrong, see
+    `motorbus.simulation.faults`. Raises RequestError for an unknown family, model or option, and for a bad script.
     """
     found = families.load(family)
     numbers = parse_ids(ids) if isinstance(ids, str) else ids
-    return Simulation(found, numbers, model=model, clock=clock, name=name, **options)
+    return Simulation(found, numbers, model=model, clock=clock, name=name, faults=faults, **options)
 
 
 def _link(opening: Opening) -> Link:
@@ -125,8 +127,12 @@ def _link(opening: Opening) -> Link:
     if opening.port == "sim":
         ids = parse_ids(str(opening.options.pop("ids", "1")))
         model = str(opening.options.pop("model", ""))
+        faults = opening.options.pop(FAULTS, "")
         simulator = family.simulator(ids, model, **opening.options)
-        return MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
+        memory = MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
+        if faults:
+            strike(memory, str(faults))
+        return memory
     if opening.port.startswith("sim:"):
         return find(opening.port.removeprefix("sim:"), family.name).link(rate)
     said: Any = {

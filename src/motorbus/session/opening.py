@@ -11,6 +11,8 @@ from motorbus.core.family import Family
 from motorbus.errors import RequestError
 from motorbus.session.address import parse_address
 
+FAULTS = "faults"
+"""What goes wrong by script, for simulated devices only; see `motorbus.simulation.faults`."""
 ADAPTER = "can://"
 """Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
 
@@ -42,7 +44,9 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     reconnect = _yes(RECONNECT, merged.pop(RECONNECT, True))
     settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
-    known = {"ids", "model", *(option.name for option in family.link.options)} if simulated else set()
+    if FAULTS in merged and not simulated:
+        raise _no_faults(address, spot.port)
+    known = {"ids", "model", FAULTS, *(option.name for option in family.link.options)} if simulated else set()
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
@@ -51,6 +55,19 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
             f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
         )
     return Opening(family.configured(**settings), spot.port, rate, rest, reconnect)
+
+
+def _no_faults(address: str, port: str) -> RequestError:
+    """Faults are for simulated devices: there is no way to put them in front of a port."""
+    here = port.startswith("sim:")
+    return RequestError(
+        f"{address!r}: {FAULTS} cannot be put in front of {'this bus' if here else 'a port'}: nothing was opened",
+        expected=f"a simulated bus, as FAMILY:sim,ids=1-6 with {FAULTS}",
+        cause="" if here else "whatever is behind a port may be real",
+        advice="set `faults` of the simulation that it belongs to"
+        if here
+        else "tell the simulator: motorbus simulate FAMILY --faults",
+    )
 
 
 def _yes(word: str, said: object) -> bool:

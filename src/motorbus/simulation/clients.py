@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Final, Protocol
+from copy import deepcopy
+from typing import Any, Final, Protocol
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
-from motorbus.link.base import Adapter
+from motorbus.link.base import Adapter, Line
+from motorbus.simulation.adapter_text import Text
 from motorbus.simulation.listener import TcpClient, TcpPort
 
 MOST_CLIENTS: Final = 16
@@ -71,6 +73,17 @@ class Participant(ABC):
         """It has left, or is to be left."""
         return False
 
+    @property
+    def fixed(self) -> str:
+        """Why its port cannot be pulled; "" when it can."""
+        return "this channel is not ours to pull"
+
+    def unplug(self) -> None:  # noqa: B027 - whose port cannot be pulled is not asked to
+        """The port vanishes, and whoever has it open loses it."""
+
+    def plug(self) -> None:  # noqa: B027 - as above
+        """The port is there again, as new."""
+
     def close(self) -> None:  # noqa: B027 - most do not own their port
         """Hang up."""
 
@@ -85,6 +98,17 @@ class SerialClient(Participant):
         self._endpoint = endpoint
         self._follows = follows
         self._out = bytearray()
+
+    @property
+    def fixed(self) -> str:
+        return _fixed(self._endpoint)
+
+    def unplug(self) -> None:
+        self._out.clear()
+        _pullable(self._endpoint).unplug()
+
+    def plug(self) -> None:
+        _pullable(self._endpoint).plug()
 
     def fileno(self) -> int:
         return self._endpoint.fileno()
@@ -108,21 +132,42 @@ class SerialClient(Participant):
 
 
 class CanClient(Participant):
-    """A program behind an adapter. A frame reaches it whole or, when it does not read, not at all."""
+    """A program behind an adapter. A frame reaches it whole or, when it does not read, not at all.
+
+    What lies between the adapter and its host is told by `heed`.
+    """
 
     def __init__(self, endpoint: Endpoint, adapter: Adapter) -> None:
         self.adapter = adapter
         self._endpoint = endpoint
         self._rate: int | None = None
         self._stuck = False
+        self._as_new = deepcopy(adapter)
+        self._text: Text | None = None
         self._out = bytearray(adapter.greet())
+
+    @property
+    def fixed(self) -> str:
+        return _fixed(self._endpoint)
+
+    def unplug(self) -> None:
+        _pullable(self._endpoint).unplug()
+
+    def plug(self) -> None:
+        _pullable(self._endpoint).plug()
+        self.adapter = deepcopy(self._as_new)
+        self._rate, self._stuck = None, False
+        self._out = bytearray(self.adapter.greet())
 
     def fileno(self) -> int:
         return self._endpoint.fileno()
 
     def read(self, at: float, patience: float = 0.0) -> list[Data]:
-        frames: list[Data] = [*self.adapter.feed(self._endpoint.read(), at)]
+        said = self._endpoint.read()
+        frames: list[Data] = [*self.adapter.feed(self._text.said(said, at) if self._text else said, at)]
         answer = self.adapter.take()
+        if self._text:
+            answer = self._text.answered(answer, at)
         if len(self._out) < _UNREAD:  # who never reads misses answers at last
             self._out += answer
         self._rate = self.adapter.bitrate if self.adapter.open or frames else None
@@ -131,10 +176,16 @@ class CanClient(Participant):
     def rate(self) -> int | None:
         return self._rate
 
+    def heed(self, line: Line | None) -> None:
+        """What lies between adapter and host from now on; None: nothing."""
+        self._text = None if line is None else Text(line)
+
     def tell(self, data: Data, at: float) -> None:
         if not isinstance(data, CanFrame):
             raise RequestError("this simulator speaks bytes, which a CAN adapter cannot carry")
         said = self.adapter.deliver(data, at)
+        if self._text:
+            said = self._text.answered(said, at)
         if self._stuck:
             self.lost += bool(said)
         else:
@@ -164,6 +215,7 @@ class Door:
         self.port = port
         self.clients: list[CanClient] = []
         self._adapter = adapter
+        self._line: Line | None = None
 
     def fileno(self) -> int:
         """Turns readable when somebody knocks."""
@@ -177,7 +229,15 @@ class Door:
         if len(self.clients) >= MOST_CLIENTS:
             connection.close()
         else:
-            self.clients.append(CanClient(connection, self._adapter()))
+            client = CanClient(connection, self._adapter())
+            client.heed(self._line)
+            self.clients.append(client)
+
+    def heed(self, line: Line | None) -> None:
+        """What lies between each adapter and its host from now on; None: nothing."""
+        self._line = line
+        for client in self.clients:
+            client.heed(line)
 
     def sweep(self) -> list[CanClient]:
         """Forget those who have left; these were they."""
@@ -187,9 +247,36 @@ class Door:
             self.clients.remove(client)
         return gone
 
+    @property
+    def fixed(self) -> str:
+        """Why the port cannot be pulled; it can."""
+        return ""
+
+    def unplug(self) -> None:
+        """Hang up on everyone, and refuse whoever comes until `plug`."""
+        for client in self.clients:
+            client.close()
+        self.clients.clear()
+        self.port.unplug()
+
+    def plug(self) -> None:
+        """Listen again."""
+        self.port.plug()
+
     def close(self) -> None:
         """Hang up on everyone and give the port back; calling it again does nothing."""
         for client in self.clients:
             client.close()
         self.clients.clear()
         self.port.close()
+
+
+def _fixed(endpoint: Endpoint) -> str:
+    if hasattr(endpoint, "unplug"):
+        return str(getattr(endpoint, "fixed", ""))
+    return "this port cannot be pulled"
+
+
+def _pullable(endpoint: Endpoint) -> Any:
+    """A port that can be pulled, as `_fixed` has said."""
+    return endpoint

@@ -17,6 +17,7 @@ from typing import Any
 
 from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
+from motorbus.simulation.faulted import Faulted, read_order
 
 LONGEST_LINE = 4096
 MOST_CLIENTS = 16
@@ -27,12 +28,14 @@ LATEST = 20
 """Remarks of each node that `log` gives."""
 HELP = (
     "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | fault ID [NAME=VALUE …] | notice ID"
-    " | log [ID] | help"
+    " | log [ID] | faults [SCRIPT | off] | help"
 )
 
 
 class ControlSocket:
     """An open control socket. Nothing waits in here: whoever serves it selects on `descriptors` and calls `attend`.
+
+    `faults` is what the order `faults` changes and shows; None: there are none to be had.
 
     Raises PortBusy when another simulator listens there, RequestError when something else is there or the path is
     too long, LinkError when the socket cannot be made.
@@ -40,6 +43,7 @@ class ControlSocket:
 
     def __init__(self, path: str | Path, simulator: Simulator) -> None:
         self.path = Path(path)
+        self.faults: Faulted | None = None
         self._simulator = simulator
         self._clients: dict[int, tuple[socket.socket, bytearray]] = {}
         self._listener = _listen(self.path)
@@ -90,7 +94,8 @@ class ControlSocket:
         while b"\n" in waiting:
             line, _, rest = bytes(waiting).partition(b"\n")
             waiting[:] = rest
-            self._answer(descriptor, client, obey(self._simulator, line.decode(errors="replace")))
+            text = obey(self._simulator, line.decode(errors="replace"), self.faults)
+            self._answer(descriptor, client, text)
 
     def _answer(self, descriptor: int, client: socket.socket, text: str) -> None:
         answer = text.encode() + b"\n"
@@ -107,10 +112,13 @@ class ControlSocket:
             client[0].close()
 
 
-def obey(simulator: Simulator, line: str) -> str:
+def obey(simulator: Simulator, line: str, faults: Faulted | None = None) -> str:
     """Carry out one order; gives its one line of answer: `ok`, JSON, or `error: …`."""
     words = line.split()
     try:
+        if words[:1] == ["faults"]:
+            found = read_order(faults, " ".join(words[1:]))
+            return "ok" if found is None else json.dumps(found)
         if not words or words[0] not in _ORDERS:
             raise RequestError(f"{line.strip()!r} is not an order; there are: {HELP}")
         return _ORDERS[words[0]](simulator, words[1:])

@@ -71,6 +71,10 @@ class Course:
             self.rate = rate
             self.simulator.tune(rate)
 
+    def forget(self) -> None:
+        """What is under way never arrives."""
+        self._events.clear()
+
     def hear(self, data: Data, now: float, sender: object = None, rate: int | None = None) -> None:
         """A client has sent this, at this rate (bit/s) if it has set one."""
         at = self._passed(data, now)

@@ -101,6 +101,14 @@ class TcpPort:
             return TcpClient(self._listener.accept()[0])
         return None
 
+    def unplug(self) -> None:
+        """Refuse everybody until `plug`."""
+        self.close()
+
+    def plug(self) -> None:
+        """Listen again where it did. Raises as making it does."""
+        TcpPort.__init__(self, self.host, self.port)
+
     def close(self) -> None:
         """Give the port back; calling it again does nothing."""
         self._listener.close()

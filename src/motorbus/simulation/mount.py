@@ -73,10 +73,38 @@ class Mount:
         self._doors = [place for place in places if isinstance(place, Door)]
         self._fixed = [_participant(place, adapter, rate) for place in places if not isinstance(place, Door)]
         self._lost_before = 0
+        self._pull: float | None = None
+        self._back_at: float | None = None
+
+    @property
+    def fixed(self) -> str:
+        """Why its port cannot be pulled; "" when it can."""
+        return next((place.fixed for place in self._ports if place.fixed), "")
+
+    @property
+    def _ports(self) -> list[Participant | Door]:
+        return [*self._fixed, *self._doors]
+
+    def unplug(self, *, seconds: float) -> None:
+        """Pull every port: whoever has one open loses it, what is under way is lost; after `seconds` they are back."""
+        self._pull = seconds
+        self.course.forget()
+
+    @property
+    def texts(self) -> list[CanClient | Door]:
+        """Where hosts speak to an adapter in text."""
+        return [port for port in self._ports if isinstance(port, CanClient | Door)]
+
+    def text(self, line: Line | None) -> None:
+        """What lies between adapters and their hosts; None: nothing."""
+        for port in self.texts:
+            port.heed(line)
 
     @property
     def clients(self) -> list[Participant]:
         """Whoever takes part now."""
+        if self._back_at is not None:
+            return []
         if not self._doors:
             return self._fixed
         return [*self._fixed, *(client for door in self._doors for client in door.clients)]
@@ -93,12 +121,12 @@ class Mount:
 
     def step(self, stop: int | None = None, timeout: float = _LONGEST_WAIT) -> bool:
         """Wait for the next thing to do, at most so long (s), and do it. True when `stop` has turned readable."""
+        wait = min(timeout, max(0.0, self._next() - self._clock()))
         everyone = {client: client.fileno() for client in self.clients}
         heeded = {} if self.course.crowded else everyone
         readers = {one: client for client, one in heeded.items() if one is not None}
         attended = {one: attendant for attendant in self.attendants for one in attendant.descriptors()}
-        doors = {door.fileno(): door for door in self._doors}
-        wait = min(timeout, max(0.0, self.course.next() - self._clock()))
+        doors = {door.fileno(): door for door in self._doors if self._back_at is None}
         for client, one in heeded.items():
             if one is None:
                 self._hear(client, min(wait, _SLICE))
@@ -108,6 +136,8 @@ class Mount:
         ready, _, _ = select(waiting, stuck, (), wait)
         self._happen(self._clock())
         for descriptor in ready:
+            if self._back_at is not None and descriptor not in attended:
+                continue  # it was pulled just now
             if descriptor in readers:
                 self._hear(readers[descriptor])
             elif descriptor in doors:
@@ -129,11 +159,33 @@ class Mount:
     def _happen(self, now: float) -> None:
         """Everything up to this moment, in order; what a client gets of it leaves in one piece."""
         for event in self.course.happen(now):
-            for client in self.clients:
+            for client in self.clients if self._pull is None else ():
                 if client is not event.sender:
                     client.tell(event.data, min(event.at, now))
         for client in self.clients:
             client.flush()
+        if self._pull is not None:
+            self._go_away(now + self._pull)
+        elif self._back_at is not None and now >= self._back_at:
+            self._come_back()
+
+    def _next(self) -> float:
+        """The next moment at which something happens by itself."""
+        due = self.course.next()
+        return due if self._back_at is None else min(due, self._back_at)
+
+    def _go_away(self, until: float) -> None:
+        if self._back_at is None:
+            for place in self._ports:
+                place.unplug()
+        self._pull, self._back_at = None, until
+        self.course.forget()
+
+    def _come_back(self) -> None:
+        self._back_at = None
+        for place in self._ports:
+            place.plug()
+        self.course.tune(self._others_rate())
 
     def _sweep(self) -> None:
         if not self._doors:

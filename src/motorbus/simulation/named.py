@@ -7,16 +7,26 @@ bus, as with a real port; when it closes its link another may open one, and the 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
+from contextlib import nullcontext
 from itertools import count
+from math import inf
 from threading import Lock
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self, TypeAlias
 
 from motorbus.core.family import Family, Simulator
 from motorbus.errors import PortBusy, PortNotFound, RequestError
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
+from motorbus.simulation.faults import Fault, FaultyLine, Script, World
+from motorbus.simulation.faults.script import script_of
+from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.served import LinkClient, Served, join
+
+Faults: TypeAlias = str | Script | Iterable[Fault]
+KNOCK: Final = 0.1
+"""s of virtual time that an attempt to open takes while the port is away; else it would never come back."""
 
 _live: dict[tuple[str, str], Simulation] = {}
 _numbers = count(1)
@@ -30,6 +40,7 @@ class Simulation:
     `url`        its address, valid in this process until `close`
     `clock`      "virtual": time passes only while a host waits; "real": it runs
     `pace`       set it before a link is opened and bytes take their time on the wire
+    `faults`     a script of what goes wrong, see `motorbus.simulation.faults`
 
     Raises RequestError for an unknown model or option, an impossible clock, or a name that is taken.
     """
@@ -42,6 +53,7 @@ class Simulation:
         model: str = "",
         clock: str = "virtual",
         name: str | None = None,
+        faults: Faults = "",
         **options: object,
     ) -> None:
         if clock not in ("virtual", "real"):
@@ -58,8 +70,13 @@ class Simulation:
         self.simulator: Simulator = family.simulator(ids, model, **options)
         self._line: Line = PerfectLine()
         self._link: MemoryLink | Served | None = None
-        self._left_at = 0.0
+        self._left_at = 0.0 if clock == "virtual" else time.monotonic()
+        self._away_until = -inf
         self._gate = Lock()
+        self._world = World(self.simulator, port=self, now=self._left_at)
+        self._devices: Simulator = self.simulator
+        if faults:
+            self.faults = faults
         self.name = _register(self, name)
 
     @property
@@ -84,7 +101,38 @@ class Simulation:
         with self._gate:
             self._line = line
             if self._link is not None:
-                self._link.line = line
+                self._link.simulator, self._link.line = self._devices, line
+
+    @property
+    def faults(self) -> FaultyLine:
+        """What happens by script, and what has happened; set a script to have it from now on, "" for none.
+
+        Raises RequestError for a bad script, and for what these devices cannot do; the one before goes on then.
+        """
+        return self._line if isinstance(self._line, FaultyLine) else FaultyLine()
+
+    @faults.setter
+    def faults(self, script: Faults) -> None:
+        given = script_of(script)
+        without_adapter(given)
+        link = self._link
+        self._world.port = None if isinstance(link, Served) else self
+        with link.still() if isinstance(link, Served) else nullcontext():
+            self._world.now = max(self._world.now, self._now())
+            line = FaultyLine(given, self._world)
+            self._devices = self._world
+            self.line = line
+
+    def unplug(self, *, seconds: float) -> None:
+        """Pull the port: whoever has it open gets LinkLost, and for so long (s) nobody can open it.
+
+        Raises RequestError while it is served on a channel of somebody else.
+        """
+        if isinstance(self._link, Served):
+            raise RequestError(f"{self.url} is served on a channel that cannot be pulled")
+        self._away_until = self._now() + seconds
+        if self._link is not None:
+            self._link.unplug(seconds=seconds)
 
     def __getitem__(self, node: int) -> Any:
         """The simulated device with this id: at least a `core.family.SimulatedNode`, and what its family adds.
@@ -101,6 +149,7 @@ class Simulation:
         """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
         with self._gate, _lock:
             self._check_free()
+            self._check_there()
             link = _OneAtATime(self, rate or self.family.link.rate, self._left_at)
             self._link = link
             return link
@@ -115,6 +164,8 @@ class Simulation:
         if self.family.link.kind != "frames":
             raise RequestError(f"{self.family.name} devices do not speak CAN")
         said, rate = rate or 0, rate or self.family.link.rate
+        if any(fault.action == "unplug" for fault in self.faults.faults):
+            raise RequestError(f"{port}: unplug pulls a port, and this channel is not ours to pull")
         with self._gate, _lock:
             self._check_free()
             client = join(port, said, self.family.link.rate, **options)
@@ -140,6 +191,24 @@ class Simulation:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _now(self) -> float:
+        """The moment (s) on the devices' clock."""
+        if self._link is not None:
+            return self._link.now()
+        return self._left_at if self.clock == "virtual" else time.monotonic()
+
+    def _check_there(self) -> None:
+        """The port has not been pulled; asking takes its time."""
+        now = self._now()
+        if now < self._away_until:
+            if self.clock == "virtual":
+                self._left_at += KNOCK
+            raise PortNotFound(
+                f"{self.url} is unplugged",
+                cause="a fault of its script has pulled it",
+                advice=f"it is there again in {self._away_until - now:g} s",
+            )
 
     def _check_free(self) -> None:
         if _live.get((self.family.name, self.name)) is not self:
@@ -194,7 +263,7 @@ class _OneAtATime(MemoryLink):
     def __init__(self, simulation: Simulation, rate: int, start: float) -> None:
         self._simulation = simulation
         super().__init__(
-            simulation.simulator,
+            simulation._devices,
             rate=rate,
             line=simulation.line,
             virtual=simulation.clock == "virtual",
@@ -223,7 +292,7 @@ class _ServedOne(Served):
     ) -> None:
         self._simulation = simulation
         simulation.simulator.tune(rate)
-        super().__init__(simulation.simulator, client, line=line, pace=pace, rate=rate, start=start)
+        super().__init__(simulation._devices, client, line=line, pace=pace, rate=rate, start=start)
 
     def close(self) -> None:
         try:

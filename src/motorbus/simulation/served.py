@@ -101,6 +101,15 @@ class Served:
         return time.monotonic() + self._offset
 
     @property
+    def simulator(self) -> Simulator:
+        """The devices; another one may take their place while it is `still`."""
+        return self._mount.simulator
+
+    @simulator.setter
+    def simulator(self, simulator: Simulator) -> None:
+        self._mount.simulator = self._mount.course.simulator = simulator
+
+    @property
     def line(self) -> Line:
         """What lies between hosts and devices; set it to do harm, at any time."""
         return self._mount.course.line

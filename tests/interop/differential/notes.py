@@ -202,8 +202,7 @@ REQUEST_NOTES: Final[Mapping[str, RequestNote]] = MappingProxyType(
         "frame-of-250": RequestNote(
             (OLD, NEW),
             "A packet of more than 250 bytes is refused, and nothing is sent.",
-            "The length byte allows 259 bytes, which is the bound here; the drivers of motorbus keep to 250 where a "
-            "group is written.",
+            "The length byte allows 259 bytes, which is the bound here; rustypot agrees.",
         ),
         "length-stated": RequestNote(
             (CANOPEN,),

@@ -24,7 +24,7 @@ class Pulled:
     def __init__(self) -> None:
         self.pulls: list[float] = []
 
-    def unplug(self, seconds: float) -> None:
+    def unplug(self, *, seconds: float) -> None:
         self.pulls.append(seconds)
 
 
@@ -49,7 +49,6 @@ def test_without_events_it_is_the_simulator() -> None:
     link, world, line, _ = host("")
     assert asked(link, PING) == PONG
     assert world.nodes[1].id == 1
-    assert not world.paced
     assert line.fired == []
 
 
@@ -226,7 +225,7 @@ def test_an_unplugged_link_is_lost() -> None:
     world = World(families.load("feetech").simulator((1,), ""))
 
     class Port:
-        def unplug(self, seconds: float) -> None:
+        def unplug(self, *, seconds: float) -> None:
             link.unplug()
 
     world.port = Port()

@@ -308,6 +308,11 @@ class Part:
         waiting = [place for place in self.places.values() if place.asked is not None and not place.begun]
         return self._release([one for one in waiting if one.claim is not None and one.claim.lost()])
 
+    def release_gone(self) -> None:
+        """The port is gone: nobody is led any more, and no goal that was set before is given when it is there again."""
+        self.command = Command(())
+        self._release([place for place in self.places.values() if place.begun or place.asked is not None])
+
     def release_silent(self) -> None:
         """Who has not been heard for too long to be ordered is left at the last goal that he was told."""
         self._release(

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Exchange, Operation, Report
-from motorbus.errors import Faulted, Interrupted, MotorbusError, Overloaded, RequestError
+from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.body import Body
@@ -327,13 +327,18 @@ class Rounds:
         return state
 
     def _fail(self, told: Mapping[str, Any]) -> None:
-        """A bus has raised: who was told something from elsewhere is led no more, the others there stay for now."""
+        """A bus has raised: who was told something from elsewhere is led no more, the others there stay for now.
+
+        Where the port is gone nobody is: an axis must not go on when the cable is in again.
+        """
         found = dict(told)
         for bus, error in told.items():
             if isinstance(error, MotorbusError):
                 part = self.parts[bus]
                 for place in part.places.values():
                     place.rest()
+                if isinstance(error, LinkLost):
+                    part.release_gone()
                 lost = part.release_lost() if isinstance(error, RELEASES) else []
                 if lost and isinstance(error, Interrupted):
                     found[bus] = stopped(lost)

@@ -166,6 +166,17 @@ def fault(axis: AxisVerbs, why: str) -> None:
     axis.engaged = axis.under_way = False
 
 
+def unknown(axis: AxisVerbs) -> None:
+    """The line to its device was cut, and is there again: where it is, and how it fares, is to be asked anew.
+
+    Nothing is sent. Whoever is to move it, or to give it torque, asks first whether it has kept that it had.
+    """
+    axis.track.forget()
+    axis.canary.at = -inf
+    if axis.reckoning is not None:
+        axis.reckoning.forget("the port of its bus was gone for a while")
+
+
 def cleared(axis: AxisVerbs) -> None:
     """Somebody has seen to it: it may be given torque and moved again. Nothing is sent."""
     gate = _gate(axis)

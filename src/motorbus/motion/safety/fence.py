@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from motorbus.core.operation import Runnable
 from motorbus.errors import RequestError
 from motorbus.motion.reckoning import UNDER_WAY, Reckoning
+from motorbus.motion.safety.canary import unknown
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard, untold
 
@@ -31,6 +32,8 @@ def fence(body: Body) -> None:
         if isinstance(bus.admit, Gate):
             _watched(bus, bus.admit)
             bus.admit.attended, bus.admit.origin = True, body.origins[name]
+            here = [axis for axis in body.axes.values() if axis.spec.bus == name]
+            bus.turns.anew += tuple(partial(unknown, axis) for axis in here)
     for name, bus in body.buses.items():  # those of the file that were not opened are there all the same
         enclose(bus, {one: spec for one, spec in body.machine.axes.items() if spec.bus == name})
     for axis in body.axes.values():
@@ -58,6 +61,7 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
 def _watched(bus: BusFace, gate: Gate) -> None:
     gate.watch(bus.turns.known.seen, bus.link.now, bus.turns.known.stops, bus.turns.known.accepts)
     bus.turns.look = gate.look
+    bus.turns.anew += (gate.forget,)
     bus.readdressed = partial(follow, bus, gate)
 
 

@@ -77,6 +77,12 @@ class Gate:
         """Whether it was told to go on without an end, as far as this gate knows, and has accepted no stop since."""
         return self.turning.goes_on(node)
 
+    def forget(self) -> None:
+        """The line to the nodes was cut, and is there again: where they are, and what waits in them, nobody knows."""
+        self._waiting = Waiting()
+        for guard in self.guards.values():
+            guard.forget()
+
     def loss(self) -> Refused | None:
         """The error for a lease that is lost; None where it is not, or there is none."""
         return None if self.lease is None else self.lease.loss(self._now() - self.origin)

@@ -153,6 +153,12 @@ class Guard:
         here = None if self.track is None else self._here()
         self._due = None if ends or here is None else self._from(here) + way
 
+    def forget(self) -> None:
+        """It may be anywhere, and nobody knows what it is about to do."""
+        self._due = None
+        if self.track is not None:
+            self.track.forget()
+
     def _from(self, here: float) -> float:
         """Where a way begins that it is told now, while it is here: at the end of the last one until it is there."""
         return here if self._due is None or abs(self._due - here) < NEAR else self._due

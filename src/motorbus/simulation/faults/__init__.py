@@ -9,6 +9,7 @@ from motorbus.simulation.faults.fault import ANY, Fault
 from motorbus.simulation.faults.line import FaultyLine
 from motorbus.simulation.faults.script import Script, parse
 from motorbus.simulation.faults.shrink import shrink
+from motorbus.simulation.faults.struck import strike
 from motorbus.simulation.faults.words import WORDS, Word
 from motorbus.simulation.faults.world import Port, World
 
@@ -26,4 +27,5 @@ __all__ = [
     "World",
     "parse",
     "shrink",
+    "strike",
 ]

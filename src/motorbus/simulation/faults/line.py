@@ -58,9 +58,11 @@ class FaultyLine:
     `pending`  what has a place or a moment and has not happened
     `exchange` how many things the host has sent
     `most`     how many of the latest are kept; None: all
+    `began`    from when moments count (s), if not from now
 
     The same script and the same traffic give the same bytes at the same moments. What happens to the bus and its
-    devices needs a `world`; RequestError without one, or when these devices cannot do it.
+    devices needs a `world`, which forgets what another line has wanted of it; RequestError without one, or when these
+    devices cannot do it.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class FaultyLine:
         *,
         adapter: bool = False,
         most: int | None = None,
+        began: float | None = None,
     ) -> None:
         given = script_of(script)
         self.faults = tuple(fault for fault in given if fault.adapter is adapter)
@@ -85,9 +88,11 @@ class FaultyLine:
         self._ways = {Side.HOST: _Way(), Side.DEVICE: _Way()}
         self._waiting: dict[int, list[tuple[int, Fault]]] = {}
         self._timed: set[int] = set()
-        self._began = world.now if world is not None else 0.0
+        self._began = began if began is not None else world.now if world is not None else 0.0
         for fault in self.faults:
             self._check(fault)
+        if world is not None:
+            world.forget()
         for index, fault in enumerate(self.faults):
             self._place(index, fault)
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import Any, Final
 
 from motorbus.errors import RequestError
@@ -171,7 +170,7 @@ def _nonsense(said: str, count: int) -> RequestError:
     unknown = [
         word for word in re.findall(r"[a-z][a-z-]*", said.lower()) if word not in (*_KEYS, *WORDS, "at", "to")
     ]
-    near = [match for word in unknown for match in get_close_matches(word, [*_KEYS, *WORDS], n=1)]
+    near = [match for word in unknown for match in _near(word, [*_KEYS, *WORDS], 1)]
     return RequestError(
         f"line {count}: {said!r} is not a fault",
         expected=EXAMPLES,
@@ -180,8 +179,14 @@ def _nonsense(said: str, count: int) -> RequestError:
 
 
 def _unknown(word: str, said: str, count: int) -> RequestError:
-    near = get_close_matches(word, WORDS, n=3)
+    near = _near(word, WORDS, 3)
     return RequestError(
         f"line {count}: {said!r} is not a fault: there is no {word!r}",
         expected=f"perhaps {' or '.join(near)}" if near else f"one of {', '.join(WORDS)}",
     )
+
+
+def _near(word: str, known: Iterable[str], most: int) -> list[str]:
+    from difflib import get_close_matches  # only who has made a mistake waits for it
+
+    return get_close_matches(word, list(known), n=most)

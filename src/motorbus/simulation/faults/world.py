@@ -26,7 +26,7 @@ _TWINS = "duplicate"
 class Port(Protocol):
     """Where clients come in, when it can be pulled."""
 
-    def unplug(self, seconds: float) -> None:
+    def unplug(self, *, seconds: float) -> None:
         """The port vanishes for so long (s), from now on. What is under way is lost."""
 
 
@@ -45,7 +45,7 @@ class _Armed(NamedTuple):
 
 
 class World:
-    """A `Simulator` around another, to which things happen.
+    """A `Simulator` around another, to which things happen. All else of the other is there too.
 
     `simulator`  the devices
     `port`       what is pulled by `unplug`; None: it cannot be, `why` says the reason
@@ -65,10 +65,8 @@ class World:
         self._armed: list[_Armed] = []
         self._out: list[tuple[float, Data]] = []
 
-    @property
-    def paced(self) -> bool:
-        """As the devices say."""
-        return bool(getattr(self.simulator, "paced", False))
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.__dict__["simulator"], name)
 
     @property
     def nodes(self) -> Mapping[int, SimulatedNode]:
@@ -161,7 +159,7 @@ class World:
     def _do(self, fault: Fault, tell: Callable[[float], None], moment: float) -> None:
         if fault.action == "unplug":
             if self.port is not None:
-                self.port.unplug(fault.seconds)
+                self.port.unplug(seconds=fault.seconds)
         elif fault.action == "power-cycle":
             for node in self._whom(fault):
                 node.power_cycle()

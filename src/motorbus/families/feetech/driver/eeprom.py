@@ -25,7 +25,15 @@ from motorbus.core.goal import Later
 from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
 from motorbus.errors import OutcomeUnknown
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import Block, acknowledged, confirmed, read_block, verified
+from motorbus.families.feetech.driver.exchanges import (
+    DOUBTS,
+    Block,
+    acknowledged,
+    confirmed,
+    read_block,
+    unread,
+    verified,
+)
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.torque import LIMP, disable_torque
 
@@ -105,8 +113,11 @@ def _harmless(node: Node, pending: int) -> Operation[None]:
 
 def still_open(node: Node, lock: int) -> Operation[None]:
     """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
-    right, and keeps none. Raises OutcomeUnknown."""
-    found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+    right, and keeps none. Raises OutcomeUnknown, also when that cannot be found out."""
+    try:
+        found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+    except DOUBTS as error:
+        raise unread(node, error) from error
     if found != _OPEN:
         raise OutcomeUnknown(
             f"node {node.node} has closed its EEPROM lock by itself while it was written to",

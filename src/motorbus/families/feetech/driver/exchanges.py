@@ -236,15 +236,31 @@ def confirmed(
 def verified(
     node: Node, block: Block, doubt: MotorbusError | None = None, *, timeout: Timeout = Timeout.REPLY
 ) -> Operation[None]:
-    """Read back what was written. Raises VerificationFailed when it differs, `doubt` when nobody answers."""
+    """Read back what was written. Raises VerificationFailed when it differs, OutcomeUnknown when nobody answers.
+
+    `doubt` is how the write itself failed, if it did.
+    """
     try:
         found = yield from read_block(node, block.address, len(block.data), bytes, timeout=timeout)
     except DOUBTS as error:
-        if doubt is None:
-            raise
-        raise doubt from error
+        if isinstance(doubt, OutcomeUnknown):
+            raise doubt from error
+        raise unread(node, doubt or error) from error
     if found != block.data:
         raise _differs(node, block, found) from doubt
+
+
+def unread(node: Node, why: MotorbusError) -> OutcomeUnknown:
+    """The error for a write that has left, when nobody tells what became of it."""
+    return OutcomeUnknown(
+        f"{why.summary}; whether the write took effect is not known",
+        sent=why.sent,
+        received=why.received,
+        expected=why.expected,
+        cause=why.cause,
+        advice=why.advice,
+        node=node.node,
+    )
 
 
 def _differs(node: Node, block: Block, found: bytes) -> VerificationFailed:

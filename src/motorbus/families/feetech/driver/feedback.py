@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
+from motorbus.core.agreed import agreed
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import State
 from motorbus.core.operation import Exchange, Operation, Runnable
@@ -76,11 +77,14 @@ def _raw(row: Entry, data: bytes) -> int:
     return row.decode(data[row.address - PRESENT : row.address - PRESENT + row.size])
 
 
-def position(node: Node) -> Runnable[float]:
+def position(node: Node, *, confirmed: bool = False) -> Runnable[float]:
     """Present position, rad, with the homing offset taken out in every mode: the servo does so in position mode only.
 
-    Raises DeviceError when the register map is not known.
+    `confirmed` reads until two readings in a row are the same, for a shaft at rest: the sum of a reply has 8 bits only.
+    Raises DeviceError when the register map is not known, VerificationFailed when no two of eight are the same.
     """
+    if confirmed:
+        return agreed(lambda: _quantity(node, "present_position"), node=node.node, what="position")
     return _quantity(node, "present_position")
 
 

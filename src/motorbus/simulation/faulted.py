@@ -1,0 +1,130 @@
+"""The faults of a simulation that is served: set before, changed and looked at while it runs.
+
+The wire suffers at the course of the mount, devices and ports in a `World`, and the text between a CAN adapter and its
+host at the clients, for it has neither check sum nor time of its own.
+"""
+
+from __future__ import annotations
+
+import secrets
+from typing import Any, Final
+
+from motorbus.errors import RequestError
+from motorbus.link.base import PerfectLine
+from motorbus.simulation.faults import FaultyLine, Script, World
+from motorbus.simulation.faults.script import script_of
+from motorbus.simulation.faults.struck import without_adapter
+from motorbus.simulation.mount import Mount
+
+SCHEMA: Final = "motorbus.simulator-script/1"
+KEPT: Final = 1000
+"""So many of the latest that happened are kept, and twice as many at most."""
+TOLD: Final = 20
+"""So many of them are told at once."""
+MOST: Final = 5
+"""Lines in a second for whoever watches; what is beyond is counted."""
+
+
+class Faulted:
+    """What goes wrong on a mount, whose simulator is this world. `count` tells how much has happened."""
+
+    def __init__(self, mount: Mount, world: World) -> None:
+        self._mount = mount
+        self._world = world
+        self._began = world.now
+        self._lines: tuple[FaultyLine, ...] = ()
+        self._script = Script()
+        self._before = self._seen = self._left = 0
+        self._since = 0.0
+        self._room = MOST
+        world.why = mount.fixed
+        world.port = None if world.why else mount
+
+    @property
+    def count(self) -> int:
+        """How many faults have happened, under all scripts."""
+        return self._before + sum(line.count for line in self._lines)
+
+    @property
+    def script(self) -> Script:
+        """What is set, with its seed where chance decides anything."""
+        return self._script
+
+    def set(self, script: Script | str) -> None:
+        """Let this happen from now on, in place of what was set. Moments count from the beginning of the simulation.
+
+        A script that leaves anything to chance and says no seed gets one. Raises RequestError for a bad script, and for
+        what cannot happen here; what was set goes on then.
+        """
+        given = script_of(script)
+        if given.by_chance:
+            given = given.seeded(secrets.randbelow(1 << 32))
+        if not self._mount.texts:
+            without_adapter(given)
+        line = FaultyLine(given, self._world, most=KEPT, began=self._began)
+        text = FaultyLine(given, adapter=True, most=KEPT, began=self._began)
+        self._before = self._seen = self.count
+        self._mount.course.line = line if len(given) else PerfectLine()
+        self._mount.text(text if text.faults else None)
+        self._lines, self._script = (line, text), given
+
+    def facts(self) -> dict[str, Any]:
+        """What is set, what has happened and what has not, as plain data; times in s from the beginning."""
+        fired = sorted(
+            ((fired.at, fired.fault) for line in self._lines for fired in line.fired), key=lambda one: one[0]
+        )
+        return {
+            "schema": SCHEMA,
+            "simulated": True,
+            "script": self._script.line,
+            "seed": self._script.seed,
+            "exchange": self._lines[0].exchange if self._lines else 0,
+            "count": self.count,
+            "fired": [{"at": round(at - self._began, 6), "fault": fault} for at, fault in fired[-TOLD:]],
+            "pending": [str(fault) for line in self._lines for fault in line.pending][:TOLD],
+        }
+
+    def remarks(self, now: float) -> list[str]:
+        """What is to be shown of what has happened since the last call, at this moment (s); not too many of them."""
+        found: list[str] = []
+        if now - self._since >= 1.0:
+            found += self.rest()
+            self._since, self._room = now, MOST
+        fresh = self.count - self._seen
+        if fresh:
+            self._seen += fresh
+            fired = sorted((one.at, one.fault) for line in self._lines for one in line.fired[-fresh:])[
+                -fresh:
+            ]
+            shown = fired[: self._room]
+            found += [f"{at - self._began:9.3f} s  fault: {fault}" for at, fault in shown]
+            self._room -= len(shown)
+            self._left += fresh - len(shown)
+        return found
+
+    def rest(self) -> list[str]:
+        """How many have not been shown; nothing when none."""
+        left, self._left = self._left, 0
+        return [f"… and {left} more faults"] if left else []
+
+    def replay(self) -> str:
+        """How to have all of it again; "" when nothing happened."""
+        if not self.count:
+            return ""
+        how = f"faults: {self.count} happened"
+        if self._script.by_chance:
+            how += f", by the seed {self._script.seed}; the same again: --faults '{self._script.line}'"
+        return how
+
+
+def read_order(faults: Faulted | None, text: str) -> dict[str, Any] | None:
+    """Carry out an order of a control socket: a script, `off`, or nothing, which asks for the facts.
+
+    Raises RequestError as `Faulted.set` does, and where a simulation takes no faults.
+    """
+    if faults is None:
+        raise RequestError("this simulation takes no faults")
+    if not text:
+        return faults.facts()
+    faults.set("" if text == "off" else text)
+    return None

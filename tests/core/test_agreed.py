@@ -1,0 +1,53 @@
+"""Two readings in a row that say the same: no more are made than it takes, and not for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from motorbus.core.agreed import READINGS, agreed
+from motorbus.core.operation import Operation
+from motorbus.errors import NoReply, VerificationFailed
+
+
+def judged(values: Iterator[int]) -> int:
+    """Carries `agreed` out over these readings, none of which needs a bus."""
+
+    def reading() -> Operation[int]:
+        yield from ()
+        return next(values)
+
+    def run() -> Operation[None]:
+        told.append((yield from agreed(reading, node=3, what="position")))
+
+    told: list[int] = []
+    assert list(run()) == []
+    return told[0]
+
+
+@pytest.mark.parametrize(
+    ("told", "left"), [([5, 5, 6], [6]), ([5, 6, 6, 7], [7]), ([1, 2, 1, 2, 3, 3], []), ([9, 9], [])]
+)
+def test_the_first_two_in_a_row_that_agree_are_believed(told: list[int], left: list[int]) -> None:
+    values = iter(told)
+    agreed_on = judged(values)
+    assert list(values) == left
+    assert agreed_on == told[len(told) - len(left) - 1]
+
+
+def test_what_changes_all_the_time_is_not_read_for_ever() -> None:
+    values = iter(range(100))
+    with pytest.raises(VerificationFailed, match="6 and 7") as raised:
+        judged(values)
+    assert next(values) == READINGS
+    assert raised.value.node == 3
+
+
+def test_a_reading_that_fails_fails_the_whole() -> None:
+    def silent() -> Operation[int]:
+        yield from ()
+        raise NoReply("nobody")
+
+    with pytest.raises(NoReply):
+        next(agreed(silent, node=1, what="position"))

@@ -1,0 +1,181 @@
+"""What is called of KST servos under fire, and what can happen on their bus.
+
+CAN controllers throw damaged frames away, so a frame comes, or comes late, or twice at once, or not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+from motorbus.core.operation import Exchange, Operation, Together, outcome
+from motorbus.errors import MotorbusError
+from motorbus.families.kst import FAMILY, Servo
+from motorbus.families.kst.driver.exchanges import upload_row
+from tests.faults.machine import Rig, machine
+from tests.faults.oracle import FalseWord, Window
+
+IDS = (0x25, 0x26)
+PROFILE = "kst-ext"
+RANGE = 250
+"""Raw goals are at most so far from the middle; travel limits are further away."""
+
+
+class KstRig(Rig):
+    """Two servos that tell more than the manual says."""
+
+    exchanges = 30  # of a write that is saved, with all that it makes sure of
+    faults = {
+        "reply lost": ": drop",
+        "reply broken": ": corrupt",
+        "reply late": ": delay {late}",
+        "reply stalled": ": stall {late}",
+        "reply held back": ": reorder {near}",
+        "reply merged": ": merge",
+        "reply copied": ": duplicate",
+        "request lost": "to device: drop",
+        "request broken": "to device: corrupt",
+        "request late": "to device: delay {near}",
+        "request copied": "to device: duplicate",
+        "power cycle": ": power-cycle {node}",
+        "brown-out": ": brown-out {near} {node}",
+        "clock step": ": clock-step 3600",
+    }
+
+    def __init__(self) -> None:
+        family = FAMILY.configured(profile=PROFILE)
+        super().__init__(family, FAMILY.simulator(IDS, "", profile=PROFILE), 500_000, pace=True)
+        self.servos = {node: Servo(self.bus, node) for node in IDS}
+        self.table = self.servos[IDS[0]].table
+        self.readable = [row.name for row in self.table.values() if row.readable]
+        self.fresh = 0
+        for servo in self.servos.values():
+            servo.ping()
+        self.verbs = {
+            "ping": self.ping,
+            "position": self.position,
+            "read": self.read,
+            "telemetry": self.telemetry,
+            "write": self.write,
+            "set limits": self.set_limits,
+            "move": self.move,
+            "stop": self.stop,
+            "at once": self.at_once,
+            "turn by hand": self.turn,
+        }
+
+    def slowest(self) -> Exchange[Any]:
+        return upload_row(Servo(self.bus, IDS[0]), self.table["present_position"], int) if hasattr(self, "table") else self.family.probe(IDS[0], 0)
+
+    def one(self, random: Random) -> Servo:
+        """One of them."""
+        return self.servos[random.choice(IDS)]
+
+    def held(self, window: Window, node: int, name: str, value: float) -> None:
+        """Judge a value in API units."""
+        self.oracle.told(window, node, name, self.servos[node].raw(self.table[name], value))
+
+    # -- verbs --------------------------------------------------------------------------------------------------------
+
+    def probe(self) -> Window:
+        return self.position(Random(self.line.exchange))
+
+    def ping(self, random: Random) -> Window:
+        servo, there = self.one(random), None
+        fired, troubled = self.line.count, self.troubled
+        with self.oracle.call(self.bound) as window:
+            there = servo.ping()
+        if there is False and not troubled and fired == self.line.count and not self.troubled:
+            raise FalseWord(f"servo {servo.node} is there, and ping says that it is not")
+        return window
+
+    def position(self, random: Random) -> Window:
+        servo, value = self.one(random), None
+        with self.oracle.call(self.bound) as window:
+            value = servo.position()
+        if value is not None:
+            self.held(window, servo.node, "present_position", value)
+        return window
+
+    def read(self, random: Random) -> Window:
+        servo, found = self.one(random), dict[str, int]()
+        names = random.sample(self.readable, random.randrange(1, 4))
+        with self.oracle.call(self.bound) as window:
+            found = servo.read_raw(*names)
+        for name, raw in found.items():
+            self.oracle.told(window, servo.node, name, raw)
+        return window
+
+    def telemetry(self, random: Random) -> Window:
+        servo, state = self.one(random), None
+        with self.oracle.call(self.bound) as window:
+            state = servo.telemetry()
+        if state is not None:
+            self.held(window, servo.node, "present_position", state.position)
+        return window
+
+    def new(self, low: int, high: int) -> int:
+        """A value that has not been written lately."""
+        self.fresh += 1
+        return low + self.fresh * 7 % (high - low)
+
+    def writing(self, servo: Servo, name: str, raw: int, call: Callable[[], object]) -> Window:
+        """Write a value by whatever verb, and judge that."""
+        with self.oracle.call(self.bound) as window:
+            call()
+        self.oracle.wrote(window, servo.node, name, raw)
+        return window
+
+    def write(self, random: Random) -> Window:
+        servo, (name, low) = self.one(random), random.choice([("negative_limit", -900), ("positive_limit", 300)])
+        raw = self.new(low, low + 600)
+        value = servo.value(self.table[name], raw)
+        return self.writing(servo, name, raw, lambda: servo.write(**{name: value}))
+
+    def set_limits(self, random: Random) -> Window:
+        servo, low, high = self.one(random), self.new(-900, -300), self.new(300, 900)
+        values = [float(servo.value(self.table["present_position"], raw)) for raw in (low, high)]
+        with self.oracle.call(self.bound) as window:
+            servo.set_travel_limits(*values)
+        if window.error is None:
+            self.oracle.told(window, servo.node, "negative_limit", low)
+            self.oracle.told(window, servo.node, "positive_limit", high)
+        return window
+
+    def move(self, random: Random) -> Window:
+        servo, raw = self.one(random), self.new(-RANGE, RANGE)
+        value = float(servo.value(self.table["goal_position"], raw))
+        return self.writing(servo, "goal_position", raw, lambda: servo.move(value, wait=False))
+
+    def stop(self, random: Random) -> Window:
+        servo = self.one(random)
+        with self.oracle.call(self.bound) as window:
+            servo.stop()
+        return window
+
+    def at_once(self, random: Random) -> Window:
+        found: list[Any] = []
+
+        def together() -> Operation[list[Any]]:
+            asked = [outcome(type(servo).position.function(servo)) for servo in self.servos.values()]
+            return (yield from Together(asked))
+
+        with self.oracle.call(len(IDS) * self.bound) as window:
+            found = self.bus.run(together())
+        for node, value in zip(IDS, found, strict=False):
+            if not isinstance(value, MotorbusError):
+                self.held(window, node, "present_position", value)
+        return window
+
+    def turn(self, random: Random) -> Window:
+        """Somebody turns a shaft; nothing is called."""
+        self.link.advance(1e-5)
+        self.simulator.servos[random.randrange(len(IDS))].raw_position = random.randrange(-RANGE, RANGE)
+        self.link.advance(1e-5)
+        with self.oracle.call(0.0) as window:
+            pass
+        return window
+
+
+KstSteps = machine(KstRig, list(KstRig().verbs), list(KstRig.faults))

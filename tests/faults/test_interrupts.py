@@ -1,0 +1,126 @@
+"""Row L17: Ctrl-C, or no more memory, at every line of every kind of transaction of all families, and of a stop.
+
+Wherever it falls, whoever called is told so by an exception; nothing of the call is left on the bus; the next read is
+right, the second at the latest; and a stop goes out. In the long runs that is every line that is executed, at its first
+visits; else a few of each kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from motorbus.bus.stop import StopOutcome
+from tests.conftest import Figures
+from tests.faults.cutting import NEVER, UNSENT, afterwards, cut, left_behind, places, told
+from tests.faults.scenes import IDS, KINDS, Scene, off
+
+Rounds = Callable[[int], int]
+ERRORS = (KeyboardInterrupt, MemoryError)
+VISITS = 8
+
+
+def most(rounds: Rounds, usual: int) -> int:
+    """How many places: all in the long runs, else so many."""
+    return NEVER if rounds(1_000_000) == 1_000_000 else usual
+
+
+def faults(kind: str, at: int, error: type[BaseException]) -> list[str]:
+    """What is wrong when this kind of transaction is cut there."""
+    how = KINDS[kind]
+    there = Scene(how.family)
+    how.prepare(there)
+    before = len(there.wire.sent)
+    came = cut(lambda: there.bus.run(how.act(there)), at, error)
+    wrong = [] if came.where is not None else ["it was not cut"]
+    if not isinstance(came.error, error):
+        wrong.append(f"it ended with {came.error!r}, {came.value!r}")
+    if UNSENT.search(told(came.error)) and len(there.wire.sent) > before:
+        wrong.append("something was sent, and it says that nothing was")
+    return [f"{one}, cut at {came.where}" for one in wrong + afterwards(there, there.bus.run)]
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("kind", KINDS)
+def test_l17_an_interrupt_at_any_line_of_a_transaction(kind: str, rounds: Rounds, figures: Figures) -> None:
+    how = KINDS[kind]
+    there = Scene(how.family)
+    how.prepare(there)
+    whole = cut(lambda: there.bus.run(how.act(there)))
+    assert whole.error is None
+    assert how.done(there, whole.value), "when it is not cut it is done"
+    spots = places(whole.walked, VISITS, most(rounds, 9))
+    total = 0
+    for error in ERRORS:
+        for at in spots:
+            assert faults(kind, at, error) == [], (error.__name__, at)
+            total += 1
+    lines = len(set(whole.walked))
+    figures(f"L17 interrupts: {kind}", family=how.family, lines=lines, cuts=total, stuck=0, wrong=0)
+
+
+def stopped(there: Scene) -> None:
+    """A bus on which something moves and everyone has been heard."""
+    off(there)
+    for device in there.devices:
+        device.ping()
+
+
+def stop_faults(family: str, at: int, error: type[BaseException]) -> list[str]:
+    """What is wrong when an emergency stop is cut there."""
+    there = Scene(family)
+    stopped(there)
+    before = len(there.wire.sent)
+    came = cut(there.bus.estop, at, error)
+    wrong = [] if came.where is not None else ["it was not cut"]
+    if isinstance(
+        came.value, StopOutcome
+    ):  # the frames that were made before do where new ones cannot be made
+        wrong += [] if set(came.value.acknowledged) == set(there.ids) else [f"it ended with {came.value}"]
+    elif not isinstance(came.error, error):
+        wrong.append(f"it ended with {came.error!r}")
+    begun = there.bus.turns.latched
+    wrong += left_behind(there)
+    there.settle()
+    if begun and there.moving():
+        wrong.append("it was latched, and something moves")
+    if not begun and len(there.wire.sent) > before:
+        wrong.append("something was sent, and it is not latched")
+    there.bus.reset()
+    return [f"{one}, cut at {came.where}" for one in wrong + afterwards(there, there.bus.run)]
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("family", IDS)
+def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
+    family: str, rounds: Rounds, figures: Figures
+) -> None:
+    """Once it has begun it goes out, is repeated until everyone has acknowledged, and only then is anything raised."""
+    there = Scene(family)
+    stopped(there)
+    whole = cut(there.bus.estop)
+    assert set(whole.value.acknowledged) == set(there.ids)
+    spots = places(whole.walked, VISITS, most(rounds, 9))
+    for error in ERRORS:
+        for at in spots:
+            assert stop_faults(family, at, error) == [], (error.__name__, at)
+    cuts = len(ERRORS) * len(spots)
+    figures(
+        "L17 interrupts: emergency stop", family=family, lines=len(set(whole.walked)), cuts=cuts, unsent=0
+    )
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("kind", ["feetech guarded write", "kst run", "stepper home"])
+def test_l17_a_second_interrupt_at_any_line_of_the_clean_up(kind: str, rounds: Rounds) -> None:
+    how = KINDS[kind]
+    there = Scene(how.family)
+    how.prepare(there)
+    whole = cut(lambda: there.bus.run(how.act(there)))
+    for number, at in enumerate(places(whole.walked, 2, most(rounds, 9))):
+        there = Scene(how.family)
+        how.prepare(there)
+        came = cut(lambda: there.bus.run(how.act(there)), at, KeyboardInterrupt, later=1 + number * 37 % 400)
+        assert isinstance(came.error, KeyboardInterrupt), came.where
+        assert afterwards(there, there.bus.run) == [], (at, came.where)

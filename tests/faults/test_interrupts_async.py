@@ -1,0 +1,115 @@
+"""Row L17 on an event loop: a task is cancelled at every await, and Ctrl-C or want of memory falls on any line.
+
+As on a blocking bus: an exception and never a value, nothing left on the bus, the next reads are right, a stop goes
+out.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from motorbus.bus.aio import AsyncBus
+from tests.conftest import Figures
+from tests.faults.cutting import NEVER, Outcome, afterwards, cut, places
+from tests.faults.scenes import KINDS, Scene
+from tests.faults.test_interrupts import ERRORS, VISITS, most
+
+Rounds = Callable[[int], int]
+ASYNC = [kind for kind, how in KINDS.items() if how.prepare in (Scene.stir, KINDS["kst read"].prepare)]
+"""All but those that are prepared by verbs of a blocking bus."""
+
+
+@contextmanager
+def looped(kind: str) -> Iterator[tuple[Scene, asyncio.AbstractEventLoop]]:
+    """A scene of this kind on an async bus, and the loop it lives on."""
+    loop = asyncio.new_event_loop()
+    try:
+        yield Scene(KINDS[kind].family, face=AsyncBus), loop
+    finally:
+        loop.close()
+
+
+def waited(there: Scene, loop: asyncio.AbstractEventLoop, operation: Any) -> Any:
+    """Run it in a task of its own until that ends."""
+    return loop.run_until_complete(there.bus.run(operation))
+
+
+def cut_in_loop(
+    there: Scene, loop: asyncio.AbstractEventLoop, kind: str, at: int, error: type[BaseException]
+) -> Outcome:
+    """The operation in a task, cut at a line; a task that outlived that is awaited to its end."""
+    tasks: list[asyncio.Task[Any]] = []
+
+    def act() -> Any:
+        tasks.append(loop.create_task(there.bus.run(KINDS[kind].act(there))))
+        return loop.run_until_complete(tasks[0])
+
+    came = cut(act, at, error)
+    if tasks and not tasks[0].done():
+        loop.run_until_complete(asyncio.wait(tasks))
+    return came
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("kind", ASYNC)
+def test_l17_an_interrupt_at_any_line_of_a_task(kind: str, rounds: Rounds, figures: Figures) -> None:
+    with looped(kind) as (there, loop):
+        KINDS[kind].prepare(there)
+        whole = cut_in_loop(there, loop, kind, NEVER, KeyboardInterrupt)
+        assert whole.error is None
+    spots = places(whole.walked, VISITS, most(rounds, 4))
+    for error in ERRORS:
+        for at in spots:
+            with looped(kind) as (there, loop):
+                came = cut_in_loop(there, loop, kind, at, error)
+                assert came.where is not None
+                assert isinstance(came.error, error), came
+                wrong = afterwards(there, lambda operation: waited(there, loop, operation))
+                assert wrong == [], came.where
+    cuts = len(ERRORS) * len(spots)
+    figures(f"L17 interrupts: {kind}, in a task", family=KINDS[kind].family, cuts=cuts, stuck=0, wrong=0)
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("kind", ASYNC)
+def test_l17_a_task_that_is_cancelled_at_any_await(kind: str, rounds: Rounds, figures: Figures) -> None:
+    awaits, cancelled = 0, True
+    step = 1 if rounds(1_000_000) == 1_000_000 else 7
+    count = 0
+    while cancelled:
+        awaits += step
+        count += 1
+        with looped(kind) as (there, loop):
+            KINDS[kind].prepare(there)
+            ended = loop.run_until_complete(cancelled_after(there, kind, awaits))
+            cancelled = isinstance(ended, asyncio.CancelledError)
+            assert cancelled or not told(kind) or KINDS[kind].done(there, ended), (
+                "never a value that is wrong"
+            )
+            wrong = afterwards(there, lambda operation: waited(there, loop, operation))
+            assert wrong == [], awaits
+            assert awaits < 10_000, "it has no end"
+    figures(f"L17 cancelled: {kind}", family=KINDS[kind].family, awaits=awaits, cuts=count, stuck=0, wrong=0)
+
+
+def told(kind: str) -> bool:
+    """Whether what it did can be told without asking the device by a blocking bus."""
+    return kind.endswith(("read", "dump", "torque"))
+
+
+async def cancelled_after(there: Scene, kind: str, awaits: int) -> Any:
+    """The value, or CancelledError, of a task that is cancelled when it has awaited so often."""
+    task = asyncio.ensure_future(there.bus.run(KINDS[kind].act(there)))
+    for _ in range(awaits):
+        if task.done():
+            break
+        await asyncio.sleep(0)
+    else:
+        task.cancel()
+    (found,) = await asyncio.gather(task, return_exceptions=True)
+    return found
