@@ -43,6 +43,7 @@ docs: $(READY)
 	$(BIN)/python -m scripts.feetech_registers
 	$(BIN)/python -m scripts.feetech_peers
 	$(BIN)/python -m scripts.machine_file
+	$(BIN)/python -m scripts.mutants --write
 	$(BIN)/python -m scripts.reliability
 	$(BIN)/zensical build --strict --clean
 

@@ -1,4 +1,4 @@
-"""What `python -m scripts.mutants` does: which faults it knows, that it notices what tests notice, that its page is true.
+"""What `python -m scripts.mutants` does: which faults it knows, that it notices what tests notice, that its page is so.
 
 The trial itself is long and stands in `make soak`; here one small file of the project is tried with a few faults.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import os
-from collections import Counter
 
 import pytest
 
@@ -75,13 +74,12 @@ def test_what_no_run_can_show_is_left_alone(source: str) -> None:
 
 
 def test_each_fault_has_a_name_of_its_own_and_leaves_the_tree_as_it_was() -> None:
-    for subject in subjects().values():
-        for fault in faults(subject, Wish(sample=0.05)):
-            before = ast.dump(fault.tree)
-            fault.mutant.code(fault.tree, fault.path)
-            assert ast.dump(fault.tree) == before
-        names = Counter(fault.name for fault in faults(subject, Wish()))
-        assert max(names.values()) == 1
+    told = faults(ABORT, Wish())
+    assert len({fault.name for fault in told}) == len(told) > 60
+    for fault in told[-12:]:
+        before = ast.dump(fault.tree)
+        fault.mutant.code(fault.tree, fault.path)
+        assert ast.dump(fault.tree) == before
 
 
 def test_a_name_outlives_the_lines_around_it() -> None:
@@ -111,7 +109,7 @@ def test_a_trial_says_which_test_noticed_and_which_fault_none() -> None:
     """One fault in a function, one in a table that is made at import, and one that changes nothing."""
     swapped, anew = "abort_text: return ABORTS[code] → return None", "84082688 → 84082689"
     alike = "abort_text: 0 <= code <= 4294967295 → 0 < code <= 4294967295"
-    found = {}
+    found: dict[str, str] = {}
     for name in (swapped, anew, alike):
         found |= {one.fault: one.by for one in trial(ABORT, Wish(only=f"abort.py {name}"))}
     assert set(found) == {f"abort.py {name}" for name in (swapped, anew, alike)}
@@ -142,4 +140,6 @@ def test_the_page_is_made_of_what_is_kept() -> None:
 
 def test_every_survivor_has_its_reason() -> None:
     known = subjects()
-    assert [line for name, told in record.kept().items() for line in record.complaints(known[name], told)] == []
+    assert [
+        line for name, told in record.kept().items() for line in record.complaints(known[name], told)
+    ] == []

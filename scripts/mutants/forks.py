@@ -80,7 +80,6 @@ def _in_child(work: Callable[[J], Any], job: J, seconds: float, tell: int) -> No
         most = round(seconds) + 2
         resource.setrlimit(resource.RLIMIT_CPU, (most, most))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        signal.alarm(round(LATE * seconds) + 10)  # should the parent be gone by then
         said = pickle.dumps(work(job))
         while said:
             said = said[os.write(tell, said) :]

@@ -11,11 +11,12 @@ from __future__ import annotations
 import gc
 import importlib
 import os
+import signal
 import sys
 import threading
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import spec_from_file_location
@@ -86,9 +87,11 @@ class _Tests:
         if report.failed and not self.failed:
             self.failed = report.nodeid or "collection"
 
-    def run(self, items: Sequence[pytest.Item]) -> str:
-        """The name of the first that failed, "" when all passed."""
+    def run(self, items: Sequence[pytest.Item], lasted: Mapping[str, float]) -> str:
+        """The name of the first that failed, "" when all passed. One that lasts much too long ends this process."""
         for item, following in zip(items, [*items[1:], None], strict=True):
+            signal.setitimer(signal.ITIMER_PROF, 0.5 + 5 * lasted[item.nodeid])
+            signal.setitimer(signal.ITIMER_REAL, 5 + 10 * lasted[item.nodeid])
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
             if self.failed:
                 break
@@ -179,21 +182,27 @@ class Gathered(_Tests):
                 if len(code.co_freevars) != len(function.__code__.co_freevars):
                     return ""  # it takes a new import
                 function.__code__ = code
-        return self.run([self.items[name] for name in order.of(fault)])
+        return self.run([self.items[name] for name in order.of(fault)], order.lasted)
 
 
 def _others() -> list[str]:
     """Modules that were installed or belong to Python: none that lies in a folder of this project."""
-    found = []
-    for name, module in sys.modules.items():
-        file = getattr(module, "__file__", None) or f"{ROOT}/"
-        if not file.startswith(f"{ROOT}/") or "/site-packages/" in file:
-            found.append(name)
-    return found
+    return [name for name, module in sys.modules.items() if not any(map(_ours, _places(module)))]
+
+
+def _places(module: object) -> list[str]:
+    file = getattr(module, "__file__", None)
+    return [file] if file else list(getattr(module, "__path__", ()))
+
+
+def _ours(path: str) -> bool:
+    return path.startswith(f"{ROOT}/") and "/site-packages/" not in path
 
 
 def progress(verdicts: Sequence[Verdict], of: int) -> str:
-    """How far it is, at times worth telling; else ""."""
+    """What is worth telling after the last of these: that it survives, now and then how far it is; else ""."""
+    if not verdicts[-1].by:
+        return f"survives so far: {verdicts[-1].fault}"
     if len(verdicts) % 50 and len(verdicts) != of:
         return ""
     return f"{len(verdicts)} of {of}, {sum(not one.by for one in verdicts)} survive"
@@ -252,10 +261,12 @@ class Anew(_Tests):
     def __init__(self, fault: Fault, order: Order, scratch: str) -> None:
         super().__init__()
         self.fault, self.scratch = fault, scratch
-        self.names = order.of(fault)
+        self.names, self.lasted = order.of(fault), order.lasted
 
     def judge(self) -> str:
         """The test that has noticed the fault, "" for none. The files whose tests notice most come first."""
+        for name in set(sys.modules) - set(_others()):
+            del sys.modules[name]  # there are some only where a test asks for a trial
         changed = _Changed(self.fault)
         sys.meta_path.insert(0, changed)
         sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
@@ -274,7 +285,9 @@ class Anew(_Tests):
         if not self.failed:
             items = {item.nodeid: item for item in session.items}
             missing = [name for name in self.names if name not in items]
-            self.failed = missing[0] if missing else self.run([items[name] for name in self.names])
+            self.failed = (
+                missing[0] if missing else self.run([items[name] for name in self.names], self.lasted)
+            )
         return True
 
 

@@ -83,7 +83,7 @@ def test_a_port_that_vanishes_meanwhile(tmp_path: Path) -> None:
             "-m",
             "motorbus.cli",
             "monitor",
-            f"{simulated.bus}#1",
+            f"{simulated.bus},reconnect=no#1",
             "--rate",
             "1000",
             "--json",

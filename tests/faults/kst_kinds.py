@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from motorbus.bus.pace import SHOWN
 from motorbus.bus.pump import Bus
+from motorbus.core.entry import changed
 from motorbus.core.operation import Runnable
 from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
@@ -21,7 +22,7 @@ from motorbus.families.kst import (
     broadcast_read,
     broadcast_save,
 )
-from motorbus.families.kst.driver.exchanges import download, order, upload
+from motorbus.families.kst.driver.exchanges import download, order, upload_row
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.table import BIT_RATES
 from motorbus.link.base import Line
@@ -42,13 +43,17 @@ class KstRig:
         simulator = FAMILY.simulator(NODES, profile=profile, firmware=VERSION, **options)
         assert isinstance(simulator, KstBus)
         self.servos = simulator.nodes
-        self.link = MemoryLink(simulator, rate=500_000, pace=True)
+        self.link = self.linked(simulator)
         self.family = FAMILY.configured(profile=profile)
         self.bus = Bus(self.link, self.family, admit=Gate(), report=lambda event: None)
         self.dialect = Servo(self.bus, NODE).dialect
         self.count = self.here = 0
         for _ in range(SHOWN + 1):  # by then it shows that this link takes its bit time
             read_2(self)
+
+    def linked(self, simulator: KstBus) -> MemoryLink:
+        """A link to them that takes bit time."""
+        return MemoryLink(simulator, rate=500_000, pace=True)
 
     def put(self, line: Line) -> None:
         """Another line between host and servos."""
@@ -115,7 +120,8 @@ def read_segments(rig: KstRig) -> None:
 
 def refused_read(rig: KstRig) -> None:
     """A refusal is an answer, and never a value."""
-    _refused(rig, upload(rig.servo, MISSING, 0, lambda reply: reply), NO_OBJECT)
+    row = changed(rig.servo.table["status"], address=MISSING)
+    _refused(rig, upload_row(rig.servo, row, int), NO_OBJECT)
 
 
 def refused_write(rig: KstRig) -> None:

@@ -41,6 +41,8 @@ from tests.faults.oracle import FalseWord, Oracle, Outcome, Window
 
 BUFFER: Final = 4096
 LOTS: Final = 1 << 16
+USUAL: Final = 8
+"""Exchanges that a plain verb makes at most, with what it has to ask before."""
 KEPT: Final = 20_000
 """Changes of a device that are remembered; a call takes a few."""
 
@@ -79,8 +81,8 @@ class Rig:
     """
 
     faults: ClassVar[Mapping[str, str]]
-    exchanges: ClassVar[int]
-    """What a verb takes at most."""
+    costs: ClassVar[Mapping[str, int]]
+    """How many exchanges a verb makes at most, where that is more than `USUAL`."""
 
     def __init__(self, family: Family, simulator: Simulator, rate: int, **how: Any) -> None:
         self.simulator: Any = simulator
@@ -96,7 +98,8 @@ class Rig:
         self.untouched = 0
         self.quarantine = 0
         self.twins = False
-        self.bound = self.exchanges * self.longest()
+        self.slow = self.longest()
+        self.bound = USUAL * self.slow
 
     def slowest(self) -> Exchange[Any]:
         """The exchange that takes longest."""
@@ -117,6 +120,7 @@ class Rig:
     def call(self, name: str, lot: int) -> None:
         """Call a verb and judge it."""
         touched, fired, again = self.troubled, self.line.count, self.again
+        self.bound = self.costs.get(name, USUAL) * self.slow
         window = self.verbs[name](Random(lot))
         self.calls[name] += 1
         self.quarantine = max(0, self.quarantine - 1)
@@ -168,7 +172,7 @@ class Rig:
         self.probe()
 
     def probe(self) -> Window:
-        """The plainest call there is, judged."""
+        """The plainest call there is, of everybody in turn, judged."""
         raise NotImplementedError
 
     def pull(self, later: float) -> None:

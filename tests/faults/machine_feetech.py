@@ -25,7 +25,7 @@ LEAST = 20
 class FeetechRig(Rig):
     """Three servos."""
 
-    exchanges = 40  # of a write to EEPROM, with all that it makes sure of
+    costs = {"write a setting": 40, "read": 5, "sync read": 9, "at once": 9}
     faults = {
         "reply lost": ": drop",
         "reply late": ": delay {late}",
@@ -165,6 +165,7 @@ class FeetechRig(Rig):
         servo, on = self.one(random), random.random() < 0.5
         with self.oracle.call(self.bound) as window:
             servo.enable_torque() if on else servo.disable_torque()
+        self.oracle.forget(servo.node, "goal_position")  # torque goes on at rest
         if window.error is None:
             self.oracle.told(window, servo.node, "torque_enable", int(on))
         return window
@@ -178,6 +179,7 @@ class FeetechRig(Rig):
         servo = self.one(random)
         with self.oracle.call(self.bound) as window:
             servo.stop()
+        self.oracle.forget(servo.node, "goal_position")  # it becomes wherever it stands
         return window
 
     def sync_read(self, random: Random) -> Window:
@@ -196,7 +198,7 @@ class FeetechRig(Rig):
             asked = [outcome(type(servo).position.function(servo)) for servo in self.servos.values()]
             return (yield from Together(asked))
 
-        with self.oracle.call(len(IDS) * self.bound) as window:
+        with self.oracle.call(self.bound) as window:
             found = self.bus.run(together())
         for node, value in zip(IDS, found, strict=False):
             if not isinstance(value, MotorbusError):

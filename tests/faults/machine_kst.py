@@ -25,7 +25,7 @@ RANGE = 250
 class KstRig(Rig):
     """Two servos that tell more than the manual says."""
 
-    exchanges = 30  # of a write that is saved, with all that it makes sure of
+    costs = {"write": 30, "set limits": 40, "at once": 9}
     faults = {
         "reply lost": ": drop",
         "reply broken": ": corrupt",
@@ -138,9 +138,8 @@ class KstRig(Rig):
         values = [float(servo.value(self.table["present_position"], raw)) for raw in (low, high)]
         with self.oracle.call(self.bound) as window:
             servo.set_travel_limits(*values)
-        if window.error is None:
-            self.oracle.told(window, servo.node, "negative_limit", low)
-            self.oracle.told(window, servo.node, "positive_limit", high)
+        self.oracle.wrote(window, servo.node, "negative_limit", low)
+        self.oracle.wrote(window, servo.node, "positive_limit", high)
         return window
 
     def move(self, random: Random) -> Window:
@@ -152,6 +151,7 @@ class KstRig(Rig):
         servo = self.one(random)
         with self.oracle.call(self.bound) as window:
             servo.stop()
+        self.oracle.forget(servo.node, "goal_position")  # it becomes wherever it stands
         return window
 
     def at_once(self, random: Random) -> Window:
@@ -161,7 +161,7 @@ class KstRig(Rig):
             asked = [outcome(type(servo).position.function(servo)) for servo in self.servos.values()]
             return (yield from Together(asked))
 
-        with self.oracle.call(len(IDS) * self.bound) as window:
+        with self.oracle.call(self.bound) as window:
             found = self.bus.run(together())
         for node, value in zip(IDS, found, strict=False):
             if not isinstance(value, MotorbusError):

@@ -164,6 +164,10 @@ class Oracle:
         if never and (found := never & set(self.history.applied(node, name, since, now))):
             raise FalseWord(f"node {node}: {name} = {found} was said not to be written, and was")
 
+    def forget(self, node: int, name: str) -> None:
+        """Something else may write this row too: what was said not to have been written counts no more."""
+        self._never.pop((node, name), None)
+
     def _applied(self, window: Window, node: int, name: str, raw: Raw) -> None:
         held = self.history.held(node, name, window.since, window.until)
         if raw not in held:

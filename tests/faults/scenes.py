@@ -47,15 +47,25 @@ class Wire(PerfectLine):
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         if sender is Side.HOST:
-            self.sent.append(data)
+            self.heard(data)
         return super().carry(sender, data, at)
+
+    def heard(self, data: Data) -> None:
+        """The host has sent this."""
+        self.sent.append(data)
 
 
 class Scene:
     """A simulated bus of one family with the real bus on it; `face` says which of the two."""
 
     def __init__(
-        self, family: str, *, line: Line | None = None, face: type[Bus] | type[AsyncBus] = Bus, **more: Any
+        self,
+        family: str,
+        *,
+        line: Line | None = None,
+        face: type[Bus] | type[AsyncBus] = Bus,
+        link: type[MemoryLink] = MemoryLink,
+        **more: Any,
     ) -> None:
         self.name = family
         self.ids = IDS[family]
@@ -67,7 +77,7 @@ class Scene:
         if family == "stepper":
             self.simulator.nodes[1].put(1, STORED)
         self.wire = Wire()
-        self.link = MemoryLink(self.simulator, rate=found.link.rate, line=line or self.wire, **more)
+        self.link = link(self.simulator, rate=found.link.rate, line=line or self.wire, **more)
         self.events: list[object] = []
         self.bus: Any = face(self.link, self.family, admit=Gate(), report=self.events.append)
         self.devices: list[Any] = [self.family.devices.blocking(self.bus, node) for node in self.ids]

@@ -60,26 +60,30 @@ class Tally(NamedTuple):
     false: int = 0
 
     @property
-    def told(self) -> dict[str, int | float | str]:
+    def told(self) -> dict[str, Any]:
         """For the table of figures."""
-        told: dict[str, int | float | str] = {"faults": self.faults, "wrong": self.false}
-        return told | {"succeeded": self.succeeded, "longest_s": round(self.longest, 4)}
+        told = {"faults": self.faults, "wrong": self.false, "succeeded": self.succeeded}
+        return told | {"longest_s": round(self.longest, 4)}
 
 
 class Overheard:
-    """Carries as another line does; `said` is what the host has sent, `heard` what of it reached the device."""
+    """Carries as another line does; `said` is what the host has sent, `heard` what of it reached the device; `meant`
+    what the device has sent, `told` what of it reached the host."""
 
     def __init__(self, line: Line) -> None:
         self.line = line
         self.said: list[Data] = []
-        self.heard = b""
+        self.heard = self.meant = self.told = b""
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         deliveries = self.line.carry(sender, data, at)
+        arrived = b"".join(one.data for one in deliveries if isinstance(one.data, bytes))
         if sender is Side.HOST:
             self.said.append(data)
-            for delivery in deliveries:
-                self.heard += delivery.data if isinstance(delivery.data, bytes) else b""
+            self.heard += arrived
+        elif isinstance(data, bytes):
+            self.meant += data
+            self.told += arrived
         return deliveries
 
 

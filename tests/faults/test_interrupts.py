@@ -13,7 +13,7 @@ import pytest
 
 from motorbus.bus.stop import StopOutcome
 from tests.conftest import Figures
-from tests.faults.cutting import NEVER, UNSENT, afterwards, cut, left_behind, places, told
+from tests.faults.cutting import NEVER, UNSENT, Outcome, afterwards, cut, left_behind, places, told
 from tests.faults.scenes import IDS, KINDS, Scene, off
 
 Rounds = Callable[[int], int]
@@ -26,13 +26,20 @@ def most(rounds: Rounds, usual: int) -> int:
     return NEVER if rounds(1_000_000) == 1_000_000 else usual
 
 
-def faults(kind: str, at: int, error: type[BaseException]) -> list[str]:
-    """What is wrong when this kind of transaction is cut there."""
+def carried_out(
+    kind: str, at: int = NEVER, error: type[BaseException] = KeyboardInterrupt, later: int = 0
+) -> tuple[Scene, Outcome, int]:
+    """A scene on which this kind of transaction was cut there, what came of it, and how much had been sent before."""
     how = KINDS[kind]
     there = Scene(how.family)
     how.prepare(there)
     before = len(there.wire.sent)
-    came = cut(lambda: there.bus.run(how.act(there)), at, error)
+    return there, cut(lambda: there.bus.run(how.act(there)), at, error, later), before
+
+
+def faults(kind: str, at: int, error: type[BaseException]) -> list[str]:
+    """What is wrong when this kind of transaction is cut there."""
+    there, came, before = carried_out(kind, at, error)
     wrong = [] if came.where is not None else ["it was not cut"]
     if not isinstance(came.error, error):
         wrong.append(f"it ended with {came.error!r}, {came.value!r}")
@@ -44,20 +51,17 @@ def faults(kind: str, at: int, error: type[BaseException]) -> list[str]:
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", KINDS)
 def test_l17_an_interrupt_at_any_line_of_a_transaction(kind: str, rounds: Rounds, figures: Figures) -> None:
-    how = KINDS[kind]
-    there = Scene(how.family)
-    how.prepare(there)
-    whole = cut(lambda: there.bus.run(how.act(there)))
-    assert whole.error is None
-    assert how.done(there, whole.value), "when it is not cut it is done"
-    spots = places(whole.walked, VISITS, most(rounds, 9))
-    total = 0
+    cuts, lines = 0, set()
     for error in ERRORS:
-        for at in spots:
+        there, whole, _ = carried_out(kind, NEVER, error)
+        assert whole.error is None
+        assert KINDS[kind].done(there, whole.value), "when it is not cut it is done"
+        for at in places(whole.walked, VISITS, most(rounds, 9)):
             assert faults(kind, at, error) == [], (error.__name__, at)
-            total += 1
-    lines = len(set(whole.walked))
-    figures(f"L17 interrupts: {kind}", family=how.family, lines=lines, cuts=total, stuck=0, wrong=0)
+            cuts += 1
+        lines |= set(whole.walked)
+    family = KINDS[kind].family
+    figures(f"L17 interrupts: {kind}", family=family, lines=len(lines), cuts=cuts, stuck=0, wrong=0)
 
 
 def stopped(there: Scene) -> None:
@@ -97,30 +101,24 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
     family: str, rounds: Rounds, figures: Figures
 ) -> None:
     """Once it has begun it goes out, is repeated until everyone has acknowledged, and only then is anything raised."""
-    there = Scene(family)
-    stopped(there)
-    whole = cut(there.bus.estop)
-    assert set(whole.value.acknowledged) == set(there.ids)
-    spots = places(whole.walked, VISITS, most(rounds, 9))
+    cuts, lines = 0, set()
     for error in ERRORS:
-        for at in spots:
+        there = Scene(family)
+        stopped(there)
+        whole = cut(there.bus.estop, NEVER, error)
+        assert set(whole.value.acknowledged) == set(there.ids)
+        for at in places(whole.walked, VISITS, most(rounds, 9)):
             assert stop_faults(family, at, error) == [], (error.__name__, at)
-    cuts = len(ERRORS) * len(spots)
-    figures(
-        "L17 interrupts: emergency stop", family=family, lines=len(set(whole.walked)), cuts=cuts, unsent=0
-    )
+            cuts += 1
+        lines |= set(whole.walked)
+    figures("L17 interrupts: emergency stop", family=family, lines=len(lines), cuts=cuts, unsent=0)
 
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", ["feetech guarded write", "kst run", "stepper home"])
 def test_l17_a_second_interrupt_at_any_line_of_the_clean_up(kind: str, rounds: Rounds) -> None:
-    how = KINDS[kind]
-    there = Scene(how.family)
-    how.prepare(there)
-    whole = cut(lambda: there.bus.run(how.act(there)))
+    _, whole, _ = carried_out(kind)
     for number, at in enumerate(places(whole.walked, 2, most(rounds, 9))):
-        there = Scene(how.family)
-        how.prepare(there)
-        came = cut(lambda: there.bus.run(how.act(there)), at, KeyboardInterrupt, later=1 + number * 37 % 400)
+        there, came, _ = carried_out(kind, at, KeyboardInterrupt, later=1 + number * 37 % 400)
         assert isinstance(came.error, KeyboardInterrupt), came.where
         assert afterwards(there, there.bus.run) == [], (at, came.where)

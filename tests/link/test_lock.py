@@ -140,7 +140,7 @@ def test_a_second_one_in_this_process_is_refused() -> None:
     assert refused.value.owner == os.getpid()
 
 
-def test_another_process_is_named() -> None:
+def test_l13_a_second_opener_is_told_the_owners_process() -> None:
     with other_process(HOLD, PORT) as process:
         with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as refused:
             PortLock(PORT).acquire()
@@ -158,7 +158,7 @@ def test_released_it_is_free_and_leaves_nothing() -> None:
         pass
 
 
-def test_the_lock_of_a_killed_process_is_reclaimed() -> None:
+def test_l13_the_lock_of_a_killed_process_is_reclaimed() -> None:
     with other_process(HOLD, PORT) as process:
         process.send_signal(signal.SIGKILL)
         process.wait(timeout=30)

@@ -57,3 +57,23 @@ def test_what_cannot_be_is_refused_without_touching_the_port(address: str, why: 
 )
 def test_a_port_is_locked_under_one_name(bus: str, name: str) -> None:
     assert lock_name(bus, {}) == name
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "feetech:/dev/nothing",
+        "feetech:socket://127.0.0.1:1",
+        "kst:can://virtual/x",
+        "stepper:COM7",
+        "feetech:sim:arm",
+    ],
+)
+def test_faults_are_for_simulated_devices_only(address: str) -> None:
+    with pytest.raises(RequestError, match=r"(?s)faults cannot be put in front of.*nothing was opened"):
+        prepare(address, {"faults": "exchange 1: drop"})
+    with pytest.raises(RequestError, match="faults cannot be put in front of"):
+        prepare(f"{address},faults=x", {})
+    assert (
+        prepare("feetech:sim,ids=1", {"faults": "exchange 1: drop"}).options["faults"] == "exchange 1: drop"
+    )

@@ -17,6 +17,8 @@ from motorbus.errors import LinkError, PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.stepper import simulator as stepper
 from motorbus.simulation.control import LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
+from motorbus.simulation.faulted import Faulted
+from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import Mount
 from tests.simulation.served import asked, served
@@ -68,10 +70,27 @@ def test_power_cycle_of_one_and_of_all() -> None:
 
 def test_help_names_every_order() -> None:
     bus = stepper.simulate((1,))  # it has inputs, and all else that any other has
+    world = World(bus)
+    faults = Faulted(Mount(world), world)
     for word in obey(bus, "help").split(" | "):
         order = word.replace("[ID]", "").replace("ID", "1").replace("INPUT on|off", "2 on")
-        order = order.replace("[NAME=VALUE …]", "echo=six seed=3")
-        assert not obey(bus, order).startswith("error")
+        order = order.replace("[NAME=VALUE …]", "echo=six seed=3").replace("[SCRIPT|off]", "off")
+        assert not obey(bus, order, faults).startswith("error")
+
+
+def test_faults_are_set_looked_at_and_switched_off() -> None:
+    bus = simulate((1,))
+    world = World(bus)
+    faults = Faulted(Mount(world), world)
+    assert obey(bus, "faults exchange 2: drop; 100% of bytes: flip 0", faults) == "ok"
+    facts = json.loads(obey(bus, "faults", faults))
+    assert (facts["schema"], facts["simulated"], facts["count"]) == ("motorbus.simulator-script/1", True, 0)
+    assert facts["script"] == f"seed {facts['seed']}; exchange 2: drop; 100% of bytes: flip 0"
+    assert obey(bus, "faults exchange 1: explode", faults).startswith("error: line 1: ")
+    assert json.loads(obey(bus, "faults", faults)) == facts
+    assert obey(bus, "faults off", faults) == "ok"
+    assert json.loads(obey(bus, "faults", faults))["script"] == ""
+    assert obey(bus, "faults", None) == "error: this simulation takes no faults"
 
 
 @pytest.mark.parametrize(

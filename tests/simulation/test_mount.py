@@ -17,7 +17,7 @@ from motorbus.families.feetech.simulator import FeetechBus, model, simulate
 from motorbus.link.base import Side
 from motorbus.link.memory import NoisyLine
 from motorbus.link.pty import PtyMaster
-from motorbus.simulation.faults import ScriptedLine
+from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import HASTE, Mount
 from tests.simulation.served import asked, received, served
@@ -273,7 +273,7 @@ def test_with_pace_a_train_keeps_its_order_and_its_time(bench: Callable[..., Ben
 
 
 def test_a_scripted_fault_is_between_simulator_and_port(bench: Callable[..., Bench]) -> None:
-    line = ScriptedLine(
+    line = FaultyLine(
         "exchange 1 byte 5: corrupt 01; exchange 2 byte 0 to device: drop; exchange 3 byte 0: delay 1"
     )
     here = bench(simulate((1,)), line=line)

@@ -8,7 +8,7 @@ from motorbus import families
 from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.memory import MemoryLink, NoisyLine
-from motorbus.simulation.faults import ScriptedLine
+from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.named import Simulation, find
 from tests.simulation.links import QueueLink
 
@@ -117,10 +117,10 @@ def test_a_closed_simulation_cannot_be_opened_and_kills_its_link() -> None:
 
 def test_the_line_can_be_changed_at_any_time() -> None:
     with simulation() as sim:
-        sim.line = ScriptedLine("exchange 1 byte 5: corrupt 01")
+        sim.line = FaultyLine("exchange 1 byte 5: corrupt 01")
         link = sim.link()
         assert asked(link) == [bytes.fromhex("FF FF 01 02 00 FD")]
-        sim.line = ScriptedLine("exchange 1 byte 0: truncate")
+        sim.line = FaultyLine("exchange 1 byte 0: truncate")
         assert asked(link) == []
         assert sim.line is link.line
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
@@ -15,7 +15,7 @@ from motorbus.cli.rates import check_rate
 from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
 from motorbus.core.operation import Pause
-from motorbus.errors import LinkError, MotorbusError, NoReply, RequestError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -32,7 +32,9 @@ app = App(
 everything else is what its device tells, in the angles of the device.
 
 Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
-that does not answer keeps its row and is asked again. What no device tells has
+that does not answer keeps its row and is asked again, and so does one whose
+port is gone: a note says so, and another when it is there again (with
+--reconnect no it ends there, with exit code 3). What no device tells has
 no column; of a stepper controller there are its inputs to watch, each asked
 for by itself. Where the line allows less than --rate, the rate that was
 reached is told at the end. --listen asks nobody: it prints what others say,
@@ -88,9 +90,10 @@ def monitor(
     specs = {key: (name, machine().axes[name]) for key, name in called.items()}
     with ExitStack() as stack, _shown(output, _Columns(_usual(wanted), specs)) as show:
         watched = _watched(wanted, stack, options, output)
-        told = alarms.Told(output)
+        told, away = alarms.Told(output), _Away(output)
 
         def tell(sample: Sample) -> None:
+            away.look(sample)
             show(sample)
             for (name, node), state in sample.items():
                 if not isinstance(state, MotorbusError | dict):
@@ -140,7 +143,8 @@ def _watch(
             passed = bus.link.now() - began
             if done == count or (duration and passed + period >= duration):
                 break
-            bus.run(_pause(max(0.0, done * period - passed)))
+            with suppress(*_later(bus)):
+                bus.run(_pause(max(0.0, done * period - passed)))
     except KeyboardInterrupt:
         pass  # the usual way to end it
     _say_rate(done, bus.link.now() - began, 1 / period, output)
@@ -158,11 +162,35 @@ def _say_rate(samples: int, seconds: float, wanted: float, output: Output) -> No
 def _sample(one: Any) -> State | Told | MotorbusError:
     try:
         state = sampled(one)
-    except LinkError:
-        raise
+    except LinkError as error:
+        if not isinstance(error, _later(one.bus)):
+            raise
+        return error
     except MotorbusError as error:
         return error
     return state
+
+
+def _later(bus: Bus) -> tuple[type[LinkLost], ...]:
+    """What need not be raised at once: a port that is looked for, and may be there again at the next sample."""
+    return () if bus.turns.renewal is None else (LinkLost,)
+
+
+class _Away:
+    """Says once that a port is gone, and once that it is there again."""
+
+    def __init__(self, output: Output) -> None:
+        self._output = output
+        self._gone: set[str] = set()
+
+    def look(self, sample: Sample) -> None:
+        """Take in a sample of every device."""
+        gone = {bus: state for (bus, _), state in sample.items() if isinstance(state, LinkLost)}
+        for bus in self._gone - gone.keys():
+            self._output.note(f"note: {bus} is there again")
+        for bus in gone.keys() - self._gone:
+            self._output.note(f"note: {gone[bus].summary}; it is looked for until it is there again")
+        self._gone = set(gone)
 
 
 def _pause(seconds: float) -> Operation[None]:

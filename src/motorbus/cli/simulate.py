@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from cyclopts import App, Parameter
 
 from motorbus import families, session
+from motorbus.cli import faulty
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.output import Output
@@ -23,6 +24,8 @@ from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
+from motorbus.simulation.faulted import Faulted
+from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.remarks import Remarks
@@ -39,7 +42,7 @@ removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
-fault ID [NAME=VALUE …], notice ID, log [ID], help.
+fault ID [NAME=VALUE …], notice ID, log [ID], faults [SCRIPT|off], help.
 
 What devices remark and tell no host, such as a number out of range, is said
 on stderr with its moment, in seconds from the start; --quiet leaves it out.
@@ -49,6 +52,11 @@ served in several ways at once: what one program sends, the others see.
 
 The file of --inputs has one change on each line, as "2.5 1 on": input 1
 turns on 2.5 s after power-on.
+
+--faults takes a script of what goes wrong, one fault a line or between
+semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
+corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
+happened is said on stderr, and at the end how to have it again.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
@@ -62,6 +70,7 @@ Examples:
     motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
     motorbus simulate stepper --link /tmp/stepper --inputs buttons.txt
     motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost
+    motorbus simulate feetech --link /tmp/arm --faults "seed 1; 1%: delay 0.1"
     motorbus simulate feetech --switches""",
 )
 
@@ -84,6 +93,7 @@ _OWN = (
     "bitrate",
     "control",
     "inputs",
+    "faults",
     "quiet",
     "switch",
 )
@@ -114,6 +124,7 @@ def simulate(
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
     inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
+    faults: Annotated[str, Parameter(help="What goes wrong: a script, a file with one, or help.")] = "",
     quiet: Annotated[Flag, Parameter(help="Do not say on stderr what they remark.")] = False,
     switch: Switched = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
@@ -123,8 +134,9 @@ def simulate(
     """Serve simulated devices on a pseudo-terminal or a socket."""
     output.simulated = True
     found = families.load(family)
-    if switches:
-        return _list(found, output)
+    if switches or faults == "help":
+        return _list(found, output) if switches else faulty.listed(output)
+    script = faulty.script_of(faults)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
@@ -138,29 +150,50 @@ def simulate(
         stop = stack.enter_context(_until_signalled())
         served = _served(stack, found, Ways(link, tcp, socketcand, can), asked)
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
+        world = World(simulator, now=time.monotonic())
         places = [place for place, _ in served]
-        mount = Mount(simulator, *places, pace=rate if pace else None, rate=rate, attendants=controls)
+        mount = Mount(world, *places, pace=rate if pace else None, rate=rate, attendants=controls)
+        faulted = _faulted(mount, world, script, controls)
         buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
-        nodes = sorted(simulator.nodes)
-        facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
-        output.document("motorbus.simulate/1", facts)
-        count = f"{len(nodes)} {family} device{'' if len(nodes) == 1 else 's'}"
-        output.text(f"ready: {' and '.join(buses)}  (simulated: {count}, ids {ids})")
-        _serve(mount, stop, None if quiet else output)
+        _ready(output, buses, family, sorted(simulator.nodes), ids)
+        _serve(mount, stop, faulted, None if quiet else output)
     return Exit.OK
 
 
-def _serve(mount: Mount, stop: int, output: Output | None) -> None:
+def _faulted(mount: Mount, world: World, script: Script, controls: Iterable[ControlSocket]) -> Faulted:
+    """What is to go wrong, and those who may change it."""
+    faulted = Faulted(mount, world)
+    faulted.set(script)
+    for control in controls:
+        control.faults = faulted
+    return faulted
+
+
+def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[int], ids: str) -> None:
+    """The line that a caller waits for."""
+    facts = {"bus": buses[0], "buses": buses, "family": family, "ids": nodes, "pid": os.getpid()}
+    output.document("motorbus.simulate/1", facts)
+    count = f"{len(nodes)} {family} device{'' if len(nodes) == 1 else 's'}"
+    output.text(f"ready: {' and '.join(buses)}  (simulated: {count}, ids {ids})")
+
+
+def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> None:
     """Serve until told to stop, and say what the devices remark, if there is anything to say it on."""
     if output is None:
         mount.serve(stop)
         return
     remarks = Remarks(mount.simulator)
+    if faulted.script.by_chance:
+        output.note(f"faults: seed {faulted.script.seed}")
     while not mount.step(stop):
-        for line in remarks.lines(time.monotonic()):
+        now = time.monotonic()
+        for line in (*remarks.lines(now), *faulted.remarks(now)):
             output.note(line)
-    for line in (*remarks.lines(time.monotonic()), *remarks.rest()):
+    now = time.monotonic()
+    for line in (*remarks.lines(now), *faulted.remarks(now), *remarks.rest(), *faulted.rest()):
         output.note(line)
+    if said := faulted.replay():
+        output.note(said)
 
 
 def _scripted(simulator: object, path: Path | None, family: str) -> None:

@@ -254,10 +254,10 @@ class Door:
 
     def unplug(self) -> None:
         """Hang up on everyone, and refuse whoever comes until `plug`."""
+        self.port.unplug()  # first, or whoever is hung up on comes back at once
         for client in self.clients:
             client.close()
         self.clients.clear()
-        self.port.unplug()
 
     def plug(self) -> None:
         """Listen again."""

@@ -28,7 +28,7 @@ LATEST = 20
 """Remarks of each node that `log` gives."""
 HELP = (
     "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | fault ID [NAME=VALUE …] | notice ID"
-    " | log [ID] | faults [SCRIPT | off] | help"
+    " | log [ID] | faults [SCRIPT|off] | help"
 )
 
 

@@ -51,7 +51,7 @@ class Faulted:
         return self._script
 
     def set(self, script: Script | str) -> None:
-        """Let this happen from now on, in place of what was set. Moments count from the beginning of the simulation.
+        """Let this happen from now on, in place of what was set; moments count from now.
 
         A script that leaves anything to chance and says no seed gets one. Raises RequestError for a bad script, and for
         what cannot happen here; what was set goes on then.
@@ -61,8 +61,8 @@ class Faulted:
             given = given.seeded(secrets.randbelow(1 << 32))
         if not self._mount.texts:
             without_adapter(given)
-        line = FaultyLine(given, self._world, most=KEPT, began=self._began)
-        text = FaultyLine(given, adapter=True, most=KEPT, began=self._began)
+        line = FaultyLine(given, self._world, most=KEPT)
+        text = FaultyLine(given, adapter=True, most=KEPT, began=self._world.now)
         self._before = self._seen = self.count
         self._mount.course.line = line if len(given) else PerfectLine()
         self._mount.text(text if text.faults else None)
@@ -70,9 +70,7 @@ class Faulted:
 
     def facts(self) -> dict[str, Any]:
         """What is set, what has happened and what has not, as plain data; times in s from the beginning."""
-        fired = sorted(
-            ((fired.at, fired.fault) for line in self._lines for fired in line.fired), key=lambda one: one[0]
-        )
+        fired = sorted((one.at, one.fault) for line in self._lines for one in line.fired)
         return {
             "schema": SCHEMA,
             "simulated": True,

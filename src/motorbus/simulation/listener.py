@@ -149,6 +149,11 @@ class TcpListener(TcpPort):
         """A socket has no rate."""
         return None
 
+    def unplug(self) -> None:
+        """Refuse everybody until `plug`, and hang up on the client."""
+        super().close()  # first, or the client comes back at once
+        self.close()
+
     def close(self) -> None:
         """Hang up and give the port back; calling it again does nothing."""
         if self._client is not None:

@@ -173,7 +173,7 @@ def test_all_rates_are_tried_but_those_that_the_adapter_lacks(on_slcan: Simulate
 
 def test_an_adapter_that_is_unplugged_meanwhile(tmp_path: Path) -> None:
     with Simulated("kst", ids="37", link=tmp_path / "can") as simulated:
-        words = ["monitor", f"{simulated.bus}#37", "--rate", "1000", "--json"]
+        words = ["monitor", f"{simulated.bus},reconnect=no#37", "--rate", "1000", "--json"]
         with subprocess.Popen(
             [sys.executable, "-m", "motorbus.cli", *words],
             stdout=subprocess.PIPE,

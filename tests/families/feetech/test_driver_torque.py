@@ -132,7 +132,11 @@ def test_every_error_is_collected(failure: MotorbusError) -> None:
     if isinstance(failure, ChecksumError):
         lines += [Line(off(1).sent, failure)] * 2 + [Line(reads(1, 40, 0).sent, failure)]
     errors = play(disable_torque_all([1, 2]), *lines, off(2))
-    assert errors == {1: failure}
+    assert set(errors) == {1}
+    if isinstance(failure, ChecksumError):  # of an order that has left
+        assert isinstance(errors[1], OutcomeUnknown)
+    else:
+        assert errors[1] is failure
 
 
 @pytest.mark.parametrize("step", range(4))

@@ -21,7 +21,7 @@ from motorbus.families.feetech.table import BAUD_CODES
 from motorbus.link import adapters
 from motorbus.link.base import PerfectLine
 from motorbus.link.pty import PtyMaster
-from motorbus.simulation.faults import ScriptedLine
+from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.mount import Mount
 from tests.conformance.test_guarded import Interrupting
 from tests.conformance.world import world
@@ -46,7 +46,7 @@ def test_quirk_01_a_reply_that_is_lost_or_garbled_is_asked_for_again_and_counted
         servo.prepare()
         for script in ("exchange 1 byte 4: corrupt 40", "exchange 1 byte 0: truncate"):
             before = there.bus.statistics.of(1).retries
-            there.simulation.line = ScriptedLine(script)
+            there.simulation.line = FaultyLine(script)
             assert servo.position() == pytest.approx(2048 * COUNT)
             assert there.bus.statistics.of(1).retries == before + 1
         there.simulation.line = silent = Lossy(lambda reply: True)
@@ -97,7 +97,7 @@ def test_quirk_07_an_acknowledgement_that_comes_too_late_is_no_answer_to_the_nex
     with bench() as there:
         servo = there.servo()
         servo.prepare()
-        there.simulation.line = ScriptedLine("exchange 1 byte 0: delay 0.03")
+        there.simulation.line = FaultyLine("exchange 1 byte 0: delay 0.03")
         servo.write(acceleration=0)
         there.simulated().raw_position = 1234
         assert servo.ping() is True

@@ -15,7 +15,7 @@ from motorbus.core.operation import Data
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import EDITS, ORDERS
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
-from motorbus.simulation.faults import Fault, ScriptedLine
+from motorbus.simulation.faults import Fault, FaultyLine
 from tests.families.stepper.fault_rig import KEPT, MOTIONS, STOPS, Rig
 from tests.families.stepper.mischief import BYTE
 
@@ -79,7 +79,7 @@ def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> tup
     total = succeeded = 0
     for fault in faults:
         total += 1
-        line = ScriptedLine([fault])
+        line = FaultyLine([fault])
         rig.link.line = Bytewise(line) if bytewise else line
         succeeded += ask(rig, name)
         assert len(line.fired) == 1, f"{fault} did not happen"

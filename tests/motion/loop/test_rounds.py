@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.operation import CanFrame, Data
-from motorbus.errors import Interrupted, LimitExceeded, LinkError, MotorbusError, NoReply, RequestError
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.readings import patience
@@ -305,15 +305,29 @@ def gone(loop: Loop, name: str) -> float:
     return way
 
 
-def test_no_small_goal_runs_away_while_a_bus_is_gone() -> None:
-    with machine(arm="1", can="0x21", exit="leave") as (made, _), Robot.of(made) as robot:
+def test_no_goal_of_before_is_given_when_a_port_that_was_gone_is_there_again() -> None:
+    with machine(arm="1", can="0x21", exit="leave") as (made, sims), Robot.of(made) as robot:
         link: Any = robot.buses["arm"].link
-        with suppress(LinkError), robot.loop(RATE) as loop:
+        with robot.loop(RATE) as loop:
             loop.goal.update({"a1": 2.0, "c1": 0.7})
             cycles(loop, 40)
             link.unplug()
-            assert 0 < gone(loop, "a1") < 2 * radians(90) / RATE
-        link.plug()
+            for _ in range(30):
+                with pytest.raises(MotorbusError):
+                    next(loop)
+            link.plug()
+            here, sims["arm"].line = robot["a1"].position(), Heard()
+            state = cycles(loop, 100)
+            assert not ordered(sims["arm"].line)
+            assert state.position["a1"] == pytest.approx(here, abs=0.02)
+            assert state.position["c1"] == pytest.approx(0.7, abs=0.02), "the other bus goes on"
+            loop.goal["a1"] = 2.0
+            assert cycles(loop, 150).position["a1"] == pytest.approx(2.0, abs=0.02)
+
+
+def ordered(line: Any) -> list[bytes]:
+    """What of that writes to a servo."""
+    return [data for data in line.sent if isinstance(data, bytes) and data[4] in (0x03, 0x83)]
 
 
 def test_no_small_goal_runs_away_while_the_settings_of_another_servo_are_not_known() -> None:

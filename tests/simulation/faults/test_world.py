@@ -9,6 +9,7 @@ import pytest
 from motorbus import families
 from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, RequestError
+from motorbus.families.stepper.wire import encode
 from motorbus.link.base import Side
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import FaultyLine, World
@@ -63,10 +64,10 @@ def test_a_power_cycle_comes_before_the_request_of_its_exchange() -> None:
 
 
 def test_at_a_byte_what_comes_before_has_arrived() -> None:
-    link, world, line, port = host("exchange 1 byte 3 to host: unplug 0.5")
+    link, _, _, port = host("exchange 1 byte 3 to host: unplug 0.5")
     assert asked(link, PING) == PONG  # this port only keeps a record
     assert port.pulls == [0.5]
-    link, world, line, port = host("exchange 1 byte 3 to host: unplug 0.5")
+    link, _, _, port = host("exchange 1 byte 3 to host: unplug 0.5")
     link.write(PING)
     assert link.read(1.0) == [PONG[:3]]
     assert port.pulls == []
@@ -157,12 +158,20 @@ def test_a_torn_save_of_other_families() -> None:
     assert list(world.nodes) == [0x26]
     assert round(line.fired[0].at, 6) == 0.15
 
-    link, world, line, _ = host("exchange 2: torn-eeprom 1", "stepper", save_cut="empty", save_time=0.5)
+
+@pytest.mark.parametrize(("save_cut", "left"), [("empty", False), ("old", True)])
+def test_a_torn_save_of_a_project(save_cut: str, left: bool) -> None:
+    link, world, line, _ = host(
+        "exchange 1: torn-eeprom 1", "stepper", save_cut=save_cut, save_time=0.5, turnaround=0.01
+    )
     link.tune(9600)
-    link.write(bytes.fromhex("FF AA 2E 01 00 00 00 00 00 00 00"))
+    world.nodes[1].put(1, world.nodes[1].store.project(1))
+    assert any(world.nodes[1].store.stored[1][:220])
+    link.write(encode("save_project", project=1))
     link.read(1.0)
-    assert line.fired == []
-    from motorbus.families.stepper.wire import COMMANDS  # noqa: F401
+    assert [str(one) for one in line.record] == ["exchange 1: torn-eeprom 1"]
+    assert line.fired[0].at == pytest.approx(0.26, abs=1e-5)
+    assert any(world.nodes[1].store.stored[1]) is left
 
 
 def test_a_clock_step_makes_devices_older_and_nobody_hears_it() -> None:
@@ -181,7 +190,7 @@ def test_a_clock_step_makes_devices_older_and_nobody_hears_it() -> None:
 
 
 def test_what_reports_meanwhile_is_not_heard_afterwards() -> None:
-    link, world, _, _ = host("exchange 1: clock-step 100", "kst", (0x25,), reports_ms=10)
+    link, _, _, _ = host("exchange 1: clock-step 100", "kst", (0x25,), reports_ms=10)
     link.tune(500_000)
     before = [piece for _ in range(10) for piece in link.read(link.now() + 0.01)]
     link.write(CanFrame(0x000, bytes.fromhex("00 00")))

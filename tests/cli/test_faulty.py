@@ -1,0 +1,69 @@
+"""The flag `--faults`: a script, a file, a question; and nowhere but before a simulator."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from motorbus.cli.exits import Exit
+from motorbus.cli.faulty import script_of
+from motorbus.errors import RequestError
+from motorbus.simulation.faults import WORDS, parse
+from tests.cli.conftest import Run
+
+
+def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "noise"
+    file.write_text("seed 3\n1%: drop  # now and then\n")
+    assert script_of(str(file)) == script_of("seed 3; 1%: drop") == parse("seed 3; 1%: drop")
+    assert len(script_of("")) == 0
+    with pytest.raises(RequestError, match="neither a file nor a script"):
+        script_of(str(tmp_path / "nothing"))
+    file.write_text("seed 3\nexchange 1: explode\n")
+    with pytest.raises(RequestError, match="^line 2: "):
+        script_of(str(file))
+
+
+def test_help_lists_every_word(run: Run) -> None:
+    said = run("simulate", "feetech", "--faults", "help", "--json")
+    facts = json.loads(said.out)
+    assert [one["fault"] for one in facts["faults"]] == list(WORDS)
+    assert all(one["packet"] for one in facts["faults"])
+    assert run("simulate", "feetech", "--faults", "help").out.count("\n") > len(WORDS) + len(facts["places"])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--faults", "exchange 1: explode"), "line 1"),
+        (("--faults", "exchange 1: power-cycle 9"), "no node 9"),
+        (("--faults", "exchange 1: unplug 1"), "no port here that could be pulled"),
+        (("--faults", "exchange 1 on adapter: drop"), "text of an adapter"),
+        (("--faults", "nothing-there"), "neither a file nor a script"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_served(
+    run: Run, words: tuple[str, ...], says: str
+) -> None:
+    said = run("simulate", "feetech", *words)
+    assert said.code == Exit.USAGE
+    assert says in said.err
+    assert said.out == ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("read", "feetech:/dev/nothing#1", "present_position", "--faults", "exchange 1: drop"),
+        ("ping", "feetech:/dev/nothing#1", "--faults", "exchange 1: drop"),
+        ("stop", "feetech:socket://127.0.0.1:1#1", "--faults", "exchange 1: drop"),
+        ("move", "feetech:/dev/nothing,faults=x#1=90deg", "--yes"),
+    ],
+)
+def test_faults_are_refused_on_every_other_port(run: Run, words: tuple[str, ...]) -> None:
+    said = run(*words)
+    assert said.code == Exit.USAGE
+    assert "faults cannot be put in front of a port" in said.err
+    assert "motorbus simulate FAMILY --faults" in said.err

@@ -1,0 +1,90 @@
+"""Anything called in any order while anything goes wrong: nothing told is false, nothing hangs, nothing stays behind.
+
+`machine.py` says what is asserted and what is left out. A failure prints the steps and the faults as a script.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import pytest
+from hypothesis import settings
+from hypothesis.stateful import run_state_machine_as_test
+
+from tests.conftest import Figures
+from tests.faults.machine import Machine, Rig, walk
+from tests.faults.machine_feetech import FeetechRig, FeetechSteps
+from tests.faults.machine_kst import KstRig, KstSteps
+from tests.faults.machine_stepper import StepperRig, StepperSteps
+
+MACHINES = {"feetech": FeetechSteps, "kst": KstSteps, "stepper": StepperSteps}
+RIGS: dict[str, type[Rig]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
+SHORT = settings(max_examples=12, stateful_step_count=30)
+FEW = 1_500
+"""Exchanges of a walk in which faults of nearly every kind strike."""
+
+
+@pytest.mark.parametrize("family", MACHINES)
+def test_whatever_is_called_and_whatever_strikes(family: str) -> None:
+    machine: type[Machine] = MACHINES[family]
+    run_state_machine_as_test(machine, settings=SHORT)
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("family", RIGS)
+def test_a_long_walk_among_faults(family: str, rounds: Callable[[int], int], figures: Figures) -> None:
+    total = rounds(1_000_000)
+    rig, began = RIGS[family](), time.process_time()
+    walk(rig, 7, total if total > 100_000 else FEW, often=0.05)
+    fired = rig.line.count
+    assert fired > rig.line.exchange / 100
+    assert rig.untouched > rig.line.exchange / 20
+    assert rig.oracle.judged > rig.line.exchange / 20
+    figures(
+        "L1-L11, L15, D3 stateful machine, every verb among faults of every kind",
+        family=family,
+        promise=2,
+        seed=7,
+        exchanges=rig.line.exchange,
+        calls=sum(rig.calls.values()),
+        judged=rig.oracle.judged,
+        faults=fired,
+        wrong=0,
+        hangs=0,
+        untouched=rig.untouched,
+        untouched_not_right_at_once=0,
+        longest_s=round(rig.oracle.longest, 3),
+        processor_s=round(time.process_time() - began),
+        **{f"failed_{says.value.replace(' ', '_')}": count for says, count in rig.oracle.failed.items()},
+    )
+
+
+@pytest.mark.parametrize("family", RIGS)
+def test_every_fault_of_a_machine_fires(family: str) -> None:
+    """One after the other, in the place where it strikes; nothing of what is listed is a word without a deed."""
+    rig = RIGS[family]()
+    for name in rig.faults:
+        fired = rig.line.count
+        for lot in range(40):
+            rig.strike(name, lot)
+            rig.spend()
+            if rig.line.count > fired:
+                break
+        assert rig.line.count > fired, name
+        rig.rest()
+
+
+def test_a_value_that_is_old_is_found_out() -> None:
+    """The judge itself: what the servo held before the call, and holds no more, is no answer."""
+    rig = FeetechRig()
+    servo = rig.simulator.servos[0]
+    servo.raw_position = 1000
+    with rig.oracle.call() as before:
+        pass
+    rig.oracle.told(before, 1, "present_position", 1000)
+    servo.raw_position = 1001
+    with rig.oracle.call() as after:
+        rig.servos[1].position()
+    with pytest.raises(AssertionError, match="was told to be 1000"):
+        rig.oracle.told(after, 1, "present_position", 1000)
