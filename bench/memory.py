@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import cycle
 
-from bench.workloads import COUNTS, IDS, position
+from bench.workloads import IDS, THERE_AND_BACK, position
 
 PORT = "memory"
 """What a contender gets as its port when it shall use this."""
@@ -32,7 +32,7 @@ def _trains(nodes: tuple[int, ...], count: int) -> list[bytes]:
         b"".join(
             packet(node, 0, position(node, turn).to_bytes(2, "little").ljust(count, b"\0")) for node in nodes
         )
-        for turn in range(COUNTS)
+        for turn in range(THERE_AND_BACK)
     ]
 
 
@@ -43,7 +43,7 @@ class Wire:
     """
 
     def __init__(self) -> None:
-        one, all_ = cycle(range(COUNTS)), cycle(range(COUNTS))
+        one, all_ = cycle(range(THERE_AND_BACK)), cycle(range(THERE_AND_BACK))
         self._ready: dict[bytes, tuple[Iterator[int], list[bytes]]] = {}
         for count in (2, 3):
             self._ready[packet(1, READ, bytes((POSITION, count)))] = one, _trains(IDS[:1], count)

@@ -3,7 +3,8 @@
    A library can only be timed against something that is never slower than itself, and that notices when a library
    cheats. So this answers FEETECH PING, READ, WRITE, SYNC READ and SYNC WRITE from plain memory, a whole sync-read
    train in one write(), and keeps books: the present position of a servo counts how often it was read, so a stale,
-   skipped or doubled reading shows in the values, and every goal that arrives is added up.
+   skipped or doubled reading shows in the values, and every goal that arrives is added up. It counts up to the end of
+   its range and down again, to and fro, for no motor jumps from one end to the other.
 
    With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
    until the line is free, and an answer is there when its last byte has passed.
@@ -13,6 +14,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,6 +24,7 @@
 #include <unistd.h>
 
 enum { SERVOS = 30, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
+enum { THERE_AND_BACK = 2 * (COUNTS - 1) };
 enum { BITS = 10, SECOND = 1000000000, EXACTLY = 60000, WATCHFUL = 300000 };
 enum { PING = 1, READ = 2, WRITE = 3, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
 
@@ -38,9 +41,13 @@ static unsigned long frames, strays;
 static long long byte_time, line_free, answered;
 static byte answer[ROOM];
 static size_t filled;
+static int urgent;
 
 /* Position of servo n before its first reading; the contenders know the same rule. */
-static unsigned position_of(int id) { return (100u * (unsigned)id + servos[id].reads) % COUNTS; }
+static unsigned position_of(int id) {
+    unsigned long at = (100u * (unsigned)id + servos[id].reads) % THERE_AND_BACK;
+    return (unsigned)(at < COUNTS ? at : THERE_AND_BACK - at);
+}
 
 static struct servo *servo_of(int id) { return id >= 1 && id <= SERVOS ? &servos[id] : NULL; }
 
@@ -186,10 +193,11 @@ static void print_books(void) {
 }
 
 /* Bytes may be there, or our input has ended. For a while after an answer the next request is near: then it looks
-   without sleeping, for a line would not have slept either. */
+   without sleeping, for a line would not have slept either. Not so with real-time priority: bytes get from one end of
+   a terminal to the other by a worker of the system, which has none, and would wait until this sleeps. */
 static int something(struct pollfd *watched) {
     int found = 0;
-    while (byte_time && !found && now() - answered < WATCHFUL) found = poll(watched, 2, 0);
+    while (byte_time && !urgent && !found && now() - answered < WATCHFUL) found = poll(watched, 2, 0);
     return found ? found : poll(watched, 2, -1);
 }
 
@@ -199,6 +207,7 @@ int main(int count_of_arguments, char **arguments) {
     long baud = count_of_arguments > 1 ? atol(arguments[1]) : 0;
     byte_time = baud > 0 ? (long long)BITS * SECOND / baud : 0;
     prctl(PR_SET_TIMERSLACK, 1);
+    urgent = sched_getscheduler(0) == SCHED_FIFO;
     int master = open_terminal();
     struct pollfd watched[] = {{.fd = master, .events = POLLIN}, {.fd = STDIN_FILENO, .events = POLLIN}};
     for (int id = 1; id <= SERVOS; id++) {

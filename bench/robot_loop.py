@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 from bench.bare_loop import bare, told
 from bench.places import BUILD, ROOT, surroundings
 from bench.responder import build, responder
-from bench.workloads import COUNTS, IDS
+from bench.workloads import COUNTS, IDS, to_and_fro
 
 BAUD = 1_000_000
 SHARE = 0.8
@@ -145,20 +145,29 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
 def judged(readings: Sequence[tuple[dict[str, float], frozenset[str]]]) -> None:
     """Each reading shows one count more than the one before, and one for each that was lost and told as lost.
 
-    One more stands for a look at how the motor fares, which reads its position too. Raises Wrong.
+    One more stands for a look at how the motor fares, which reads its position too. At the end of its range a servo
+    counts down again; at the first reading it counts up. Raises Wrong.
     """
-    last, due = dict(readings[0][0]), dict.fromkeys(readings[0][0], 0)
-    for number, (positions, missing) in enumerate(readings[1:], 1):
+    first, *others = readings
+    number = {name: counted(here) for name, here in first[0].items()}
+    due = dict.fromkeys(number, 0)
+    for cycle, (positions, missing) in enumerate(others, 1):
         for name, here in positions.items():
             due[name] += 1
             if name in missing:
                 continue
-            way = round((here - last[name]) / STEP) % COUNTS
-            if not due[name] <= way <= due[name] + 1:
+            since, shown = due[name], counted(here)
+            came = [more for more in (since, since + 1) if to_and_fro(number[name] + more) == shown]
+            if not came:
                 raise Wrong(
-                    f"cycle {number}: {name} shows {way} readings since the last, and {due[name]} were asked"
+                    f"cycle {cycle}: {name} shows {shown}, {since} readings after {to_and_fro(number[name])}"
                 )
-            last[name], due[name] = here, 0
+            number[name], due[name] = number[name] + came[0], 0
+
+
+def counted(here: float) -> int:
+    """The count of a servo whose axis is here (rad), by the zero that the machine file gives it."""
+    return round((here + math.pi) / STEP)
 
 
 # -- in the process that conducts --------------------------------------------------------------------------------

@@ -8,6 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 COUNTS = 4096
+THERE_AND_BACK = 2 * (COUNTS - 1)
+"""Readings after which a servo shows the same again: it counts up to the end of its range and down again."""
 """Positions of one turn; the responder counts its readings modulo this."""
 
 IDS = (1, 2, 3, 4, 5, 6)
@@ -59,7 +61,13 @@ WORKLOADS = {
 
 def position(node: int, readings: int) -> int:
     """What servo `node` shows after so many readings, in counts."""
-    return (100 * node + readings) % COUNTS
+    return to_and_fro(100 * node + readings)
+
+
+def to_and_fro(number: int) -> int:
+    """The count that comes after so many from 0 on, up and down and up again."""
+    at = number % THERE_AND_BACK
+    return at if at < COUNTS else THERE_AND_BACK - at
 
 
 def goals(exchange: int) -> list[int]:

@@ -126,6 +126,12 @@ def test_a_step_of_the_open_change_passes_with_its_facts_or_without() -> None:
     assert found.facts[REACHED] == [INTENT, "writing", "written"]
 
 
+def test_a_change_that_has_begun_does_not_begin_again() -> None:
+    kept = begun(new=7)
+    with pytest.raises(RequestError, match="unfinished"):
+        kept(Journal("set_id", INTENT, {"node": 3, "new": 7}))
+
+
 def test_who_goes_on_with_a_change_that_is_gone_is_told_what_he_wanted() -> None:
     with pytest.raises(RequestError) as caught:
         BusJournal(BUS)(Journal("set_id", "writing 7", {}))

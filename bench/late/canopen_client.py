@@ -70,7 +70,7 @@ def position(node: Any) -> int | None:
     """As it is read without a dictionary of objects."""
     try:
         return int.from_bytes(node.sdo.upload(POSITION, 0), "little", signed=True)
-    except canopen.SdoError:
+    except Exception:  # whatever it raises is a reading that failed
         return None
 
 

@@ -43,7 +43,7 @@ def tally(
     count: int,
     where: Callable[[int], int] = place,
 ) -> Tally:
-    """So many readings. One is right that was true after a request which was heard during its call; None is an error."""
+    """So many readings. One is right that was true after a request that was heard during its call; None is an error."""
     right = stale = errors = 0
     for _ in range(count):
         before = heard()

@@ -2,8 +2,8 @@
 
     python -S -m bench.late.sdk SEED COUNT
 
-Which SDK is a matter of the path for modules. The SDK itself is unmodified: the module `serial` and `time.time` are given
-to it from outside, and its own time-out counts.
+Which SDK is a matter of the path for modules. The SDK itself is unmodified: the module `serial` and `time.time` are
+given to it from outside, and its own time-out counts.
 """
 
 from __future__ import annotations
@@ -42,13 +42,16 @@ class Port:
 
     def write(self, data: Any) -> int:
         soon, then = self.servo.hear(bytes(data))
-        self.under_way += [(self.clock.now + SOON, soon), (self.clock.now + DELAY, then)]
+        for later, answer in ((SOON, soon), (DELAY, then)):
+            if answer:  # nothing overtakes what is under way
+                before = self.under_way[-1][0] if self.under_way else 0.0
+                self.under_way.append((max(self.clock.now + later, before), answer))
         return len(data)
 
     def read(self, count: int) -> bytes:
         self._take()
         if not self.arrived:
-            self.clock.now = min([self.clock.now + STEP, *(at for at, _ in self.under_way)])
+            self.clock.now = min([self.clock.now + STEP, *(at for at, _ in self.under_way[:1])])
             self._take()
         taken, self.arrived = self.arrived[: max(count, 0)], self.arrived[max(count, 0) :]
         return taken

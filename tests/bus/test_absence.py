@@ -13,7 +13,7 @@ from motorbus.bus import absence
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import Effect, Exchange, Operation, Pause, Rank, outcome
+from motorbus.core.operation import Effect, Exchange, Operation, Pause, outcome
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -125,7 +125,7 @@ def test_nothing_that_was_known_is_known() -> None:
     with pytest.raises(LinkLost):
         bus.run(position(1))
     bus.link.latency = 0.016  # as an adapter has it that is plugged in anew
-    bus.run(waited(AWAY))
+    bus.run(waited(AWAY + 0.1))
     turns = bus.turns
     assert told == ["anew"]
     assert dict(turns.known) == {1: None}, "who is there is known still, for a stop must reach him"
@@ -303,8 +303,12 @@ def test_nobody_waits_for_the_lock_while_a_port_is_opened() -> None:
     bus.run(position(1))
     held: list[bool] = []
 
+    def taken() -> None:
+        held.append(bus.turns.lock.acquire(timeout=30))
+        bus.turns.lock.release()
+
     def slow(losses: int) -> None:
-        thread = threading.Thread(target=lambda: held.append(bus.turns.lock.acquire(timeout=30)))
+        thread = threading.Thread(target=taken)
         thread.start()
         thread.join(30)
         MemoryLink.renew(link, losses)

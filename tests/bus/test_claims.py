@@ -64,3 +64,15 @@ def test_a_claim_whose_granting_was_interrupted_is_granted_again_or_given_back()
             claims.grant(True, settle)
             assert claim.done
             assert (list(claims.waiting), list(claims.held)) == ([], [claim])
+
+
+def test_who_only_waits_and_gives_up_frees_nothing() -> None:
+    first, second = Claim("a"), Claim("b")
+    claims = asking(first, second)
+    claims.grant(True, settle)
+    assert not claims.forget(second)
+    assert claims.ours("a")
+    assert claims
+    assert claims.forget(first)
+    assert not claims
+    assert asking(second), "somebody waits"

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from motorbus.bus.pace import EARLY, SHOWN, Pace
+import pytest
+
+from motorbus.bus.pace import EARLY, SHOWN, Pace, least_time
+from motorbus.core.operation import ANY, CanFrame, Due, Exchange
+from motorbus.families.feetech import FAMILY
+from tests.bus.script import position
 
 LEAST = 0.0005
 
@@ -51,3 +56,15 @@ def test_nothing_behind_two_running_refutes_it_and_behind_one_does_not() -> None
 def test_where_it_is_certain_nothing_refutes_it() -> None:
     pace = Pace(certain=True)
     assert not any(pace.nothing_behind() for _ in range(5))
+
+
+def test_the_least_time_of_frames_counts_no_stuffed_bit_of_the_answer() -> None:
+    frame = CanFrame(0x601, bytes(8))
+    asked = least_time(Exchange(frame, (Due(1, 1, 8),)), FAMILY, 1_000_000)
+    alone = least_time(Exchange(frame, ()), FAMILY, 1_000_000)
+    assert asked - alone == pytest.approx(111e-6), "47 bits of frame and 64 of data"
+
+
+def test_the_least_time_of_bytes_is_their_air_time() -> None:
+    for exchange in (position(1), Exchange(b"ask", ANY)):
+        assert least_time(exchange, FAMILY, 9600) == FAMILY.air_time(exchange, 9600)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.bus.ticket import Flight, Ticket
-from motorbus.core.operation import Reply
+from motorbus.core.operation import ANY, Answer, Event, Exchange, Noise, Notice, Rank, Reply
 from tests.bus.script import position, positions, reply
 
 
@@ -51,3 +51,40 @@ def test_a_reply_of_an_unbelieved_node_counts_as_missing() -> None:
     assert flight.complete
     flight.take(Reply(0, 2, reply(2)))
     assert flight.answer(0.0).missing == (2,)
+
+
+def test_a_flight_takes_all_replies_at_once_only_where_nothing_is_odd() -> None:
+    good: list[Event] = [Reply(0, node, reply(node)) for node in (1, 2)]
+    one, two = good
+    odd: list[list[Event]] = [
+        [],
+        [one],
+        [two, one],
+        [one, two, two],
+        [one, one],
+        [one, Reply(0, 2, reply(2)[:-1])],
+        [one, Reply(1, 2, reply(2))],
+        [one, Noise(reply(2), "checksum")],
+        [one, Notice(2, "report", reply(2))],
+    ]
+    for events in odd:
+        flight = Flight(positions(1, 2))
+        assert not flight.take_all(events, ())
+        assert (flight.got, flight.last, flight.complete) == ({}, None, False)
+    flight = Flight(positions(1, 2))
+    assert not flight.take_all(good, (reply(2),)), "it may be an echo"
+    flight.unbelieved = (2,)
+    assert not flight.take_all(good, ())
+    flight = Flight(positions(1, 2))
+    flight.take(Reply(0, 2, reply(2)))
+    assert not flight.take_all(good, ())
+    flight = Flight(positions(1, 2))
+    assert flight.take_all(good, (reply(3),))
+    assert flight.complete
+    assert flight.answer(1.0) == Answer(tuple(one for one in good if isinstance(one, Reply)), (), 1.0)
+
+
+def test_what_stops_and_what_everybody_answers_is_taken_one_by_one() -> None:
+    data = reply(1)
+    for exchange in (position(1, rank=Rank.STOP), Exchange(b"ask", ANY)):
+        assert not Flight(exchange).take_all([Reply(0, 1, data)], ())

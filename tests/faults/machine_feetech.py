@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from random import Random
-from typing import Any
+from typing import Any, Final
 
-from motorbus.core.operation import Exchange, Operation, Together, outcome
+from motorbus.core.operation import Data, Exchange, Operation, Together, outcome
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech import FAMILY, Servo, sync_read
+from motorbus.families.feetech import FAMILY, Servo, sync_read, wire
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.table import TABLES
 from tests.faults.machine import Rig, machine
@@ -20,37 +20,39 @@ READABLE = [row.name for row in TABLE.values() if row.readable]
 MEASURED = ("position", "velocity", "load", "voltage", "temperature")
 LEAST = 20
 """Values to be written begin here: no row ships with one that is as large and as odd."""
+COSTS: Final = {"write a setting": 40, "read": 5, "sync read": 9, "at once": 9}
+"""Exchanges that a verb makes at most, with all that it makes sure of."""
+FAULTS: Final = {
+    "reply lost": ": drop",
+    "reply late": ": delay {late}",
+    "reply copied": ": duplicate",
+    "reply held back": ": reorder {near}",
+    "reply merged": ": merge",
+    "reply in bytes": ": split {near}",
+    "reply cut": "byte {byte}: split {near}",
+    "byte changed": "byte {byte}: corrupt {bits}",
+    "byte lost": "byte {byte}: drop",
+    "byte inserted": "byte {byte}: insert {bits}",
+    "byte doubled": "byte {byte}: duplicate",
+    "reply short": "byte {byte}: truncate",
+    "echo": ": echo",
+    "some echo": ": echo {byte}",
+    "request lost": "to device: drop",
+    "request late": "to device: delay {near}",
+    "request copied": "to device: duplicate",
+    "request changed": "byte {byte} to device: corrupt {bits}",
+    "request short": "byte {byte} to device: truncate",
+    "power cycle": ": power-cycle {node}",
+    "brown-out": "byte {byte}: brown-out {near} {node}",
+    "clock step": ": clock-step 3600",
+}
 
 
 class FeetechRig(Rig):
     """Three servos."""
 
-    costs = {"write a setting": 40, "read": 5, "sync read": 9, "at once": 9}
-    faults = {
-        "reply lost": ": drop",
-        "reply late": ": delay {late}",
-        "reply stalled": ": stall {late}",
-        "reply copied": ": duplicate",
-        "reply held back": ": reorder {near}",
-        "reply merged": ": merge",
-        "reply in bytes": ": split {near}",
-        "reply cut": "byte {byte}: split {near}",
-        "byte changed": "byte {byte}: corrupt {bits}",
-        "byte lost": "byte {byte}: drop",
-        "byte inserted": "byte {byte}: insert {bits}",
-        "byte doubled": "byte {byte}: duplicate",
-        "reply short": "byte {byte}: truncate",
-        "echo": ": echo",
-        "some echo": ": echo {byte}",
-        "request lost": "to device: drop",
-        "request late": "to device: delay {near}",
-        "request copied": "to device: duplicate",
-        "request changed": "byte {byte} to device: corrupt {bits}",
-        "request short": "byte {byte} to device: truncate",
-        "power cycle": ": power-cycle {node}",
-        "brown-out": "byte {byte}: brown-out {near} {node}",
-        "clock step": ": clock-step 3600",
-    }
+    costs = COSTS
+    faults = FAULTS
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator(IDS), 1_000_000, pace=True)
@@ -70,7 +72,6 @@ class FeetechRig(Rig):
             "stop": self.stop,
             "sync read": self.sync_read,
             "at once": self.at_once,
-            "turn by hand": self.turn,
         } | {name: self.measuring(name) for name in MEASURED}
 
     def slowest(self) -> Exchange[Any]:
@@ -79,6 +80,14 @@ class FeetechRig(Rig):
     def one(self, random: Random) -> Servo:
         """One of them."""
         return self.servos[random.choice(IDS)]
+
+    def stir(self, random: Random) -> None:
+        for servo in self.simulator.servos:
+            if random.random() < 0.7:
+                servo.raw_position = random.randrange(4096)
+
+    def foreign(self, random: Random) -> Data:
+        return wire.encode_status(random.randrange(10, 250), 0, random.randbytes(random.randrange(4)))
 
     def told(self) -> str:
         return f"{super().told()}\n# {[(servo.node, servo.alarm) for servo in self.servos.values()]}"
@@ -205,16 +214,5 @@ class FeetechRig(Rig):
                 self.held(window, node, "present_position", value)
         return window
 
-    def turn(self, random: Random) -> Window:
-        """Somebody turns a shaft; nothing is called."""
-        self.link.advance(1e-5)
-        self.simulator.servos[random.randrange(len(IDS))].raw_position = random.randrange(4096)
-        self.link.advance(1e-5)
-        with self.oracle.call(0.0) as window:
-            pass
-        return window
 
-
-FeetechSteps = machine(
-    FeetechRig, list(FeetechRig().verbs), list(FeetechRig.faults)
-)
+FeetechSteps = machine(FeetechRig, list(FeetechRig().verbs), list(FeetechRig.faults))

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from random import Random
-from typing import Any
+from typing import Any, Final
 
-from motorbus.core.operation import Exchange, Operation, Together, outcome
+from motorbus.core.operation import Data, Exchange, Operation, Together, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
-from motorbus.families.kst.driver.exchanges import upload_row
+from motorbus.families.kst.wire import encode_download_reply, encode_report, encode_upload_reply
 from tests.faults.machine import Rig, machine
 from tests.faults.oracle import FalseWord, Window
 
@@ -20,28 +20,31 @@ IDS = (0x25, 0x26)
 PROFILE = "kst-ext"
 RANGE = 250
 """Raw goals are at most so far from the middle; travel limits are further away."""
+COSTS: Final = {"write": 30, "set limits": 40, "at once": 9}
+"""Exchanges that a verb makes at most, with all that it makes sure of."""
+FAULTS: Final = {
+    "reply lost": ": drop",
+    "reply broken": ": corrupt",
+    "reply late": ": delay {late}",
+    "reply stalled": ": stall {late}",
+    "reply held back": ": reorder {near}",
+    "reply merged": ": merge",
+    "reply copied": ": duplicate",
+    "request lost": "to device: drop",
+    "request broken": "to device: corrupt",
+    "request late": "to device: delay {near}",
+    "request copied": "to device: duplicate",
+    "power cycle": ": power-cycle {node}",
+    "brown-out": ": brown-out {near} {node}",
+    "clock step": ": clock-step 3600",
+}
 
 
 class KstRig(Rig):
     """Two servos that tell more than the manual says."""
 
-    costs = {"write": 30, "set limits": 40, "at once": 9}
-    faults = {
-        "reply lost": ": drop",
-        "reply broken": ": corrupt",
-        "reply late": ": delay {late}",
-        "reply stalled": ": stall {late}",
-        "reply held back": ": reorder {near}",
-        "reply merged": ": merge",
-        "reply copied": ": duplicate",
-        "request lost": "to device: drop",
-        "request broken": "to device: corrupt",
-        "request late": "to device: delay {near}",
-        "request copied": "to device: duplicate",
-        "power cycle": ": power-cycle {node}",
-        "brown-out": ": brown-out {near} {node}",
-        "clock step": ": clock-step 3600",
-    }
+    costs = COSTS
+    faults = FAULTS
 
     def __init__(self) -> None:
         family = FAMILY.configured(profile=PROFILE)
@@ -62,11 +65,28 @@ class KstRig(Rig):
             "move": self.move,
             "stop": self.stop,
             "at once": self.at_once,
-            "turn by hand": self.turn,
         }
 
     def slowest(self) -> Exchange[Any]:
-        return upload_row(Servo(self.bus, IDS[0]), self.table["present_position"], int) if hasattr(self, "table") else self.family.probe(IDS[0], 0)
+        return self.family.probe(IDS[0], 0)
+
+    def stir(self, random: Random) -> None:
+        for servo in self.simulator.servos:
+            if random.random() < 0.7:
+                servo.raw_position = random.randrange(-RANGE, RANGE)
+
+    def foreign(self, random: Random) -> Data:
+        node, data = random.choice(IDS), random.randbytes(4)
+        position = self.table["present_position"]
+        return random.choice(
+            [
+                encode_upload_reply(node, position.address, random.randrange(1, 256), data),
+                encode_upload_reply(node, position.address + 0x20, position.subindex or 0, data),
+                encode_upload_reply(0x51, position.address, position.subindex or 0, data),
+                encode_download_reply(node, position.address, position.subindex or 0),
+                encode_report(node, random.randrange(-900, 900)),
+            ]
+        )
 
     def one(self, random: Random) -> Servo:
         """One of them."""
@@ -111,7 +131,7 @@ class KstRig(Rig):
         servo, state = self.one(random), None
         with self.oracle.call(self.bound) as window:
             state = servo.telemetry()
-        if state is not None:
+        if state is not None and state.position is not None:
             self.held(window, servo.node, "present_position", state.position)
         return window
 
@@ -128,7 +148,10 @@ class KstRig(Rig):
         return window
 
     def write(self, random: Random) -> Window:
-        servo, (name, low) = self.one(random), random.choice([("negative_limit", -900), ("positive_limit", 300)])
+        servo, (name, low) = (
+            self.one(random),
+            random.choice([("negative_limit", -900), ("positive_limit", 300)]),
+        )
         raw = self.new(low, low + 600)
         value = servo.value(self.table[name], raw)
         return self.writing(servo, name, raw, lambda: servo.write(**{name: value}))
@@ -166,15 +189,6 @@ class KstRig(Rig):
         for node, value in zip(IDS, found, strict=False):
             if not isinstance(value, MotorbusError):
                 self.held(window, node, "present_position", value)
-        return window
-
-    def turn(self, random: Random) -> Window:
-        """Somebody turns a shaft; nothing is called."""
-        self.link.advance(1e-5)
-        self.simulator.servos[random.randrange(len(IDS))].raw_position = random.randrange(-RANGE, RANGE)
-        self.link.advance(1e-5)
-        with self.oracle.call(0.0) as window:
-            pass
         return window
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from random import Random
-from typing import Any
+from typing import Any, Final
 
-from motorbus.core.operation import Exchange
+from motorbus.core.operation import Data, Exchange
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller, wire
 from motorbus.families.stepper.driver.reading import dump_once
@@ -18,36 +18,39 @@ from tests.faults.machine import Rig, machine
 from tests.faults.oracle import FalseWord, Window
 
 STEPS = (1, 2, 3)
+COSTS: Final = {"write": 120, "read a project": 6, "select": 9}
+"""Exchanges that a verb makes at most, with all that it makes sure of."""
+FAULTS: Final = {
+    "reply lost": ": drop",
+    "reply late": ": delay {late}",
+    "reply stalled": ": stall {late}",
+    "reply copied": ": duplicate",
+    "reply held back": ": reorder {near}",
+    "reply merged": ": merge",
+    "reply cut": "byte {byte}: split {near}",
+    "byte changed": "byte {byte}: corrupt {bits}",
+    "byte lost": "byte {byte}: drop",
+    "byte inserted": "byte {byte}: insert {bits}",
+    "byte doubled": "byte {byte}: duplicate",
+    "reply short": "byte {byte}: truncate",
+    "echo": ": echo",
+    "some echo": ": echo {byte}",
+    "request lost": "to device: drop",
+    "request late": "to device: delay {near}",
+    "request copied": "to device: duplicate",
+    "request changed": "byte {byte} to device: corrupt {bits}",
+    "request short": "byte {byte} to device: truncate",
+    "power cycle": ": power-cycle {node}",
+    "brown-out": "byte {byte}: brown-out {near} {node}",
+    "clock step": ": clock-step 3600",
+}
 
 
 class StepperRig(Rig):
     """One controller; two of its inputs are active."""
 
-    costs = {"write": 120, "read a project": 6, "select": 9}
-    faults = {
-        "reply lost": ": drop",
-        "reply late": ": delay {late}",
-        "reply stalled": ": stall {late}",
-        "reply copied": ": duplicate",
-        "reply held back": ": reorder {near}",
-        "reply merged": ": merge",
-        "reply cut": "byte {byte}: split {near}",
-        "byte changed": "byte {byte}: corrupt {bits}",
-        "byte lost": "byte {byte}: drop",
-        "byte inserted": "byte {byte}: insert {bits}",
-        "byte doubled": "byte {byte}: duplicate",
-        "reply short": "byte {byte}: truncate",
-        "echo": ": echo",
-        "some echo": ": echo {byte}",
-        "request lost": "to device: drop",
-        "request late": "to device: delay {near}",
-        "request copied": "to device: duplicate",
-        "request changed": "byte {byte} to device: corrupt {bits}",
-        "request short": "byte {byte} to device: truncate",
-        "power cycle": ": power-cycle {node}",
-        "brown-out": "byte {byte}: brown-out {near} {node}",
-        "clock step": ": clock-step 3600",
-    }
+    costs = COSTS
+    faults = FAULTS
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator((1,)), 9600, pace=True)
@@ -71,11 +74,18 @@ class StepperRig(Rig):
             "select": self.select,
             "write": self.write,
             "stop": self.stop,
-            "press": self.press,
         }
 
     def slowest(self) -> Exchange[Any]:
         return dump_once(Controller(self.bus), 1)
+
+    def stir(self, random: Random) -> None:
+        for port in range(1, 6):
+            if random.random() < 0.5:
+                self.there.set_input(port, random.random() < 0.5)
+
+    def foreign(self, random: Random) -> Data:
+        return wire.NOTICE
 
     # -- verbs --------------------------------------------------------------------------------------------------------
 
@@ -132,7 +142,9 @@ class StepperRig(Rig):
 
     def distance(self, random: Random) -> Window:
         step, raw = random.choice(STEPS), self.new()
-        return self.writing(f"step_{step}_distance", raw, lambda: self.controller.set_step_distance(step, raw))
+        return self.writing(
+            f"step_{step}_distance", raw, lambda: self.controller.set_step_distance(step, raw)
+        )
 
     def turn_distance(self, random: Random) -> Window:
         raw = self.new()
@@ -149,22 +161,11 @@ class StepperRig(Rig):
     def write(self, random: Random) -> Window:
         raw = self.new()
         value = self.controller.value(self.controller.table["step_1_delay"], raw)
-        return self.writing(
-            "step_1_delay", raw, lambda: self.controller.write(project=1, step_1_delay=value)
-        )
+        return self.writing("step_1_delay", raw, lambda: self.controller.write(project=1, step_1_delay=value))
 
     def stop(self, random: Random) -> Window:
         with self.oracle.call(self.bound) as window:
             self.controller.stop()
-        return window
-
-    def press(self, random: Random) -> Window:
-        """Somebody presses a button, or lets it go; nothing is called."""
-        self.link.advance(1e-4)
-        self.there.set_input(random.randrange(1, 6), random.random() < 0.5)
-        self.link.advance(1e-4)
-        with self.oracle.call(0.0) as window:
-            pass
         return window
 
 

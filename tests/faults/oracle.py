@@ -96,9 +96,7 @@ class Oracle:
     they said, `longest` is the longest call (s).
     """
 
-    def __init__(
-        self, link: MemoryLink, history: History, ahead: Callable[[], float] = lambda: 0.0
-    ) -> None:
+    def __init__(self, link: MemoryLink, history: History, ahead: Callable[[], float] = lambda: 0.0) -> None:
         self.link = link
         self.history = history
         self.ahead = ahead

@@ -73,9 +73,10 @@ class Scene:
         options = MADE[family]
         settings = {one.name for one in found.link.settings}
         self.family = found.configured(**{key: value for key, value in options.items() if key in settings})
-        self.simulator: Any = found.simulator(self.ids, **options)
+        made: Any = found.simulator(self.ids, **options)
+        self.simulator = made
         if family == "stepper":
-            self.simulator.nodes[1].put(1, STORED)
+            made.nodes[1].put(1, STORED)
         self.wire = Wire()
         self.link = link(self.simulator, rate=found.link.rate, line=line or self.wire, **more)
         self.events: list[object] = []

@@ -14,7 +14,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.faults import Fault, ScriptedLine
+from motorbus.simulation.faults import Fault, FaultyLine
 
 SPLIT = 0.0003
 """s between two pieces of what is one packet all the same."""
@@ -107,9 +107,9 @@ def number_of(length: int, values: int = 256) -> int:
     return length * (4 + values - 1) + (length + 1) * values
 
 
-def scripted(fault: Any) -> ScriptedLine:
+def scripted(fault: Any) -> FaultyLine:
     """A line with this one fault of a script."""
-    return ScriptedLine([fault])
+    return FaultyLine([fault])
 
 
 def suffer(

@@ -174,7 +174,7 @@ def test_l14_a_terminal_that_is_read_again_is_right_again() -> None:
         with pytest.raises(LinkError):
             bus.run(position(1))
         with served(Mount(Responder(), master)):
-            told = []
+            told: list[int] = []
             while len(told) < 20:
                 try:
                     told.append(bus.run(position(1 + len(told))))

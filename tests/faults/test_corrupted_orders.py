@@ -19,7 +19,7 @@ from motorbus.errors import MotionError, VerificationFailed
 from motorbus.families import feetech, stepper
 from motorbus.families.feetech import wire
 from motorbus.families.stepper.simulator.ear import Ear
-from motorbus.families.stepper.wire import encode_request
+from motorbus.families.stepper.wire import encode
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
@@ -81,7 +81,9 @@ def test_l5_a_setting_that_arrives_changed_is_found_by_reading_it_back(
 
 def test_l5_a_goal_that_arrives_changed_is_never_said_to_be_reached() -> None:
     goal = 1.0
-    line = Forger(lambda packet: packet[4] == wire.Instruction.WRITE and packet[5] in (41, 42), 8, servo_mended)
+    line = Forger(
+        lambda packet: packet[4] == wire.Instruction.WRITE and packet[5] in (41, 42), 8, servo_mended
+    )
     simulator = feetech.FAMILY.simulator((1,))
     servo = feetech.Servo(bus_of(feetech.FAMILY, simulator, 1_000_000, line), 1)
     servo.enable_torque()
@@ -93,7 +95,7 @@ def test_l5_a_goal_that_arrives_changed_is_never_said_to_be_reached() -> None:
 
 
 def test_l5_a_project_that_arrives_changed_is_found_by_reading_it_back() -> None:
-    request = encode_request("set_step_delay", step=1, delay=500)
+    request = encode("set_step_delay", step=1, delay=500)
     line = Forger(lambda sent: sent[2:4] == request[2:4], 6, stepper_mended)
     simulator = stepper.FAMILY.simulator((1,))
     controller = stepper.Controller(bus_of(stepper.FAMILY, simulator, 9600, line))
@@ -106,7 +108,7 @@ def test_l5_how_often_a_changed_order_passes_the_sum(rounds: Callable[[int], int
     """1 % per byte, 11 bytes: two of them have to be changed, and by amounts that cancel."""
     total = rounds(1_000_000)
     line = FaultyLine("seed 5; 1% of bytes to device: corrupt", most=10)
-    request = encode_request("set_step_delay", step=1, delay=500)
+    request = encode("set_step_delay", step=1, delay=500)
     passed = changed = 0
     for number in range(total):
         (heard,) = line.carry(Side.HOST, request, float(number))
@@ -115,7 +117,9 @@ def test_l5_how_often_a_changed_order_passes_the_sum(rounds: Callable[[int], int
         changed += 1
         assert not isinstance(heard.data, CanFrame)
         passed += sum(one != request for one in Ear(1.0).feed(heard.data, 0.0).requests)
-    figures("L5 changed orders that pass the sum", family="stepper", orders=total, changed=changed, obeyed=passed)
+    figures(
+        "L5 changed orders that pass the sum", family="stepper", orders=total, changed=changed, obeyed=passed
+    )
     assert changed > total / 20
     expected = 2e-5 * total
     assert passed <= expected + 4 * expected**0.5 + 1

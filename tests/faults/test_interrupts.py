@@ -7,23 +7,26 @@ visits; else a few of each kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import closing
 
 import pytest
 
+from motorbus.bus.pump import Bus
 from motorbus.bus.stop import StopOutcome
-from tests.conftest import Figures
+from motorbus.errors import MotorbusError
+from motorbus.families.feetech import FAMILY
+from motorbus.link.pty import PtyMaster
+from motorbus.link.serial import SerialLink
+from motorbus.simulation.mount import Mount
+from tests.bus.responder import Responder, position
+from tests.bus.script import admit_all
+from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, UNSENT, Outcome, afterwards, cut, left_behind, places, told
 from tests.faults.scenes import IDS, KINDS, Scene, off
+from tests.simulation.served import served
 
-Rounds = Callable[[int], int]
 ERRORS = (KeyboardInterrupt, MemoryError)
-VISITS = 8
-
-
-def most(rounds: Rounds, usual: int) -> int:
-    """How many places: all in the long runs, else so many."""
-    return NEVER if rounds(1_000_000) == 1_000_000 else usual
+VISITS = 3
 
 
 def carried_out(
@@ -56,7 +59,7 @@ def test_l17_an_interrupt_at_any_line_of_a_transaction(kind: str, rounds: Rounds
         there, whole, _ = carried_out(kind, NEVER, error)
         assert whole.error is None
         assert KINDS[kind].done(there, whole.value), "when it is not cut it is done"
-        for at in places(whole.walked, VISITS, most(rounds, 9)):
+        for at in places(whole.walked, VISITS, rounds(NEVER, 9)):
             assert faults(kind, at, error) == [], (error.__name__, at)
             cuts += 1
         lines |= set(whole.walked)
@@ -107,7 +110,7 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
         stopped(there)
         whole = cut(there.bus.estop, NEVER, error)
         assert set(whole.value.acknowledged) == set(there.ids)
-        for at in places(whole.walked, VISITS, most(rounds, 9)):
+        for at in places(whole.walked, VISITS, rounds(NEVER, 9)):
             assert stop_faults(family, at, error) == [], (error.__name__, at)
             cuts += 1
         lines |= set(whole.walked)
@@ -118,7 +121,54 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
 @pytest.mark.parametrize("kind", ["feetech guarded write", "kst run", "stepper home"])
 def test_l17_a_second_interrupt_at_any_line_of_the_clean_up(kind: str, rounds: Rounds) -> None:
     _, whole, _ = carried_out(kind)
-    for number, at in enumerate(places(whole.walked, 2, most(rounds, 9))):
+    for number, at in enumerate(places(whole.walked, 2, rounds(NEVER, 9))):
         there, came, _ = carried_out(kind, at, KeyboardInterrupt, later=1 + number * 37 % 400)
         assert isinstance(came.error, KeyboardInterrupt), came.where
         assert afterwards(there, there.bus.run) == [], (at, came.where)
+
+
+def ported(link: SerialLink, at: int, error: type[BaseException]) -> Outcome:
+    """A read by a real port, cut there; afterwards another one is right, the second at the latest."""
+    bus = Bus(link, FAMILY, admit=admit_all)
+    came = cut(lambda: bus.run(position(1)), at, error)
+    told: list[object] = []
+    for node in (2, 3):
+        try:
+            told.append(bus.run(position(node)))
+        except MotorbusError as failure:
+            told.append(failure)
+    assert told[1] == 3, (came.where, told)
+    assert told[0] == 2 or isinstance(told[0], MotorbusError), (came.where, told)
+    assert not bus.turns.lock._is_owned()  # type: ignore[attr-defined]
+    assert not bus.turns.waiting
+    assert bus.relay.pumper is None
+    return came
+
+
+@pytest.mark.timeout(1800)
+def test_l17_an_interrupt_at_any_line_on_a_real_port(rounds: Rounds, figures: Figures) -> None:
+    """As above, with the code of a serial port in place of a link in memory."""
+    with closing(PtyMaster()) as master, served(Mount(Responder(), master)):
+        link = SerialLink(master.slave_name, rate=1_000_000)
+        cuts = 0
+        for error in ERRORS:
+            walked = ported(link, NEVER, error).walked
+            for at in places(walked, VISITS, rounds(NEVER, 12)):
+                came = ported(link, at, error)
+                cuts += came.where is not None
+                assert came.where is None or isinstance(came.error, error), came
+        link.close()
+    assert cuts > 10
+    figures("L17 interrupts: a read by a pseudo-terminal", family="feetech", cuts=cuts, stuck=0, wrong=0)
+
+
+def test_l17_a_run_that_is_cut_before_its_start_is_not_said_to_go_on() -> None:
+    _, whole, _ = carried_out("stepper run")
+    said = {True: 0, False: 0}
+    for at in places(whole.walked, VISITS, 60):
+        there, came, _ = carried_out("stepper run", at)
+        started = any(bytes(data[:3]) == b"\xff\xaa\x4e" for data in there.wire.sent)
+        if "goes on" in told(came.error):
+            assert started or "_launch" in str(came.where), came.where
+            said[started] += 1
+    assert said[True]

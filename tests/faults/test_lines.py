@@ -10,7 +10,6 @@ import pytest
 
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError, NoReply
-from motorbus.families.feetech import wire
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from tests.faults.rig import KINDS, Rig, ping, read_word, sync_read, write_byte
@@ -143,68 +142,6 @@ def test_l8_a_damaged_echo_forges_nothing_either() -> None:
         try_(write_byte, rig)
     for fault in ("corrupt", "lose_byte", "insert_byte", "split", "echo"):
         assert rig.line.count(fault) > 20, fault
-
-
-class Babble:
-    """A perfect line on which something else never stops talking, at line rate."""
-
-    def __init__(self, rig: Rig, babble: Callable[[Random], bytes]) -> None:
-        self.rig = rig
-        self.babble = babble
-        self.random = Random(1)
-        self.bytes = 0
-        self._advance = rig.simulator.advance
-        rig.simulator.advance = self.advance  # type: ignore[method-assign]
-        rig.simulator.due = self.due  # type: ignore[method-assign]
-        self.next = 0.0
-
-    def due(self) -> float:
-        return self.next
-
-    def advance(self, to: float) -> list[tuple[float, Data]]:
-        out: list[tuple[float, Data]] = list(self._advance(to))
-        while self.next <= to:
-            data = self.babble(self.random)
-            self.bytes += len(data)
-            out.append((self.next, data))
-            self.next += 0.01
-        return sorted(out, key=lambda item: item[0])
-
-
-@pytest.mark.parametrize(
-    "babble",
-    [
-        lambda random: random.randbytes(1000),
-        lambda random: b"\xff" * 1000,
-        lambda random: b"\xff\xaa" * 500,
-        lambda random: wire.encode_status(77, 0, b"\x01\x02") * 125,
-        lambda random: wire.encode_status(1, 0, b"\x01") * 140,
-    ],
-    ids=["random", "FF", "FF AA", "another node's frames", "the node's own, of another length"],
-)
-@pytest.mark.timeout(300)
-def test_l9_minutes_of_garbage_hang_nothing(
-    babble: Callable[[Random], bytes], rounds: Callable[[int], int]
-) -> None:
-    """Every call ends by its own deadlines, and the bus is right again when the line is quiet.
-
-    A piece of garbage every 10 ms; in the soak it is ten minutes of it.
-    """
-    pieces = rounds(60_000, 1_000)
-    rig = Rig()
-    line = Babble(rig, babble)
-    longest = 0.0
-    while rig.link.now() < pieces * 0.01:
-        before = rig.link.now()
-        try_(read_word, rig)
-        longest = max(longest, rig.link.now() - before)
-        rig.link.read(rig.link.now() + 5.0)
-    assert line.bytes >= pieces * 980
-    assert longest < 1.0, "three tries, their quiet times and probes"
-    line.next = float("inf")
-    rig.link.read(rig.link.now())
-    try_(read_word, rig)
-    read_word(rig)
 
 
 @pytest.mark.parametrize("kind", KINDS)

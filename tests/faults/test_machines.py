@@ -19,7 +19,7 @@ from tests.faults.machine_kst import KstRig, KstSteps
 from tests.faults.machine_stepper import StepperRig, StepperSteps
 
 MACHINES = {"feetech": FeetechSteps, "kst": KstSteps, "stepper": StepperSteps}
-RIGS: dict[str, type[Rig]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
+RIGS: dict[str, Callable[[], Rig]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
 SHORT = settings(max_examples=12, stateful_step_count=30)
 FEW = 1_500
 """Exchanges of a walk in which faults of nearly every kind strike."""

@@ -11,10 +11,19 @@ from typing import Any
 import can
 import pytest
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.can_text import SlcanReader, slcan_line
-from motorbus.link.can_wire import MOST, BusWire, TextWire, build, frame_of, quietly
+from motorbus.link.can_wire import (
+    BUS_OFF,
+    MOST,
+    BusWire,
+    TextWire,
+    build,
+    frame_of,
+    quietly,
+    refuse_bus_off,
+)
 from tests.link.can_peer import PING
 
 
@@ -196,3 +205,20 @@ def test_a_channel_that_was_not_said_is_the_back_ends_own() -> None:
     made = build(SimpleNamespace, None, {"a": 1})
     assert made.a == 1
     quietly(lambda: os.stat("/no/such/file"))
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENETDOWN, "Network is down"), can.CanOperationError("gone")])
+def test_d13_an_adapter_that_is_down_is_a_lost_link(error: Exception) -> None:
+    wire = bus_wire(Bus(error=error))
+    with pytest.raises(LinkLost):
+        wire.read(0.0)
+    with pytest.raises(LinkLost):
+        wire.write(PING)
+
+
+def test_d13_bus_off_is_a_lost_link_and_no_other_error_is() -> None:
+    for bits in (0x88, 0x04, 0x100):
+        refuse_bus_off("can0", [CanFrame(ERROR_FLAG | bits, bytes(8)), PING])
+    refuse_bus_off("can0", [CanFrame(BUS_OFF, bytes(8))])
+    with pytest.raises(LinkLost, match="can0 is off the bus"):
+        refuse_bus_off("can0", [PING, CanFrame(ERROR_FLAG | BUS_OFF | 0x04, bytes(8))])

@@ -135,3 +135,28 @@ except LinkError as error:
     print(error.summary)
 """
     assert "no pseudo-terminal here" in run(code)
+
+
+def test_pulled_it_hangs_up_and_comes_back_behind_the_same_name(master: PtyMaster, tmp_path: Path) -> None:
+    assert "nobody would find" in master.fixed
+    link = tmp_path / "arm"
+    master.symlink(link)
+    assert master.fixed == ""
+    descriptor = client(str(link))
+    master.unplug()
+    assert not link.is_symlink()
+    assert master.fixed == ""
+    assert gone(descriptor)
+    os.close(descriptor)
+    master.plug()
+    descriptor = client(str(link))
+    assert master.write(b"xyz") == 3
+    assert os.read(descriptor, 10) == b"xyz"
+    os.close(descriptor)
+
+
+def gone(descriptor: int) -> bool:
+    try:
+        return os.read(descriptor, 10) == b""
+    except OSError:
+        return True

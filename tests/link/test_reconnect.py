@@ -105,6 +105,22 @@ def test_l12_a_terminal_is_found_behind_its_link(tmp_path: Path, master: PtyMast
     link.close()
 
 
+def test_l12_a_link_that_was_left_behind_leads_to_somebody_elses_terminal(
+    tmp_path: Path, master: PtyMaster, other: PtyMaster
+) -> None:
+    path = tmp_path / "bus"
+    path.symlink_to(master.slave_name)
+    link = opened(str(path))
+    with pytest.raises(LinkLost, match="has not been made anew"):
+        link.renew(1)
+    path.unlink()
+    path.symlink_to(other.slave_name)
+    link.rest(link.now() + 30)
+    link.renew(1)
+    passes(link, other)
+    link.close()
+
+
 def test_a_terminal_without_a_name_of_its_own_is_not_looked_for(master: PtyMaster) -> None:
     link = open_link(master.slave_name, rate=RATE)
     assert reconnecting(link, rate=RATE, usual=RATE) is link

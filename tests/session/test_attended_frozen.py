@@ -55,7 +55,7 @@ def rests(control: Path) -> bool:
 
 
 @pytest.mark.parametrize("how", ["frozen", "killed"])
-def test_what_a_process_that_does_nothing_any_more_leaves_behind(
+def test_l15_d15_what_a_process_that_does_nothing_any_more_leaves_behind(
     how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

@@ -119,3 +119,10 @@ def test_too_much_under_way_is_told() -> None:
 def test_an_impossible_pace(pace: int) -> None:
     with pytest.raises(RequestError, match="pace"):
         Course(Parrots(), pace=pace)
+
+
+def test_what_is_forgotten_never_arrives() -> None:
+    course = Course(Parrots(), pace=500_000)
+    course.hear(FRAME, 1.0, "me")
+    course.forget()
+    assert told(course, 9.0) == []

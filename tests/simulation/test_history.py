@@ -87,6 +87,15 @@ def test_of_two_servos_with_one_id_what_either_held_was_held() -> None:
     assert bench.history.held(1, "present_position", now, now) == {100, 200}
 
 
+def test_a_second_servo_may_come_later() -> None:
+    bench = Bench(feetech.FAMILY, 3)
+    since = bench.now()
+    bench.history.duplicate(3)
+    bench.history.simulator.servos[1].memory["acceleration"] = 9
+    until = bench.now()
+    assert bench.history.held(3, "acceleration", since, until) == {0, 9}
+
+
 def test_a_servo_is_found_by_the_id_it_had_then() -> None:
     bench = Bench(feetech.FAMILY, 1)
     servo = feetech.Servo(bench.bus, 1)

@@ -146,3 +146,20 @@ def test_what_is_small_leaves_at_once() -> None:
         assert client is not None
         with closing(client), socket.socket(fileno=os.dup(client.fileno())) as same:
             assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def test_pulled_it_refuses_and_is_back_at_the_same_place() -> None:
+    with closing(TcpListener()) as port:
+        address = port.host, port.port
+        with socket.create_connection(address, timeout=10.0) as program:
+            while port.write(b"!") == 0:
+                assert select.select([port], (), (), 10.0)[0]
+                port.read()
+            port.unplug()
+            assert program.recv(10) == b"!"
+            assert program.recv(10) == b""
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(address, timeout=10.0).close()
+        port.plug()
+        assert (port.host, port.port) == address
+        socket.create_connection(address, timeout=10.0).close()

@@ -86,10 +86,10 @@ class Air:
         exchange = flight.exchange
         if exchange.other is not None and self.trust.alike(exchange):
             exchange = flight.exchange = exchange.other()
-        echo_checked = (flight.spoiled == "echo" or flight.echo_checked) and self.echo.present is False
         if flight.left:
+            echo_checked = (flight.spoiled == "echo" or flight.echo_checked) and self.echo.present is False
             flight.reset()
-        flight.echo_checked = echo_checked
+            flight.echo_checked = echo_checked
         start, air = max(now, self._free_at), self.family.air_time(exchange, self.rate)
         flight.sent_at, flight.left = now, True
         awaited = exchange.replies != ()
@@ -156,10 +156,8 @@ class Air:
 
     def _take_all(self, events: Sequence[Event]) -> bool:
         """The usual case: one exchange is in the air, and these are its replies, all of them and nothing else."""
-        if len(self._flying) != 1:
-            return False
-        (flight,) = self._flying.values()
-        return flight.take_all(events, self.echo.recent)
+        flying = self._flying
+        return len(flying) == 1 and next(iter(flying.values())).take_all(events, self.echo.recent)
 
     def _let_settle(self, size: int, now: float) -> None:
         """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.

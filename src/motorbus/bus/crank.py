@@ -6,6 +6,8 @@ blocking pump, the async pump and the stop thread, so that none of them has poli
 
 from __future__ import annotations
 
+from typing import Any
+
 from motorbus.bus.absence import back, rest
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
@@ -109,20 +111,30 @@ def drain(link: Link, turns: Turns, now: float) -> None:
         turns.feed(stale, now)
 
 
-def launch(link: Link, turns: Turns, flight: Flight) -> bool:
-    """The short path: True when the request has left at once; otherwise it is queued, or already settled."""
+def launch(link: Link, turns: Turns, *flights: Flight) -> bool:
+    """The short path: True when the requests have left at once, all of them in one write; they are bytes if several.
+
+    Of several none but the last is answered. Where the first cannot leave so it is queued, or already settled; what
+    follows one that did not leave is left alone.
+    """
     try:
         with turns.lock:
             now = link.now()
             if turns.idle and turns.gone is None:
                 drain(link, turns, now)
-                request = turns.short(flight, now)
-                if request is not None:
-                    link.write(request)
-                    return True
-            turns.submit(flight, now)
+                requests: list[Any] = []
+                for flight in flights:
+                    request = turns.short(flight, now)
+                    if request is None:
+                        break
+                    requests.append(request)
+                if requests:
+                    link.write(requests[0] if len(requests) == 1 else b"".join(requests))
+                    return len(requests) == len(flights)
+            turns.submit(flights[0], now)
     except LinkError as error:
         with turns.lock:
             turns.lost(error)
-            flight.finish(error=error)
+            for flight in flights:
+                flight.finish(error=error)
     return False

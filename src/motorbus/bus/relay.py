@@ -29,22 +29,28 @@ class Relay:
         self.changed = changed
         self.pumper: int | None = None
         self.bells: set[Callable[[], None]] = set()
+        self._lock = turns.lock  # that of `changed`; taken by itself it costs less
 
-    def start(self, flight: Flight) -> None:
-        """Send this exchange at once where the bus is idle, and take in what comes; queue it otherwise."""
-        if self._launched(flight):
-            take_in(self.link, self.turns, flight.deadline)
+    def start(self, *flights: Flight) -> None:
+        """Send this exchange at once where the bus is idle, and take in what comes; queue it otherwise.
+
+        Several leave together: none but the last is answered. What cannot leave so is left to whoever waits for it.
+        """
+        last = flights[-1]
+        if self._launched(flights):
+            take_in(self.link, self.turns, last.deadline)
             self.hand_over()
-        flight.wake = self.wake
+        last.wake = self.wake
 
-    def _launched(self, flight: Flight) -> bool:
-        """Has it left at once, and is its answer to be waited for here?"""
-        with self.changed:
-            if self.pumper is None and launch(self.link, self.turns, flight):
-                self.pumper = get_ident() if not flight.done else None
-                return not flight.done
+    def _launched(self, flights: tuple[Flight, ...]) -> bool:
+        """Have they left at once, and is an answer to be waited for here?"""
+        with self._lock:
+            if self.pumper is None and launch(self.link, self.turns, *flights):
+                awaited = not flights[-1].done
+                self.pumper = get_ident() if awaited else None
+                return awaited
             if self.pumper is not None:
-                self.turns.submit(flight, self.link.now())
+                self.turns.submit(flights[0], self.link.now())
             return False
 
     def turn(self) -> None:

@@ -296,7 +296,7 @@ class Run(Generic[T]):
 def taken(turns: Turns, exchange: Exchange[T], answer: Any) -> Any:
     """What the driver reads from an answer; one that it does not take for a refusal says that a stop is accepted."""
     value = answer if exchange.read is None else exchange.read(answer)
-    if exchange.effect in GATED:
+    if exchange.effect in GATED and exchange.replies:
         with turns.lock:
             turns.known.accept(exchange, answer)
     return value

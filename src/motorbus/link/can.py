@@ -24,7 +24,7 @@ from motorbus.link.can_rates import check_rate, ip_line, kernel_rate
 from motorbus.link.can_refusal import INSTALL, device_of, refused
 from motorbus.link.can_slcan import SlcanWire, command_of, open_slcan
 from motorbus.link.can_socketcand import open_socketcand
-from motorbus.link.can_wire import BusWire, Wire, build
+from motorbus.link.can_wire import BusWire, Wire, build, refuse_bus_off
 from motorbus.link.foreign import who_holds
 from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, not_found
@@ -34,6 +34,8 @@ NO_WIRE: Final = ("virtual", "udp_multicast")
 """Interfaces without a bit rate, where any number of programs meet."""
 BY_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
 """Back ends in which a readable descriptor means a frame, and a silent one that there is none."""
+TELLS_ERRORS: Final = ("socketcan", "socketcand")
+"""Back ends whose error frames say what is wrong in the words of the kernel."""
 LATENCY: Final = {
     "virtual": adapters.TERMINAL_LATENCY,  # two threads have to be scheduled
     "udp_multicast": adapters.TERMINAL_LATENCY,
@@ -87,6 +89,7 @@ class CanLink:
         self.latency = LATENCY.get(self._config.interface, adapters.DEVICE_LATENCY)
         self.rate = self._settled_rate(usual)
         self.listen_only = self._config.listen_only
+        self._tells = self._config.interface in TELLS_ERRORS
         self._tuning = False
         self._told = (0, 0)
         self.lock_name = _lock_name(self._config)
@@ -247,12 +250,15 @@ class CanLink:
     def read(self, until: float) -> list[Data]:
         wire = self._wire
         try:
-            return wire.read(until)
+            frames = wire.read(until)
         except LinkLost:
             if wire is self._wire and not self._tuning:
                 raise
             time.sleep(ASK_AGAIN)
             return []  # it is being opened anew
+        if frames and self._tells:
+            refuse_bus_off(self.name, frames)
+        return frames
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         if rate < 0:

@@ -11,12 +11,12 @@ import contextlib
 import errno
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from threading import Lock
 from typing import Any, Final, Protocol
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, LinkLost
 from motorbus.link.can_port import ASK_AGAIN, Port
 from motorbus.link.can_text import Reader
 from motorbus.link.refusal import full, lost
@@ -27,6 +27,8 @@ SLICE: Final = 0.02
 MOST: Final = 256
 """Frames taken from python-can in one go."""
 _IDENTIFIER: Final = ERROR_FLAG - 1
+BUS_OFF: Final = 0x40
+"""Of the identifier of an error frame."""
 _FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
 _NO_ROOM: Final = ("full", "overflow", "could not send message to one or more")
 
@@ -257,6 +259,21 @@ def frame_of(message: Any) -> CanFrame | None:
     if message.is_remote_frame:
         return CanFrame(message.arbitration_id | REMOTE_FLAG, bytes(message.dlc), message.is_extended_id)
     return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
+
+
+def refuse_bus_off(name: str, frames: Iterable[Data]) -> None:
+    """Raise LinkLost where the controller says that it has left the bus: it sends nothing from then on.
+
+    So says the kernel's error frame, CAN_ERR_BUSOFF (linux/can/error.h).
+    """
+    for frame in frames:
+        if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
+            raise LinkLost(
+                f"{name} is off the bus: its controller has counted too many errors",
+                received=frame,
+                cause="a short circuit, another bit rate on the bus, no terminating resistors, or nobody else there",
+                advice="see to that; an interface without restart-ms needs `ip link set can0 type can restart`",
+            )
 
 
 def build(back_end: Any, channel: Any, settings: dict[str, Any]) -> Any:

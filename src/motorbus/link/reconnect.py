@@ -33,6 +33,8 @@ LONGEST: Final = 0.5
 """s between two looks at most: with the time that opening takes it is there within 2 s of its return."""
 PATIENCE: Final = 0.1
 """s for a host of the network to answer at all, when it is looked for: whoever waits has other things to do."""
+MOST_LINKS: Final = 16
+"""Symbolic links behind one another that are looked at."""
 AGAIN: Final = "it is looked for again whenever something is asked for; nothing of before is sent again"
 
 
@@ -251,6 +253,7 @@ class _Ways:
         self._at: Callable[[str], str] = link.port_at if kind == "frames" else str
         self._said, self._had = rate, link.rate
         self._usual, self._kind, self._options = usual, kind, options
+        self._links = _links(self.device)
 
     def at(self, device: str) -> str:
         """The port, as an address says it, where its serial port has this name."""
@@ -283,7 +286,22 @@ class _Ways:
             raise PortNotFound(f"{self.device} leads nowhere")
         if not real.startswith(PSEUDO_TERMINALS):
             raise another(self.port, f"a pseudo-terminal, behind {self.device}", real)
-        return self.open(self.port, rate, listen_only, kept)
+        links = _links(self.device)
+        if links == self._links:  # who was killed has left it behind, and its number is the next terminal's
+            raise PortNotFound(f"{self.device} has not been made anew")
+        found = self.open(self.port, rate, listen_only, kept)
+        self._links = links
+        return found
+
+
+def _links(path: str) -> list[tuple[int, int]]:
+    """The symbolic links that lead from there to a device, each by what changes when it is made anew."""
+    found: list[tuple[int, int]] = []
+    while path and os.path.islink(path) and len(found) < MOST_LINKS:
+        about = os.lstat(path)
+        found.append((about.st_ino, about.st_ctime_ns))
+        path = os.path.join(os.path.dirname(path), os.readlink(path))
+    return found
 
 
 def knock(port: str) -> None:

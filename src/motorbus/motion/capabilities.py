@@ -19,8 +19,8 @@ from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
 from motorbus.motion.safety import canary
+from motorbus.motion.safety.blame import blamed
 from motorbus.motion.safety.canary import Canary
-from motorbus.motion.safety.gate import blamed
 from motorbus.motion.safety.track import Track, believed
 from motorbus.motion.safety.turning import Resting
 from motorbus.motion.several import named, names

@@ -14,7 +14,7 @@ from motorbus.bus.concert_loop import LoopConcert
 from motorbus.bus.pump import Bus
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
-from motorbus.motion.safety.gate import raise_blamed
+from motorbus.motion.safety.blame import raise_blamed
 
 T = TypeVar("T")
 

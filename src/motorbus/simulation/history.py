@@ -108,7 +108,10 @@ class History:
 
     def look(self, at: float) -> None:
         """Keep what has changed since the last event, as of this moment."""
-        for log, (node, picture) in zip(self._logs, self.simulator.sight(at), strict=True):
+        seen = tuple(self.simulator.sight(at))
+        for newcomer in seen[len(self._logs) :]:  # a second device with an id that was there
+            self._logs.append(deque([Seen(at, *newcomer)], self.keep))
+        for log, (node, picture) in zip(self._logs, seen, strict=True):
             _, last_node, last = log[-1]
             if picture != last or node != last_node:
                 log.append(Seen(at, node, picture))

@@ -125,7 +125,9 @@ def test_an_emergency_stop_is_no_doubt_to_be_settled() -> None:
 def test_a_write_that_left_and_of_which_nobody_tells_is_of_unknown_outcome(silent: bool) -> None:
     """Also one whose effect is none: only the reply, or its reading back, can say whether it was heard."""
     asked = writes(3, 41, 5, 6)
-    node, line = (prepared(at_8=0), unheard(asked)) if silent else (prepared(), Line(asked.sent, NoReply("n")))
+    node, line = (
+        (prepared(at_8=0), unheard(asked)) if silent else (prepared(), Line(asked.sent, NoReply("n")))
+    )
     with pytest.raises(OutcomeUnknown, match="whether the write took effect is not known"):
         play(confirmed(node, BLOCK), line, unheard(reads(3, 41, 0, 0)))
 

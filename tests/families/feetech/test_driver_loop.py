@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import inf, nan, tau
+from typing import Any
 
 import pytest
 
-from motorbus.core.operation import ANY, Effect, Goal, Rank
+from motorbus.core.operation import ANY, Answer, Effect, Goal, Rank, Reply
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver import (
     Node,
@@ -39,6 +40,24 @@ def test_positions_of_all_in_one_exchange_that_may_be_kept() -> None:
         found = play(exchange, sync_reads(56, {1: low_high(raw), 2: low_high(-5)}, 2))
         assert found.values == {1: pytest.approx(raw * COUNT), 2: pytest.approx(-5 * COUNT)}
         assert (found.missing, found.at) == ((), one.at)
+
+
+def test_where_they_are_is_told_by_the_settings_that_they_have_when_it_is_asked() -> None:
+    one, other = prepared(1), prepared(2)
+    exchange = sync_read_positions([one, other])
+    tells: Any = exchange.tells_position
+    replies = tuple(Reply(0, node, packet(node, 0, *low_high(raw))) for node, raw in ((1, 1000), (2, 2048)))
+    answer = Answer(replies, (), 1.0)
+    fresh = tells(answer)
+    assert fresh == {1: pytest.approx(1000 * COUNT), 2: pytest.approx(2048 * COUNT)}
+    assert exchange.read is not None
+    exchange.read(answer).values.clear()  # what was given away is not what is kept
+    assert tells(answer) == fresh
+    assert tells(answer._replace(replies=replies[:1])) == {1: fresh[1]}
+    other.settings = prepared(2, at_30=2).settings
+    assert tells(answer) == {1: fresh[1], 2: pytest.approx(2048 * COUNT * 2)}
+    one.forget_settings()
+    assert tells(answer) == {2: pytest.approx(2048 * COUNT * 2)}
 
 
 def test_a_missing_position_is_missing_and_never_replaced() -> None:

@@ -9,11 +9,11 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import Journal, Progress
+from motorbus.core.operation import Data, Journal, Progress
 from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech.driver import Node, set_id
 from motorbus.families.feetech.simulator.memory import Written
-from motorbus.link.base import Side
+from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from motorbus.simulation.named import Simulation
 
@@ -45,6 +45,39 @@ def test_it_is_there_under_its_new_id_for_good(model: str, id_ack: str, level: i
         assert servo.memory.wear == ({5: 1, 7: 1} if model.startswith("hls") else {5: 1})
         servo.power_cycle()
         assert (servo.id, simulation[4].id) == (7, 4)
+
+
+class Mute(PerfectLine):
+    """Takes away every acknowledgement of the new id, whichever id it comes from; `fired` counts them."""
+
+    def __init__(self) -> None:
+        self.order = False
+        self.fired = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            self.order = isinstance(data, bytes) and data[4:6] == b"\x03\x05"
+        elif self.order:
+            self.fired += 1
+            return []
+        return super().carry(sender, data, at)
+
+
+@pytest.mark.parametrize("id_ack", ["old", "new"])
+@pytest.mark.parametrize("lost", [False, True])
+def test_d7_the_acknowledgement_of_a_new_id_may_come_from_either_or_not_at_all(
+    id_ack: str, lost: bool
+) -> None:
+    with motorbus.simulate("feetech", ids="3+4", id_ack=id_ack) as simulation:
+        servo, line = simulation[3], Mute()
+        if lost:
+            simulation.line = line
+        assert renamed(simulation).node == 7
+        assert line.fired == int(lost)
+        assert (servo.id, servo.locked, simulation[4].id) == (7, True, 4)
+        assert servo.memory.wear[5] == 1, "written once"
+        servo.power_cycle()
+        assert servo.id == 7
 
 
 def test_the_journal_is_closed_and_tells_each_step() -> None:

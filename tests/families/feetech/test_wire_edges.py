@@ -136,6 +136,30 @@ def test_the_numbers_of_the_protocol() -> None:
     assert wire.VENDOR_MAX_LENGTH == 246
 
 
+def test_a_group_of_nobody_is_told_as_that() -> None:
+    error = refused(lambda: wire.sync_write(255, []))
+    assert error.summary == "SYNC WRITE for 0 servos is impossible"
+    assert error.expected.startswith("1 to 125 servos")
+
+
+def test_broken_items_are_not_taken_for_too_many() -> None:
+    error = refused(lambda: wire.encode_instruction(254, 0x83, b"\x2a\x02" + bytes(251)))
+    assert error.expected == "4 to 253 parameter bytes"
+
+
+def test_a_status_that_is_too_long_is_called_a_status() -> None:
+    assert refused(lambda: wire.encode_status(1, 0, bytes(254))).summary.startswith("status: ")
+
+
+def test_an_instruction_there_is_not_suits_nothing() -> None:
+    assert not wire.suits(0x55, b"")
+
+
+def test_a_length_that_is_impossible_is_told() -> None:
+    with pytest.raises(FramingError, match="length 1 is impossible"):
+        wire.decode_status(bytes.fromhex("FF FF 07 01 00 F7"))
+
+
 # --- what is held back of a stream ----------------------------------------------------------------------------------
 
 
@@ -176,3 +200,39 @@ def test_a_bad_packet_that_comes_in_two_pieces_is_one_doubt() -> None:
     rest = [*receiver.feed(b"\x00"), *receiver.flush()]
     assert b"".join(event.data for event in [*first, *rest]) == bad + b"\x00"
     assert {event.fault for event in [*first, *rest] if isinstance(event, Noise)} >= {"checksum"}
+
+
+def test_what_only_looks_like_a_packet_is_noise_at_once() -> None:
+    """All of these have the right sum: one byte short of a packet, and two with another header."""
+    for text in ("FF FF 05 01 F9 00", "FE 00 01 02 00 FC", "FF 00 01 02 00 FB", "00 FE 01 02 00 FC"):
+        data = bytes.fromhex(text)
+        assert wire.StatusReceiver().feed(data) == [Noise(data, "framing")]
+        assert wire.StatusReceiver().feed(REPLY + data) == [Reply(0, 1, REPLY), Noise(data, "framing")]
+
+
+@pytest.mark.parametrize("text", ["FF FF FE", "FF FF 01 01", "FF FF 01 00"])
+def test_what_can_become_no_packet_any_more_is_not_held(text: str) -> None:
+    receiver = wire.StatusReceiver()
+    assert receiver.feed(bytes.fromhex(text)) == [Noise(bytes.fromhex(text), "framing")]
+    assert receiver.held == 0
+
+
+def test_a_run_of_noise_that_comes_in_one_piece_is_told_in_one() -> None:
+    data = bytes.fromhex("11 22 FF FF 01 01 33")
+    assert wire.StatusReceiver().feed(data) == [Noise(data, "framing")]
+
+
+def test_a_bad_packet_inside_a_bad_one_is_part_of_it_behind_noise_too() -> None:
+    bad = b"\xff\xff\x02\x0c\x00" + REPLY[:-1] + b"\x00" + b"\x11\x22\x33"
+    assert wire.StatusReceiver().feed(bytes(10) + bad) == [
+        Noise(bytes(10), "framing"),
+        Noise(bad, "checksum"),
+    ]
+
+
+def test_doubt_ends_with_the_good_packet_that_its_last_bytes_begin() -> None:
+    receiver = wire.StatusReceiver()
+    head = b"\xff\xff\x02\x04\x00"
+    assert receiver.feed(head + REPLY[:3]) == [Noise(head, "checksum")]
+    assert receiver.feed(REPLY[3:]) == [Reply(0, 1, REPLY)]
+    assert receiver.feed(b"\x33\x44") == [Noise(b"\x33\x44", "framing")]

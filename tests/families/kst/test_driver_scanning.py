@@ -96,8 +96,9 @@ def test_at_another_rate_it_listens_first_and_the_rate_is_set_back() -> None:
 
 def test_d12_a_running_bus_at_another_rate_is_not_disturbed() -> None:
     with bench(bit_rate=250_000, reports_ms=20, profile="kst-ext") as there:
-        there.run(there.family.scan((), tuple(rate for rate in RATES if rate != 500_000)))
+        found = there.run(there.family.scan((), tuple(rate for rate in RATES if rate != 500_000)))
         assert there.sim().errors == 0
+        assert [one.rate for one in found] == [250_000], "where it listened first and heard somebody"
 
 
 def test_a_silent_bus_at_another_rate_loses_one_frame_for_each_rate_that_was_named() -> None:

@@ -232,3 +232,12 @@ def test_any_eight_bytes_are_survived_and_answered_at_most_once(profile: str) ->
 def test_impossible_ids_are_refused(ids: tuple[int, ...]) -> None:
     with pytest.raises(RequestError):
         simulate(ids)
+
+
+def test_a_second_servo_comes_while_the_bus_is_at_work() -> None:
+    host = at_rate(1_000_000, duplicate_delay=0.001)
+    host.bus.duplicate(1)
+    assert [servo.node for servo in host.bus.servos] == [1, 1]
+    assert host.say(f"601#{READ}") == ["581#4B02600000000000"] * 2
+    with pytest.raises(RequestError, match="no servo has the id 9"):
+        host.bus.duplicate(9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import pytest
 
 from motorbus.families.kst.simulator.memory import KEPT, Memory
@@ -86,3 +88,11 @@ def test_what_is_not_there_has_a_substitute() -> None:
     assert "zero" not in memory()
     assert "node_id" in memory()
     assert (memory().get("zero", 7), memory().get("node_id", 7)) == (7, 37)
+
+
+def test_the_middle_of_a_save() -> None:
+    values = memory()
+    assert values.midway(0.0) == inf
+    values.save(1.0, 0.3)
+    assert values.midway(1.1) == pytest.approx(1.15)
+    assert values.midway(1.4) == inf

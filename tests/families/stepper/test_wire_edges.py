@@ -31,6 +31,7 @@ def test_only_the_whole_request_is_sound() -> None:
     assert wire.is_sound(request)
     assert not wire.is_sound(request[:10])
     assert not wire.is_sound(request + b"\0")
+    assert not wire.is_sound(request + request[-1:])
     assert not wire.is_sound(b"\xff\xab" + request[2:-1] + bytes((request[-1] + 1,)))
     assert not wire.is_sound(request[:-1] + bytes((request[-1] ^ 1,)))
 
@@ -49,6 +50,18 @@ def test_a_refusal_says_what_would_do(name: str, values: dict[str, int], expecte
     with pytest.raises(RequestError) as caught:
         wire.encode(name, **values)
     assert caught.value.expected == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [("step", 256, "its 1 byte"), ("microsteps", 1 << 16, "its 2 bytes"), ("delay", 1 << 24, "its 3 bytes")],
+)
+def test_a_number_that_is_too_large_is_told_with_its_size(name: str, value: int, says: str) -> None:
+    command = next(one for one in wire.COMMANDS.values() if one.place(name) is not None)
+    values = {place.name: 0 for place in command.places} | {name: value}
+    with pytest.raises(RequestError) as caught:
+        wire.encode(command.name, **values)
+    assert caught.value.summary.endswith(f"{name} {value} does not fit {says}")
 
 
 def test_an_unknown_command_is_told_with_all_there_are() -> None:
@@ -162,6 +175,41 @@ def test_only_a_dump_is_longer_than_six_bytes() -> None:
         assert wire.reply_length(command) == (226 if command.name == "read_project" else 6)
 
 
+@pytest.mark.parametrize(
+    ("at", "name"),
+    [
+        (0, "header"),
+        (1, "header"),
+        (2, "class"),
+        (3, "command or project"),
+        (4, "port"),
+        (5, "step or level"),
+    ],
+)
+def test_a_wrong_byte_of_a_reply_is_named(at: int, name: str) -> None:
+    request = wire.encode("stop_motor")
+    reply = bytearray(STOPPED)
+    reply[at] ^= 0x40
+    said = f"byte {at} ({name}) is {reply[at]:02X}, {STOPPED[at]:02X} is due"
+    assert wire.difference(request, bytes(reply)) == said
+
+
+def test_a_project_that_was_named_is_due_and_of_one_that_was_not_any_there_is() -> None:
+    started = wire.encode("start_project", project=2)
+    assert wire.difference(started, bytes.fromhex("FF AA 4E 05 00 00")) == (
+        "byte 3 (command or project) is 05, 02 is due"
+    )
+    looped = wire.encode("set_project_loop", project_loop=9)
+    assert wire.difference(looped, bytes.fromhex("FF AA 8E 07 00 00")) == (
+        "byte 3 is 07, a project from 01 to 04 is due"
+    )
+    asked = wire.encode("read_input", port=2)
+    assert (
+        wire.difference(asked, bytes.fromhex("FF AA 00 0B 02 02"))
+        == "byte 5 (step or level) is 02, 00 is due"
+    )
+
+
 # --- dumps --------------------------------------------------------------------------------------------------------
 
 
@@ -226,3 +274,9 @@ def test_bytes_without_a_time_end_nothing() -> None:
     assert receiver.feed(STOPPED[:2], 1.0) == []
     assert receiver.feed(STOPPED[2:4]) == []
     assert receiver.feed(STOPPED[4:], 1.02) == [Reply(0, (3, 0x0D, 0, 0), STOPPED)]
+
+
+def test_a_pause_of_exactly_the_gap_ends_nothing() -> None:
+    receiver = wire.Receiver()
+    assert receiver.feed(STOPPED[:2], 0.0) == []
+    assert receiver.feed(STOPPED[2:], 0.05) == [Reply(0, (3, 0x0D, 0, 0), STOPPED)]

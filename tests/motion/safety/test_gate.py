@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from motorbus.core.goal import Stays, torque_on
 from motorbus.core.operation import EVERY_LANE, Answer, Due, Effect, Exchange, Goal, Rank
-from motorbus.errors import Interrupted, LimitExceeded, NoReply, Refused
-from motorbus.motion.safety.gate import Gate, blamed
+from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.motion.safety.track import FRESH
@@ -303,18 +303,3 @@ def test_a_lease_has_the_time_of_the_robot() -> None:
     assert line.gate.loss() is None
     line.now = 101.0
     assert line.gate.loss() is not None
-
-
-def test_who_was_ended_by_the_loss_of_the_lease_is_told_so() -> None:
-    class Bus:
-        admit = Gate()
-
-    error, other = Interrupted("ended by another order", node=3), NoReply("silent")
-    error.add_note("also: this")
-    assert blamed(error, [Bus]) is error
-    Bus.admit.lease = lease = Lease()
-    lease.take("page", 0.0)  # of a gate that was told of no clock, whose time is over
-    assert blamed(other, [Bus]) is other
-    why = blamed(error, [Bus])
-    assert isinstance(why, Refused)
-    assert (why.reason, why.node, why.__notes__) == ("lease", 3, ["also: this"])

@@ -156,7 +156,7 @@ def at_rest(served: Served) -> dict[Spot, tuple[float, float, bool]]:
 
 
 @pytest.mark.timeout(0)
-def test_what_was_led_goes_no_farther_than_its_last_goal_and_connecting_changes_nothing(
+def test_d15_what_was_led_goes_no_farther_than_its_last_goal_and_connecting_changes_nothing(
     served: Served, rounds: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chance = Random(8)

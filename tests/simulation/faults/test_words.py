@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from motorbus.simulation.faults import WORDS
@@ -26,3 +28,13 @@ def test_a_word_says_what_it_does(name: str) -> None:
 def test_what_belongs_to_what_the_host_sends() -> None:
     outward = {name for name, word in WORDS.items() if word.outward}
     assert outward == {name for name, word in WORDS.items() if word.world} | {"echo"}
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_the_page_says_the_same(name: str) -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "faults.md").read_text(
+        encoding="utf-8"
+    )
+    word = WORDS[name]
+    takes, byte = word.takes.value or "nothing", word.byte or "(not)"
+    assert f"| `{name}` | {takes} | {byte} | {word.packet} |\n" in page

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
+from motorbus.bus.volley import volley
 from motorbus.core.family import Positions, Quality, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import (
@@ -149,7 +150,7 @@ class Part:
         return told
 
     def at_once(self, bus: Bus, orders: Sequence[Exchange[Any]], moment: float) -> list[Any]:
-        """`cycle` on the only bus there is, where nothing is abreast: each exchange on the short path.
+        """`cycle` on the only bus there is, where nothing is abreast: goals and the first question leave as one.
 
         There is nothing to clean up, so an interruption is raised at once.
         """
@@ -160,12 +161,7 @@ class Part:
         for pause in self._wait(moment + self.origin):
             bus.run(iter(pause))
         self.began = self.link.now() - self.origin
-        told: list[Any] = []
-        for exchange in (*orders, *self.reads):
-            try:
-                told.append(bus.run(exchange))
-            except LOST as error:
-                told.append(error)
+        told = volley(bus, (*orders, *self.reads), LOST)
         self.ended = self.link.now() - self.origin
         return told
 

@@ -39,7 +39,7 @@ from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
-from motorbus.motion.safety.gate import raise_blamed
+from motorbus.motion.safety.blame import raise_blamed
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -74,6 +74,7 @@ class TrapezoidFollower:
     def __init__(self, position: float, limits: Limits) -> None:
         self._limits = limits
         self._alike = limits.acceleration == limits.braking
+        self._fastest, self._hardest = limits.velocity, limits.acceleration
         self._position = self._goal = position
         self._velocity = self._since = 0.0
         self._phases: tuple[_Stretch, ...] = ()
@@ -134,13 +135,13 @@ class TrapezoidFollower:
 
     def _usual(self, goal: float) -> tuple[_Stretch, ...]:
         """The way as `core.plant.move` lays it, where it brakes as it accelerates; () where it cannot be said so."""
-        begin, velocity, hardest = self._position, self._velocity, self._limits.acceleration
+        begin, velocity, hardest = self._position, self._velocity, self._hardest
         halt = begin + velocity * abs(velocity) / (2 * hardest)
         if not self._alike or goal == halt or not isfinite(goal):
             return ()
         way = 1.0 if goal > halt else -1.0
         square = 0.5 * (2 * hardest * way * (goal - begin) + velocity * velocity)
-        fastest = self._limits.velocity
+        fastest = self._fastest
         peak = way * (fastest if square >= fastest * fastest else sqrt(square) if square > 0.0 else 0.0)
         gain = hardest if peak > velocity else -hardest
         first = (peak - velocity) / gain

@@ -18,9 +18,10 @@ from typing import Any, Final
 
 from motorbus.core.goal import Later, Stays
 from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
-from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused
-from motorbus.motion.safety.guard import Guard, untold
+from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.guard import ENDLESS, PLACES, Guard, untold
 from motorbus.motion.safety.lease import Lease
+from motorbus.motion.safety.track import FRESH
 from motorbus.motion.safety.turning import Turning
 from motorbus.motion.safety.waiting import Handed, Waiting
 
@@ -101,11 +102,13 @@ class Gate:
             return []
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
-        if not everyone and self._are_fine(goals, now):
+        if not everyone and self._are_known(goals, now):
             return []
         for goal in self._of_everyone(goals) if everyone else goals:
             guard = self.guards.get(goal.node)
-            if guard is None or guard.track is None or guard.ask is None or not _goes(goal):
+            if guard is None or guard.track is None or guard.ask is None:
+                continue
+            if goal.quantity not in PLACES or _stays(goal):
                 continue
             self._look(goal.node, guard)
             if goal.node not in found and guard.track.why_not(now):
@@ -129,14 +132,19 @@ class Gate:
 
     def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
         """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
-        if obeyed and goals and not self.faults and exchange.lane != EVERY_LANE:
-            if self._are_fine(goals, self._now()):
-                if self.lease is not None:
-                    self._check_standing(exchange, goals)
-                if self._tells:
-                    for goal in goals:
-                        self.guards[goal.node].ordered(True)
-                return
+        if (
+            obeyed
+            and goals
+            and not self.faults
+            and exchange.lane != EVERY_LANE
+            and self._are_fine(goals, self._now())
+        ):
+            if self.lease is not None:
+                self._check_standing(exchange, goals)
+            if self._tells:
+                for goal in goals:
+                    self.guards[goal[0]].ordered(True)
+            return
         if exchange.effect is Effect.MOTION and not goals:
             raise LimitExceeded(
                 "this write moves a motor and does not say where to",
@@ -168,13 +176,10 @@ class Gate:
         if self._tells and obeyed:
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
                 if goal.node in self.guards:
-                    _tell(self.guards[goal.node], goal)
+                    self.guards[goal.node].told(goal)
 
     def _are_fine(self, goals: tuple[Goal, ...], now: float) -> bool:
-        """Whether each of these leads to a place that is surely allowed, in one pass: the quick way of most orders.
-
-        What it does not find so is looked at more closely, by who asks.
-        """
+        """Whether each of these leads to a place that is surely allowed, in one pass; else who asks looks closely."""
         guards, seen = self.guards, self._seen
         for node, quantity, value, low, high, stays in goals:
             guard = guards.get(node)
@@ -184,6 +189,22 @@ class Gate:
             if heard is not None and heard[1] is not guard.answer:
                 self._look(node, guard)
             if not (-inf < low <= value <= high < inf and guard.is_fine(value, now)):
+                return False
+        return True
+
+    def _are_known(self, goals: tuple[Goal, ...], now: float) -> bool:
+        """Whether it is known where each of these is, in one pass; else `look` finds out whom to ask."""
+        guards, seen = self.guards, self._seen
+        for goal in goals:
+            node = goal[0]
+            guard = guards.get(node)
+            if guard is None or (track := guard.track) is None:
+                return False
+            heard = seen.get(node)
+            if heard is not None and heard[1] is not guard.answer:
+                self._look(node, guard)
+            sample = track.sample
+            if sample is None or track.suspect is not None or now - sample.at > FRESH:
                 return False
         return True
 
@@ -270,15 +291,8 @@ class Gate:
         place = self._places.get(node)
         if place is not None:
             guard.track.take(place, answer.at)
-        guard.answer = (
-            answer  # last, so that an interrupt between these lines leaves it to be taken in once more
-        )
-
-
-PLACES: Final = ("position", "relative")
-"""Quantities that lead to a place."""
-ENDLESS: Final = ("velocity", "load", "current")
-"""Quantities that go on being obeyed until something else is ordered."""
+        # last, so that an interrupt between these lines leaves it to be taken in once more
+        guard.answer = answer
 
 
 def _stays(goal: Goal) -> bool:
@@ -301,44 +315,6 @@ def _nobody_stops(goal: Goal) -> Refused:
         advice="open the machine with it as an axis, or its bus by its address; nothing was sent",
         node=goal.node,
     )
-
-
-def _tell(guard: Guard, goal: Goal) -> None:
-    """Whoever has set the guard is to know that this was ordered. What only bounds a movement moves nothing."""
-    if goal.quantity == "relative" or goal.stays is not None:
-        guard.adds(0.0 if goal.stays is not None else goal.value, ends=goal.stays is not None)
-    if goal.stays is Stays.ON:
-        guard.ordered(False)
-    elif not _stays(goal) and (goal.quantity in PLACES or (goal.quantity in ENDLESS and goal.value)):
-        guard.ordered(True)
-
-
-def _goes(goal: Goal) -> bool:
-    """It is told to go to a place."""
-    return goal.quantity in PLACES and not _stays(goal)
-
-
-def blamed(error: MotorbusError, buses: Iterable[Any]) -> MotorbusError:
-    """The error that says why: a movement that was ended because the lease was lost says so, and so do its notes.
-
-    `buses` are those that it was on.
-    """
-    ended = isinstance(error, Interrupted) or (isinstance(error, Refused) and error.reason == "lease")
-    gates = (bus.admit for bus in buses if isinstance(bus.admit, Gate)) if ended else ()
-    loss = next((loss for gate in gates if (loss := gate.loss()) is not None), None)
-    if loss is None:
-        return error
-    for note in getattr(error, "__notes__", ()):
-        loss.add_note(note)
-    loss.node = error.node
-    return loss
-
-
-def raise_blamed(error: MotorbusError, buses: Iterable[Any]) -> None:
-    """Raise what it was ended by, where that is the loss of the lease."""
-    why = blamed(error, buses)
-    if why is not error:
-        raise why from error
 
 
 def _none(_: int) -> int:

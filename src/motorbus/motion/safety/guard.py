@@ -9,6 +9,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any, Final, NamedTuple
 
+from motorbus.core.goal import Stays
 from motorbus.core.operation import Answer, Goal, Runnable
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.track import FRESH, Track
@@ -28,6 +29,11 @@ taken one period ago, and the goal is for one period from now: 0.25 s each where
 """
 NEAR: Final = 0.1
 """rad that it may lead besides, whatever its speed: how far one that is led may be off (`moving.stream.FAR`)."""
+
+PLACES: Final = ("position", "relative")
+"""Quantities that lead to a place."""
+ENDLESS: Final = ("velocity", "load", "current")
+"""Quantities that go on being obeyed until something else is ordered."""
 
 
 def _unknown() -> float | None:
@@ -147,6 +153,16 @@ class Guard:
             )
         if way > self._lead and not paced:
             raise self._unpaced(goal, way)
+
+    def told(self, goal: Goal) -> None:
+        """It was ordered this: whoever has set the guard is to know. What only bounds a movement moves nothing."""
+        stays = goal.stays is not None
+        if goal.quantity == "relative" or stays:
+            self.adds(0.0 if stays else goal.value, ends=stays)
+        if goal.stays is Stays.ON:
+            self.ordered(False)
+        elif not stays and (goal.quantity in PLACES or (goal.quantity in ENDLESS and goal.value)):
+            self.ordered(True)
 
     def adds(self, way: float, *, ends: bool = False) -> None:
         """It was told to go so much farther (rad), perhaps while an earlier way was not at its end; or that is over."""

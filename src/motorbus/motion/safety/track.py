@@ -68,7 +68,9 @@ class Track:
         """
         before = self.sample
         if before is not None and at >= before.at and abs(value - before.value) <= TREMBLING:
-            return self._believed(value, at, Quality.FRESH)  # the usual case: possible whatever its age
+            self.suspect = None
+            self.sample = sample = Sample(value, at)  # the usual case: possible whatever its age
+            return sample
         if not isfinite(value):
             return self._doubted(value, at)
         if before is None:

@@ -13,7 +13,6 @@ from motorbus.simulation.faults.struck import strike
 from motorbus.simulation.faults.words import WORDS, Word
 from motorbus.simulation.faults.world import Port, World
 
-ScriptedLine = FaultyLine
 
 __all__ = [
     "ANY",
@@ -22,7 +21,6 @@ __all__ = [
     "FaultyLine",
     "Port",
     "Script",
-    "ScriptedLine",
     "Word",
     "World",
     "parse",

@@ -7,6 +7,7 @@ import random
 import pytest
 
 from motorbus.core.operation import CanFrame
+from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import simulate
 from tests.families.feetech.simulator.host import (
     ACTION,
@@ -291,3 +292,36 @@ def test_replies_come_later_by_chance_and_the_same_again() -> None:
 def test_duplicates_with_jitter_come_apart_and_garble_each_other() -> None:
     host = Host(duplicate="1", reply_jitter=0.0005, seed=3)
     assert len({tuple(host.say(packet(1, PING))) for _ in range(20)}) > 5
+
+
+# A second servo with an id that is there.
+
+
+def test_a_second_servo_comes_while_the_bus_is_at_work() -> None:
+    host = Host((1, 2))
+    host.write(1, 6, 4)  # 500 kbit/s from now on
+    host.wait(1.0)
+    host.bus.duplicate(1)
+    assert [servo.id for servo in host.bus.servos] == [1, 2, 1]
+    assert host.bus.servos[2].baud_rate == host.bus.servos[0].baud_rate == 500_000
+    assert len(host.bus.nodes) == 2
+    host.bus.servos[2].memory["return_delay"] = 250
+    host.bus.servos[2].power_cycle()
+    assert len(host.say(packet(1, PING))) == 1  # the power cycle has taken its delay, and both say the same
+    host.bus.servos[2].memory["return_delay"] = 250
+    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 FC"] * 2
+    assert host.bus.servos[2].baud_rate == 500_000
+    with pytest.raises(RequestError, match="no servo has the id 7"):
+        host.bus.duplicate(7)
+
+
+def test_what_happens_to_servos_by_themselves_goes_on_beside_a_second_one() -> None:
+    host = Host((1,))
+    servo = host.bus.servos[0]
+    servo.memory["goal_position"] = 3000
+    servo.memory["torque_enable"] = 1
+    servo.move(host.now)
+    host.bus.duplicate(1)
+    host.wait(10.0)
+    assert servo.raw_position == 3000
+    assert host.bus.servos[1].raw_position == 2048

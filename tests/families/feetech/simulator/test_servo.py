@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import pytest
 
 from tests.families.feetech.simulator.host import (
@@ -366,3 +368,16 @@ def test_every_other_register_is_heeded_as_soon_as_it_is_written_or_poked(addres
     assert servo.asked is not asked
     servo.memory["max_torque"] = servo.memory["torque_limit"] = 100
     assert servo.asked.limit == 0.1
+
+
+def test_the_middle_of_a_cell_that_is_stored() -> None:
+    host = Host(store_time=0.02)
+    servo = host.bus.nodes[1]
+    assert servo.midway() == inf
+    host.write(1, 55, 0)
+    host.write(1, 11, 0x10, 0x02)
+    assert servo.midway() == pytest.approx(host.now + 0.005)
+    host.wait(0.015)
+    assert servo.midway() == pytest.approx(host.now)
+    host.wait(0.1)
+    assert servo.midway() == inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import inf
 
 import pytest
 
@@ -302,3 +303,13 @@ def test_what_happened_does_not_grow_for_ever() -> None:
     host.say(frame(START, 1), 20.0)
     assert len(host.device.told) == 10_000
     assert host.device.told[-1].at == pytest.approx(host.now, abs=0.002)
+
+
+def test_the_middle_of_a_save() -> None:
+    host = Host(save_time=0.5, turnaround=0.0)
+    assert host.device.midway() == inf
+    began = host.now
+    host.bus.receive(frame(SAVE, 1), began)
+    assert host.device.midway() == pytest.approx(began + 0.25)
+    host.wait(1.0)
+    assert host.device.midway() == inf

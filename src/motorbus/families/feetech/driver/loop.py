@@ -103,7 +103,8 @@ def _no_sync_read(node: Node) -> RequestError:
 class _Gauge:
     """Tells the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker.
 
-    What has been made of those `settings` is kept as long as they are the same. A code below `_plain` is its own raw value.
+    What has been made of those `settings` is kept as long as they are the same. A code below `_plain` is its own raw
+    value.
     """
 
     __slots__ = ("_factor", "_order", "_plain", "_scale", "end", "node", "row", "settings")

@@ -27,6 +27,8 @@ MAX_LENGTH: Final = 255
 VENDOR_MAX_LENGTH: Final = 246
 """The greatest length field the FEETECH SDKs send or take: 250 bytes in all."""
 MAX_PARAMETERS: Final = MAX_LENGTH - 2
+SOUND: Final = 0xFD
+"""The last byte of the sum over a whole packet whose checksum is right, header and checksum included."""
 OVERHEAD: Final = 6
 """Bytes of a packet besides its parameters."""
 
@@ -162,7 +164,7 @@ def frame(id: int, code: int, parameters: bytes = b"") -> bytes:
 
 def is_sound(data: bytes) -> bool:
     """Is the checksum of this whole packet right? The two header bytes are part of the sum used here."""
-    return sum(data) & 0xFF == 0xFD
+    return sum(data) & 0xFF == SOUND
 
 
 def decode_status(data: bytes) -> StatusPacket:

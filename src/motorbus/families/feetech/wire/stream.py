@@ -20,6 +20,7 @@ from motorbus.families.feetech.wire.packets import (
     HEADER,
     MAX_ID,
     OVERHEAD,
+    SOUND,
     InstructionPacket,
     StatusPacket,
     is_sound,
@@ -57,7 +58,9 @@ class Stream(Generic[P]):
         while end - start >= OVERHEAD:
             stop = start + data[start + 3] + 4
             packet = data[start:stop]
-            if stop > end or packet[2] > top or packet[3] < 2 or packet[:2] != HEADER or not is_sound(packet):
+            if stop > end or packet[2] > top or packet[3] < 2 or packet[:2] != HEADER:
+                break
+            if sum(packet) & 0xFF != SOUND:
                 break
             events.append(make(packet))
             start = stop

@@ -1,0 +1,70 @@
+"""Several exchanges one after the other, as a control loop has them in every cycle: goals out, positions in.
+
+What nobody answers leaves together with what follows it, where the bus is idle: so a cycle takes one look at the line,
+one write and one answer. Where that cannot be, because somebody else is on the bus, a node must be probed, the line
+takes its time, or something must be asked before an order can be judged, each exchange goes its own way. So it does
+where time is virtual, for there a write costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from motorbus.bus.look import questions
+from motorbus.bus.run import taken
+from motorbus.bus.ticket import Flight
+from motorbus.core.operation import Exchange
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+
+Exchanges = Sequence[Exchange[Any]]
+
+
+def volley(bus: Bus, exchanges: Exchanges, forgiven: tuple[type[Exception], ...] = ()) -> list[Any]:
+    """Carry these out in their order; the value of each, or the error, where that is one of those `forgiven`.
+
+    Raises the first other error, as `Bus.run` does; what comes behind has not been sent then.
+    """
+    told: list[Any] = []
+    begin = 0
+    for end, exchange in enumerate(exchanges, 1):
+        if exchange.replies == () and end < len(exchanges) and isinstance(exchange.request, bytes):
+            continue  # nobody answers it, so it goes with the next
+        burst, begin = exchanges[begin:end], end
+        sent = _sent(bus, burst)
+        for number, one in enumerate(burst):
+            try:
+                if number < len(sent):
+                    told.append(taken(bus.turns, one, sent[number].result()))
+                else:
+                    told.append(bus.run(one))
+            except forgiven as error:
+                told.append(error)
+    return told
+
+
+def _sent(bus: Bus, burst: Exchanges) -> list[Flight]:
+    """Send them as one, and wait until all that left so are settled; they are the first ones of the burst."""
+    if len(burst) < 2 or bus.link.virtual:
+        return []
+    for one in burst:
+        if one.effect and questions(bus.turns, one):
+            return []
+    flights = [Flight(exchange) for exchange in burst]
+    relay = bus.relay
+    try:
+        relay.start(*flights)
+        for number, flight in enumerate(flights):
+            if number and not (flight.left or flight.done):
+                return flights[:number]
+            while not flight.done:
+                relay.turn()
+        return flights
+    except BaseException:
+        relay.recover()
+        with bus.turns.lock:
+            for flight in flights:
+                bus.turns.abandon(flight)
+        raise

@@ -1,0 +1,170 @@
+"""`motorbus simulate --faults`: by real processes, over every way in, before it is served and while it runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+
+import motorbus
+from motorbus.cli.simulated import Simulated
+from motorbus.errors import LinkLost, MotorbusError, NoReply
+from tests.interop.test_peers import SDK, Peer
+
+PATIENCE = 30.0
+
+
+class Control:
+    """A control socket in a folder with a short name, for local sockets allow some hundred bytes."""
+
+    def __init__(self) -> None:
+        self.folder = TemporaryDirectory()
+        self.path = str(Path(self.folder.name) / "control")
+
+    def order(self, text: str) -> str:
+        with socket.socket(socket.AF_UNIX) as client:
+            client.settimeout(PATIENCE)
+            client.connect(self.path)
+            client.sendall(f"{text}\n".encode())
+            with client.makefile() as lines:
+                return lines.readline().strip()
+
+    def facts(self) -> Any:
+        """What is set and what has happened."""
+        return json.loads(self.order("faults"))
+
+    def fired(self) -> list[str]:
+        return [one["fault"] for one in self.facts()["fired"]]
+
+    def __enter__(self) -> Control:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.folder.cleanup()
+
+
+def lost(servo: Any) -> bool:
+    """Whether nobody answers a read; a second try is not made by hand."""
+    try:
+        servo.position()
+    except NoReply:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("way", ["link", "tcp"])
+def test_a_serial_line_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
+    ways: dict[str, Any] = {"link": tmp_path / "arm"} if way == "link" else {"tcp": "0"}
+    with (
+        Control() as control,
+        Simulated("feetech", faults="exchange 1: split 0.001", control=control.path, **ways) as simulated,
+        motorbus.open(simulated.bus) as bus,
+    ):
+        servo = motorbus.feetech.Servo(bus, 1)
+        servo.position()
+        assert control.fired() == ["exchange 1: split 0.001"]
+        assert control.order("faults 100% to device: drop") == "ok"
+        assert lost(servo)
+        assert control.facts()["count"] > 1
+        assert control.order("faults off") == "ok"
+        servo.position()
+
+
+@pytest.mark.parametrize("way", ["link", "socketcand"])
+def test_a_can_bus_suffers_whatever_adapter_is_before_it(way: str, tmp_path: Path) -> None:
+    ways: dict[str, Any] = {"link": tmp_path / "can"} if way == "link" else {way: "0"}
+    with (
+        Control() as control,
+        Simulated("kst", ids="0x25", faults="exchange 1: corrupt", control=control.path, **ways) as simulated,
+        motorbus.open(simulated.bus) as bus,
+    ):
+        servo = motorbus.kst.Servo(bus, 0x25)
+        for _ in range(2):  # it is broken once, and then it is not
+            with suppress(MotorbusError):
+                servo.position()
+        assert control.fired() == ["exchange 1: corrupt"]
+        servo.position()
+        assert control.order("faults 100% of bytes on adapter: flip 7") == "ok"
+        with pytest.raises(MotorbusError):
+            servo.position()
+        assert control.fired()[0].endswith(" on adapter: flip 7")
+        assert control.order("faults off") == "ok"
+
+
+@pytest.mark.parametrize(("family", "way"), [("feetech", "tcp"), ("kst", "link")])
+def test_a_pulled_port_is_lost_and_comes_back(family: str, way: str, tmp_path: Path) -> None:
+    ways: dict[str, Any] = {"link": tmp_path / "arm"} if way == "link" else {"tcp": "0"}
+    with Control() as control, Simulated(family, control=control.path, **ways) as simulated:
+        port = simulated.bus
+        with motorbus.open(port, reconnect="no") as bus:
+            servo = getattr(motorbus, family).Servo(bus, 1)
+            servo.position()
+            assert control.order("faults exchange 1: unplug 0.2") == "ok"
+            with pytest.raises(LinkLost):
+                ask_until_lost(servo)
+        assert control.fired() == ["exchange 1: unplug 0.2"]
+        with opened_again(port) as bus:
+            getattr(motorbus, family).Servo(bus, 1).position()
+
+
+def ask_until_lost(servo: Any) -> None:
+    """Ask; only a port that is gone is told, and that by the second question."""
+    with suppress(NoReply):
+        servo.position()
+    servo.position()
+
+
+def opened_again(port: str) -> Any:
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return motorbus.open(port)
+        except MotorbusError:
+            assert time.monotonic() < end, f"{port} did not come back"
+
+
+def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_path: Path) -> None:
+    noise = tmp_path / "noise"
+    noise.write_text("seed 7\n100%: duplicate  # and still it works\n")
+    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--link", str(tmp_path / "arm")]
+    with subprocess.Popen(
+        [*command, "--faults", str(noise)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("ready")
+        descriptor = os.open(tmp_path / "arm", os.O_RDWR | os.O_NOCTTY)
+        os.write(descriptor, bytes.fromhex("FFFF010201FB"))
+        got = b""
+        while len(got) < 12:
+            got += os.read(descriptor, 64)
+        os.close(descriptor)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert got == bytes.fromhex("FFFF010200FC") * 2
+    lines = err.splitlines()
+    assert lines[0] == "faults: seed 7"
+    assert lines[1].endswith(" s  fault: exchange 1: duplicate")
+    assert lines[2] == "faults: 1 happened, by the seed 7; the same again: --faults 'seed 7; 100%: duplicate'"
+    assert process.returncode == 0
+
+
+def test_the_vendors_own_library_on_a_line_that_does_harm(tmp_path: Path) -> None:
+    script = "exchange 1: drop; exchange 2 byte 4: corrupt 80; exchange 3: merge; exchange 5 to device: drop"
+    with (
+        Control() as control,
+        Simulated("feetech", link=tmp_path / "arm", faults=script, control=control.path),
+        Peer(SDK, str(tmp_path / "arm")) as sdk,
+    ):
+        assert sdk.read_word(1, 56) == 2048
+        assert sdk.read(1, 5, 1) == [1]
+        assert control.fired()[:3] == script.split("; ")[:3]

@@ -1,0 +1,207 @@
+"""Row L9: something that never stops talking, at line rate, on the line of each family. No call hangs, nothing piles up.
+
+In the soak it is ten minutes of each kind of garbage. What processor time a minute of it takes is told and not judged.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from random import Random
+from typing import Any
+
+import pytest
+
+from motorbus.core.family import SimulatedNode
+from motorbus.core.operation import CanFrame, Data, Event
+from motorbus.errors import MotorbusError
+from motorbus.families.feetech import wire as feetech
+from motorbus.families.stepper import wire as stepper
+from motorbus.link.base import PerfectLine
+from motorbus.link.memory import MemoryLink
+from tests.conftest import Figures, Rounds
+from tests.families.stepper.fault_rig import Rig as StepperRig
+from tests.faults.kst_kinds import KstRig, read_2
+from tests.faults.rig import Rig, read_word
+from tests.faults.slcan_rig import SlcanRig, TextLink
+
+MOST = 4096
+"""Bytes that a receiver may hold back."""
+MINUTES = 10
+EVERY = 0.01
+"""s between two pieces of garbage."""
+
+
+class Babble:
+    """A simulator on whose line something else talks: `garbage` makes what comes every hundredth of a second."""
+
+    def __init__(self, inner: Any, garbage: Callable[[Random], list[Data]]) -> None:
+        self.inner = inner
+        self.garbage = garbage
+        self.random = Random(1)
+        self.pieces = 0
+        self.next = 0.0
+
+    @property
+    def nodes(self) -> Mapping[int, SimulatedNode]:
+        return self.inner.nodes  # type: ignore[no-any-return]
+
+    def tune(self, rate: int) -> None:
+        self.inner.tune(rate)
+
+    def receive(self, data: Data, at: float) -> None:
+        self.inner.receive(data, at)
+
+    def due(self) -> float:
+        due = self.inner.due()
+        return self.next if due is None else min(due, self.next)
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        out: list[tuple[float, Data]] = list(self.inner.advance(to))
+        while self.next <= to:
+            out += [(self.next, data) for data in self.garbage(self.random)]
+            self.pieces += 1
+            self.next += EVERY
+        return sorted(out, key=lambda item: item[0])
+
+
+class Watched:
+    """A receiver, and the most bytes that it has held back."""
+
+    def __init__(self, receiver: Any, held: Callable[[], int]) -> None:
+        self.receiver = receiver
+        self.most = 0
+        self._held = held
+
+    def feed(self, data: Data) -> list[Event]:
+        events: list[Event] = self.receiver.feed(data)
+        self.most = max(self.most, self._held())
+        return events
+
+    def flush(self) -> list[Event]:
+        events: list[Event] = self.receiver.flush()
+        return events
+
+
+def one(data: Callable[[Random], bytes]) -> Callable[[Random], list[Data]]:
+    return lambda random: [data(random)]
+
+
+def frames(make: Callable[[Random], CanFrame]) -> Callable[[Random], list[Data]]:
+    """42 frames of 8 bytes fill a hundredth of a second at 500 kbit/s."""
+    return lambda random: [make(random) for _ in range(42)]
+
+
+SERVO: dict[str, Callable[[Random], list[Data]]] = {
+    "random": one(lambda random: random.randbytes(1000)),
+    "FF": one(lambda random: b"\xff" * 1000),
+    "FF AA": one(lambda random: b"\xff\xaa" * 500),
+    "frames of another node": one(lambda random: feetech.encode_status(77, 0, b"\x01\x02") * 125),
+    "its own frames, of another length": one(lambda random: feetech.encode_status(1, 0, b"\x01") * 140),
+}
+CAN: dict[str, Callable[[Random], list[Data]]] = {
+    "frames of any identifier": frames(lambda random: CanFrame(random.randrange(0x800), random.randbytes(8))),
+    "replies of another node": frames(lambda random: CanFrame(0x5A9, b"\x4b\x02\x60\0\x01\x02\0\0")),
+    "replies that are none": frames(lambda random: CanFrame(0x5A5, b"\xe0" + random.randbytes(7))),
+    "reports": frames(lambda random: CanFrame(0x5A5, random.randbytes(4))),
+    "its own replies, about another object": frames(
+        lambda random: CanFrame(0x5A5, b"\x4b\x05\x60\0\x01\x02\0\0")
+    ),
+}
+TEXT: dict[str, Callable[[Random], list[Data]]] = {
+    "random": one(lambda random: random.randbytes(120)),
+    "digits without end": one(lambda random: b"0123456789ABCDEF" * 7),
+    "ends of lines": one(lambda random: b"\r" * 120),
+    "refusals": one(lambda random: b"\a" * 120),
+    "frames of another node": one(lambda random: b"t5A984B02600001020000\r" * 5),
+}
+CONTROLLER: dict[str, Callable[[Random], list[Data]]] = {
+    "random": one(lambda random: random.randbytes(9)),
+    "FF": one(lambda random: b"\xff" * 9),
+    "FF AA": one(lambda random: b"\xff\xaa" * 4),
+    "notices": one(lambda random: stepper.NOTICE * 4),
+    "replies to something else": one(lambda random: bytes.fromhex("FFAA030D0000")),
+}
+
+
+def servos() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+    rig = Rig(ids=(1,))
+    return rig, lambda: read_word(rig), lambda: _receiver(rig).held
+
+
+def can() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+    rig = KstRig()
+    return rig, lambda: read_2(rig), lambda: 0  # one frame is one event
+
+
+def text() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+    rig = SlcanRig()
+    assert isinstance(rig.link, TextLink)
+    reader = rig.link.reader
+    return rig, lambda: read_2(rig), lambda: len(reader._rest)
+
+
+def controller() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+    rig = StepperRig(PerfectLine(), 1)
+    rig.open()
+    return rig, lambda: rig.output() or _raise(rig.errors[-1]), lambda: _receiver(rig).held
+
+
+def _raise(error: MotorbusError) -> None:
+    raise error
+
+
+def _receiver(rig: Any) -> Any:
+    return rig.bus.turns.receiver.receiver
+
+
+LINES = {
+    "feetech": (servos, SERVO, 1.0),
+    "kst": (can, CAN, 1.0),
+    "kst by slcan": (text, TEXT, 1.0),
+    "stepper": (controller, CONTROLLER, 8.0),
+}
+"""How each is made, its kinds of garbage, and how long (s) a call may take: tries, quiet times and probes."""
+ALL = [(line, kind) for line, (_, kinds, _) in LINES.items() for kind in kinds]
+
+
+def succeeds(act: Callable[[], object]) -> bool:
+    """False when it fails honestly; what is wrong is an AssertionError."""
+    try:
+        act()
+    except MotorbusError:
+        return False
+    return True
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("line", "kind"), ALL)
+def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Rounds, figures: Figures) -> None:
+    make, kinds, longest = LINES[line]
+    rig, act, held = make()
+    link: MemoryLink = rig.link
+    link.simulator = babble = Babble(link.simulator, kinds[kind])
+    babble.next = link.now()
+    rig.bus.turns.receiver = watched = Watched(rig.bus.turns.receiver, held)
+    seconds = rounds(MINUTES * 60, 3)
+    end, took, calls, good = link.now() + seconds, 0.0, 0, 0
+    before = time.process_time()
+    while link.now() < end:
+        began = link.now()
+        good += succeeds(act)
+        took = max(took, link.now() - began)
+        calls += 1
+    used = time.process_time() - before
+    assert babble.pieces >= 0.99 * seconds / EVERY
+    assert watched.most <= MOST
+    assert took <= longest
+    babble.next = float("inf")
+    link.read(link.now())
+    link.advance(1.0)
+    succeeds(act)
+    act()
+    figures(
+        f"L9 {seconds / 60:.2g} minutes of garbage: {kind}",
+        family=line, promise=6, pieces=babble.pieces, calls=calls, succeeded=good, longest_s=round(took, 3),
+        most_bytes_held=watched.most, core_seconds_per_minute=round(used / seconds * 60, 2),
+    )  # fmt: skip

@@ -1,0 +1,203 @@
+"""Row L12 in real time: simulators that are killed, pulled and started again behind the same name, on real ports."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import motorbus
+from motorbus import families
+from motorbus.bus.pump import Bus
+from motorbus.cli.simulated import Simulated
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import Faulted, LinkLost, NoReply
+from motorbus.link.lock import socket_path
+from motorbus.link.pty import PtyMaster
+from motorbus.motion.machine import Machine
+from motorbus.session.opening import prepare
+from motorbus.session.robot import Robot
+from motorbus.simulation.mount import Mount
+from tests.conftest import Figures
+from tests.simulation.served import served
+
+TRIES = 1_000
+"""Looks at a port that is coming back, each behind a pause."""
+LOOK = 0.03
+"""s of such a pause."""
+
+
+@pytest.fixture(autouse=True)
+def state_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port: int = server.getsockname()[1]
+        return port
+
+
+WAYS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {
+    "pty": lambda folder: ("feetech", {"link": folder / "bus"}),
+    "tcp": lambda folder: ("feetech", {"tcp": f"127.0.0.1:{free_port()}"}),
+    "slcan": lambda folder: ("kst", {"link": folder / "can"}),
+    "slcan over tcp": lambda folder: ("kst", {"tcp": f"127.0.0.1:{free_port()}"}),
+    "socketcand": lambda folder: ("kst", {"socketcand": f"127.0.0.1:{free_port()}"}),
+    "stepper": lambda folder: ("stepper", {"link": folder / "line"}),
+}
+
+
+def pause(seconds: float = LOOK) -> Operation[None]:
+    yield from Pause(seconds)
+
+
+def kill(simulated: Simulated, **place: Any) -> None:
+    """Kill it, and remove the link that it leaves behind: its number may be another terminal's by now."""
+    simulated.process.kill()
+    simulated.process.communicate()
+    if "link" in place:
+        place["link"].unlink(missing_ok=True)
+
+
+def first(bus: Any) -> Any:
+    """The device with the lowest id."""
+    node = {"feetech": 1, "kst": 0x21, "stepper": 1}[bus.family.name]
+    return bus.family.devices.blocking(bus, node)
+
+
+def asked(bus: Bus) -> object:
+    """What it tells; a machine that is busy may be late with the answer."""
+    device = first(bus)
+    for _ in range(TRIES):
+        try:
+            return device.read_input(1) if bus.family.name == "stepper" else device.position()
+        except NoReply:
+            bus.run(pause())
+    raise AssertionError("it does not answer")
+
+
+def again(bus: Bus) -> object:
+    """Ask until it is there."""
+    for _ in range(TRIES):
+        try:
+            return asked(bus)
+        except LinkLost:
+            bus.run(pause())
+    raise AssertionError("it was not opened anew")
+
+
+OFTEN = ("pty", "tcp", "slcan")
+"""Those that are tried with every commit; each takes two processes."""
+
+
+@pytest.mark.parametrize(
+    "way", [way if way in OFTEN else pytest.param(way, marks=pytest.mark.soak) for way in WAYS]
+)
+def test_l12_a_simulator_that_is_killed_and_started_again(way: str, tmp_path: Path) -> None:
+    family, place = WAYS[way](tmp_path)
+    ids = {"kst": "0x21", "feetech": "1-2", "stepper": "1"}[family]
+    with Simulated(family, ids=ids, **place) as before, motorbus.open(before.bus) as bus:
+        told = asked(bus)
+        kill(before, **place)
+        for _ in range(3):
+            with pytest.raises(LinkLost, match="looked for again"):
+                asked(bus)
+        with Simulated(family, ids=ids, **place) as after:
+            assert after.process.pid != before.process.pid
+            assert again(bus) == told
+            assert bus.turns.losses == 1
+            link: Any = bus.link
+            assert socket_path(link.lock_name).exists(), "it is to be stopped by other programs there"
+
+
+def test_l12_the_async_pump_over_a_terminal(tmp_path: Path) -> None:
+    async def main() -> None:
+        place: dict[str, Any] = {"link": tmp_path / "bus"}
+        with Simulated("feetech", ids="1", **place) as before:
+            async with motorbus.open_async(before.bus) as bus:
+                servo = bus.family.devices.awaiting(bus, 1)
+                told = await servo.position()
+                kill(before, **place)
+                found = await asyncio.gather(*(servo.position() for _ in range(5)), return_exceptions=True)
+                assert all(isinstance(one, LinkLost) for one in found)
+                with Simulated("feetech", ids="1", **place):
+                    for _ in range(TRIES):
+                        await bus.run(pause())
+                        if bus.turns.gone is None:
+                            break
+                    assert await asyncio.gather(*(servo.position() for _ in range(5))) == [told] * 5
+
+    asyncio.run(main())
+
+
+def test_a_servo_that_has_restarted_behind_it_is_at_fault_and_limp(tmp_path: Path) -> None:
+    place: dict[str, Any] = {"link": tmp_path / "bus"}
+    with Simulated("feetech", ids="1", **place) as before:
+        text = (
+            f'format = 1\n[bus.arm]\naddress = "{before.bus}"\n[axis.a1]\ndevice = "arm#1"\nzero = "180 deg"\n'
+            'low = "-90 deg"\nhigh = "90 deg"\nmax_velocity = "90 deg/s"\nmax_acceleration = "360 deg/s2"\n'
+            'exit = "leave"\n'
+        )
+        with Robot.of(Machine.parse(text, check_address=lambda address: prepare(address, {}))) as robot:
+            robot["a1"].enable_torque()
+            robot.move({"a1": 0.1})
+            kill(before, **place)
+            with pytest.raises(LinkLost):
+                robot.move({"a1": 0.2})
+            bus: Any = robot.buses["arm"]
+            with Simulated("feetech", ids="1", **place):
+                again(bus)
+                with pytest.raises(Faulted, match="has restarted"):
+                    robot.move({"a1": 0.2})
+                assert not first(bus).read("torque_enable")["torque_enable"]
+
+
+# -- often ---------------------------------------------------------------------------------------------------------
+
+
+def counts() -> tuple[int, int]:
+    """Descriptors and threads of this process."""
+    gc.collect()
+    return len(os.listdir("/proc/self/fd")), threading.active_count()
+
+
+def cycles(bus: Bus, mount: Mount, count: int) -> Iterator[object]:
+    """Pull the terminal so often; what is read each time it is back."""
+    for _ in range(count):
+        mount.unplug(seconds=0.005)
+        with pytest.raises(LinkLost):
+            _until_it_is_gone(bus)
+        yield again(bus)
+
+
+def _until_it_is_gone(bus: Bus) -> None:
+    for _ in range(TRIES):
+        asked(bus)
+
+
+def test_l12_a_terminal_pulled_again_and_again_leaves_nothing_behind(
+    tmp_path: Path, rounds: Callable[[int], int], figures: Figures
+) -> None:
+    count = 10_000 if rounds(20_000) == 20_000 else 20
+    master = PtyMaster()
+    master.symlink(tmp_path / "bus")
+    family = families.load("feetech")
+    mount = Mount(family.simulator((1,), ""), master)
+    with closing(master), served(mount), motorbus.open(f"feetech:{tmp_path / 'bus'}") as bus:
+        told = asked(bus)
+        list(cycles(bus, mount, 3))
+        before = counts()
+        right = sum(value == told for value in cycles(bus, mount, count))
+        assert right == count
+        assert bus.turns.losses == count + 3
+        assert counts() == before
+    figures("L12 a terminal pulled and put back", family="feetech", cycles=count, right=right, leaked=0)
