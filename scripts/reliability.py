@@ -20,8 +20,10 @@ from scripts.pages import kept, listed
 PAGE: Final = soaked.ROOT / "docs" / "reliability.md"
 TESTS: Final = soaked.ROOT / "tests"
 NAMED: Final = re.compile(r"^(?:async )?def (test_([ld]\d+)_\w+)", re.M)
-FIRST: Final = ("seed", "exchanges", "faults", "wrong")
+FIRST: Final = ("seed", "kinds", "exchanges", "reads", "faults", "wrong")
 """Figures that come first in a table; the others follow in the order in which a run has told them."""
+MANY: Final = 4
+"""So many runs of one kind are one row."""
 
 HEAD: Final = """# Reliability
 
@@ -81,11 +83,36 @@ def _others(runs: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _table(runs: Iterable[dict[str, Any]]) -> Iterator[str]:
-    rows = [[run["what"], run["family"], _figures(run["figures"]), _run(run)] for run in runs]
+    rows = [[run["what"], run["family"], _figures(run["figures"]), _run(run)] for run in together(runs)]
     if rows:
         yield from listed(("what", "family", "figures", "run"), rows)
     else:
         yield "Not measured yet.\n"
+
+
+def together(runs: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row for many of a kind: those of one test whose names are the same up to the first comma.
+
+    Counts are added up, and of what begins with `longest` or `most` the largest is kept. Each by itself stands in the
+    file of figures.
+    """
+    groups: dict[object, list[dict[str, Any]]] = {}
+    for run in runs:
+        kind = run["what"].partition(",")[0], run["family"], run["test"].partition("[")[0], *run["figures"]
+        groups.setdefault(kind, []).append(run)
+    return [row for group in groups.values() for row in (_summed(group) if len(group) >= MANY else group)]
+
+
+def _summed(group: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    last = max(group, key=lambda run: str(run["date"]))
+    figures = {"kinds": len(group)}
+    for name in group[0]["figures"]:
+        values = [run["figures"][name] for run in group]
+        if any(isinstance(value, str) for value in values) or name == "seed":
+            continue
+        figures[name] = max(values) if name.startswith(("longest", "most")) else sum(values)
+    what, test = last["what"].partition(",")[0], last["test"].partition("[")[0]
+    return [{**last, "what": what, "test": test, "figures": figures}]
 
 
 def _figures(figures: dict[str, Any]) -> str:
@@ -100,7 +127,7 @@ def _shown(value: object) -> str:
 
 
 def _run(run: dict[str, Any]) -> str:
-    where = run["test"].removeprefix("tests/").replace("|", "/")
+    where = run["test"].removeprefix("tests/").partition("[")[0]
     return f"`{where}` {run['date']} {run['commit']}".strip()
 
 

@@ -37,7 +37,7 @@ def test_what_a_run_tells_is_on_the_page(apart: Path, monkeypatch: pytest.Monkey
     )
     page = written(monkeypatch, "--take")
     part = page[page.index("## Promise 3") : page.index("## Promise 4")]
-    assert "| L7 late replies | kst | exchanges 12 345, wrong 0 | `x.py::y[a/b]` 2" in part
+    assert "| L7 late replies | kst | exchanges 12 345, wrong 0 | `x.py::y` 2" in part
 
 
 def test_figures_come_in_one_order(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,6 +53,17 @@ def test_a_newer_run_takes_the_place_of_an_older_one(apart: Path, monkeypatch: p
     soaked.record("L9 garbage", family="kst", promise=6, wrong=3)
     page = written(monkeypatch, "--take")
     assert ("wrong 1" in page, "wrong 2" in page, "wrong 3" in page) == (False, True, True)
+
+
+def test_many_of_a_kind_are_one_row(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number, kind in enumerate(("ping", "read", "write", "action")):
+        soaked.record(
+            f"L1 faults, {kind}", family="kst", test=f"t.py::x[{kind}]", faults=10, wrong=0, longest_s=number
+        )
+    soaked.record("L1 faults, else", family="kst", test="u.py::y", faults=7, wrong=0, longest_s=9)
+    page = written(monkeypatch, "--take")
+    assert "| L1 faults | kst | kinds 4, faults 40, wrong 0, longest s 3 | `t.py::x` 2" in page
+    assert "| L1 faults, else | kst | faults 7, wrong 0, longest s 9 | `u.py::y` 2" in page
 
 
 def test_without_being_told_to_it_takes_nothing_over(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
+from motorbus.core.operation import Operation, Pause
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
@@ -74,3 +75,38 @@ def test_an_axis_has_its_own_position_in_its_own_unit(run: Run, bench: Bench) ->
     assert told["position"] == pytest.approx(0.5236 + 3.1416, abs=0.01)
     reckoned = run("monitor", "arm#1", "lift", "--count", "1", "--json").records
     assert [(one.get("axis"), one.get("axis_position")) for one in reckoned] == [(None, None), ("lift", None)]
+
+
+def test_l12_it_goes_on_when_a_port_that_was_gone_is_there_again(
+    run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pauses: list[float] = []
+
+    def pulled(seconds: float) -> Operation[None]:
+        pauses.append(seconds)
+        if len(pauses) == 2:
+            arm.unplug(seconds=1.0)
+        yield from Pause(seconds)
+
+    monkeypatch.setattr(monitor, "_pause", pulled)
+    ran = run("monitor", f"{arm.url}#1", "--rate", "4", "--count", "12", "--json")
+    assert ran.code == 0, ran.err
+    failed = ["error" in one for one in ran.records]
+    assert failed[:2] == [False, False]
+    assert 3 <= sum(failed) <= 6, "as long as it was away"
+    assert not any(failed[-3:])
+    first, second = ran.err.splitlines()
+    assert "is looked for until it is there again" in first
+    assert second == f"note: {arm.url} is there again"
+
+
+def test_it_ends_where_a_port_is_not_looked_for(
+    run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def pulled(seconds: float) -> Operation[None]:
+        arm.unplug(seconds=1.0)
+        yield from Pause(seconds)
+
+    monkeypatch.setattr(monitor, "_pause", pulled)
+    ran = run("monitor", f"{arm.url}#1", "--reconnect", "no", "--count", "12", "--json")
+    assert ran.code == 3

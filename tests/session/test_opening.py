@@ -77,3 +77,25 @@ def test_faults_are_for_simulated_devices_only(address: str) -> None:
     assert (
         prepare("feetech:sim,ids=1", {"faults": "exchange 1: drop"}).options["faults"] == "exchange 1: drop"
     )
+
+
+@pytest.mark.parametrize(
+    ("address", "options", "looked_for"),
+    [
+        ("feetech:/dev/ttyACM0", {}, True),
+        ("feetech:/dev/ttyACM0,reconnect=no", {}, False),
+        ("kst:can://slcan/dev/ttyACM0,reconnect=yes", {}, True),
+        ("kst:can://socketcan/can0", {"reconnect": False}, False),
+        ("feetech:sim,reconnect=no", {}, False),
+    ],
+)
+def test_a_port_that_is_lost_is_looked_for_unless_told_otherwise(
+    address: str, options: dict[str, object], looked_for: bool
+) -> None:
+    opening = prepare(address, options)
+    assert (opening.reconnect, opening.options) == (looked_for, {})
+
+
+def test_whether_it_is_looked_for_is_yes_or_no() -> None:
+    with pytest.raises(RequestError, match="reconnect=maybe: neither yes nor no"):
+        prepare("feetech:/dev/ttyACM0,reconnect=maybe", {})

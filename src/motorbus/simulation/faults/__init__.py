@@ -13,7 +13,6 @@ from motorbus.simulation.faults.struck import strike
 from motorbus.simulation.faults.words import WORDS, Word
 from motorbus.simulation.faults.world import Port, World
 
-
 __all__ = [
     "ANY",
     "WORDS",

@@ -299,7 +299,7 @@ def test_duplicates_with_jitter_come_apart_and_garble_each_other() -> None:
 
 def test_a_second_servo_comes_while_the_bus_is_at_work() -> None:
     host = Host((1, 2))
-    host.write(1, 6, 4)  # 500 kbit/s from now on
+    host.write(1, 6, 1)  # 500 kbit/s from now on
     host.wait(1.0)
     host.bus.duplicate(1)
     assert [servo.id for servo in host.bus.servos] == [1, 2, 1]

@@ -12,6 +12,7 @@ from tests.families.feetech.simulator.host import (
     CALIBRATE,
     REG_WRITE,
     RESTORE,
+    WRITE,
     Host,
     packet,
     word,
@@ -375,7 +376,8 @@ def test_the_middle_of_a_cell_that_is_stored() -> None:
     servo = host.bus.nodes[1]
     assert servo.midway() == inf
     host.write(1, 55, 0)
-    host.write(1, 11, 0x10, 0x02)
+    host.wait(1.0)
+    host.bus.receive(packet(1, WRITE, 11, 0x10, 0x02), host.now)
     assert servo.midway() == pytest.approx(host.now + 0.005)
     host.wait(0.015)
     assert servo.midway() == pytest.approx(host.now)
