@@ -24,7 +24,7 @@ from typing import Any
 
 from scripts import pages
 from scripts.mutants.record import PAGE, complaints, keep, kept, outcome, page, share
-from scripts.mutants.subjects import Subject, Verdict, Wish, subjects
+from scripts.mutants.subjects import Subject, Verdict, Wish, faults, subjects
 from scripts.mutants.trial import trial
 
 
@@ -38,8 +38,8 @@ def main() -> int:
     failed, found = False, {}
     for name in told.modules or known:
         found[name] = verdicts = _tried(known[name], told)
-        result = outcome(verdicts)
-        whole = told.sample == 1 and not told.only and not told.functions
+        result = outcome(verdicts, len(faults(known[name], Wish())))
+        whole = told.sample == 1 and not told.only
         failed |= bool(
             _say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole)
         )
@@ -60,10 +60,10 @@ def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
             os.write(voice, f"  {time.monotonic() - begun:5.0f} s  {text}\n".encode())
 
     print(subject.name, file=sys.stderr)
-    wish = Wish(told.sample, told.only, told.anew, told.functions, told.jobs, _known(subject, told), tell)
+    wish = Wish(told.sample, told.only, told.anew, told.tables, told.jobs, _known(subject, told), tell)
     verdicts = trial(subject, wish)
     os.close(voice)
-    result = outcome(verdicts)
+    result = outcome(verdicts, len(verdicts))
     took = time.monotonic() - begun
     print(
         f"{subject.name}: {result['noticed']} of {result['faults']} faults noticed ({share(result)}) in {took:.0f} s"
@@ -92,9 +92,7 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
     parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
     parser.add_argument("--only", default="", help="a text that the name of a fault must have")
-    parser.add_argument(
-        "--functions", action="store_true", help="leave out what happens at import, which is slow"
-    )
+    parser.add_argument("--tables", type=float, default=1.0, help="share of what happens at import, which is slow")
     parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--json", default="", help="a file for every verdict")

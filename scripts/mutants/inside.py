@@ -50,7 +50,9 @@ class Order:
 
     def __init__(self, subject: Subject, seen: Seen) -> None:
         self.lasted = {name: took for name, took in seen.lasted.items() if took <= subject.longest}
+        self.known = frozenset(seen.lasted)
         self.kills: Counter[str] = Counter()
+        self._files: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._by_line: defaultdict[Line, set[str]] = defaultdict(set)
         for name in self.lasted:
             for line in seen.ran[name]:
@@ -60,6 +62,17 @@ class Order:
     def limit(self) -> float:
         """How long a child may last (s)."""
         return 1 + 3 * sum(self.lasted.values())
+
+    def noticed(self, file: str, by: str) -> None:
+        """A fault of this file was noticed by that test."""
+        self.kills[by] += 1
+        self._files[file][_file(by)] += 1
+
+    def files(self, fault: Fault) -> list[str]:
+        """The test files whose tests meet this fault, in the order in which they have noticed faults of its file."""
+        kills = self._files[fault.file]
+        files = dict.fromkeys(map(_file, self.of(fault)))
+        return sorted(files, key=lambda file: -kills[file])
 
     def of(self, fault: Fault) -> list[str]:
         """The fast tests that run one of its lines; of what happens at import, all that run any line of its file."""
@@ -71,6 +84,10 @@ class Order:
                 *(tests for line, tests in self._by_line.items() if line[0] == fault.path)
             )
         return sorted(found, key=lambda name: (-self.kills[name], self.lasted[name], name))
+
+
+def _file(test: str) -> str:
+    return test.split("::")[0]
 
 
 class _Tests:
@@ -90,8 +107,8 @@ class _Tests:
     def run(self, items: Sequence[pytest.Item], lasted: Mapping[str, float]) -> str:
         """The name of the first that failed, "" when all passed. One that lasts much too long ends this process."""
         for item, following in zip(items, [*items[1:], None], strict=True):
-            signal.setitimer(signal.ITIMER_PROF, 0.5 + 5 * lasted[item.nodeid])
-            signal.setitimer(signal.ITIMER_REAL, 5 + 10 * lasted[item.nodeid])
+            signal.setitimer(signal.ITIMER_PROF, 0.5 + 5 * lasted.get(item.nodeid, 1.0))
+            signal.setitimer(signal.ITIMER_REAL, 5 + 10 * lasted.get(item.nodeid, 1.0))
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
             if self.failed:
                 break
@@ -171,7 +188,7 @@ class Gathered(_Tests):
         self.wish.tell(f"{len(order.lasted)} fast tests, {sum(order.lasted.values()):.1f} s")
         for fault, by in each(todo, lambda fault: self._try(fault, order), order.limit, self.wish.at_once):
             verdicts.append(Verdict(fault.name, "time" if by is None else by))
-            order.kills[verdicts[-1].by] += 1
+            order.noticed(fault.file, verdicts[-1].by)
             self.wish.tell(progress(verdicts, len(todo)))
         return seen, verdicts
 
@@ -260,11 +277,10 @@ class Anew(_Tests):
 
     def __init__(self, fault: Fault, order: Order, scratch: str) -> None:
         super().__init__()
-        self.fault, self.scratch = fault, scratch
-        self.names, self.lasted = order.of(fault), order.lasted
+        self.fault, self.order, self.scratch = fault, order, scratch
 
     def judge(self) -> str:
-        """The test that has noticed the fault, "" for none. The files whose tests notice most come first."""
+        """The test that has noticed the fault, "" for none. The file whose tests notice most is gathered first."""
         for name in set(sys.modules) - set(_others()):
             del sys.modules[name]  # there are some only where a test asks for a trial
         changed = _Changed(self.fault)
@@ -273,21 +289,23 @@ class Anew(_Tests):
         try:
             importlib.import_module(
                 changed.module
-            )  # before pytest has a hook of its own, which would come first
+            )  # before pytest has a hook of its own that would come first
         except Exception as error:
             return f"import: {type(error).__name__}"
-        files = list(dict.fromkeys(name.split("::")[0] for name in self.names))
-        status = _pytest(self, files, self.scratch)
-        return self.failed or ("" if status in (0, 5) else f"pytest gave {status}")
+        first, *rest = self.order.files(self.fault)
+        for files in ([first], rest):
+            status = _pytest(self, files, self.scratch) if files and not self.failed else 0
+            if status not in (0, 5) and not self.failed:
+                return f"pytest gave {status}"
+        return self.failed
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """In place of running all of them in the order of their files."""
+        """In place of running all of them in the order of their files. Tests that only this fault brings count too."""
         if not self.failed:
             items = {item.nodeid: item for item in session.items}
-            missing = [name for name in self.names if name not in items]
-            self.failed = (
-                missing[0] if missing else self.run([items[name] for name in self.names], self.lasted)
-            )
+            names = [name for name in self.order.of(self.fault) if name in items]
+            names += [name for name in items if name not in self.order.known]
+            self.run([items[name] for name in names], self.order.lasted)
         return True
 
 

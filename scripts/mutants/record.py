@@ -27,16 +27,20 @@ below with the reason, by far most often that the changed program does the same.
 Left alone is what no run can show: annotations, docstrings, `assert`, imports, and prose (a string with a space in it
 is a sentence for people; a test that repeats it proves nothing).
 
+Of what a module does while it is imported (its tables and constants) a share may be tried by chance, for each such
+fault takes a new process; "tried" says how many of all it were. Every fault in a function is tried.
+
 `python -m scripts.mutants --keep` runs all of them anew and makes this page; `python -m scripts.mutants kst-wire` tries
 one module and prints what lives.
 """
 
 
-def outcome(verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """What is kept of the trial of one module."""
+def outcome(verdicts: Sequence[Verdict], there_are: int) -> dict[str, Any]:
+    """What is kept of the trial of one module, of whose faults `there_are` so many."""
     return {
         "date": datetime.now(UTC).date().isoformat(),
         "python": platform.python_version(),
+        "there are": there_are,
         "faults": len(verdicts),
         "noticed": sum(bool(one.by) for one in verdicts),
         "without end": sum(one.by == "time" for one in verdicts),
@@ -76,7 +80,7 @@ def share(told: dict[str, Any]) -> str:
 def page(subjects: dict[str, Subject], known: dict[str, Any]) -> str:
     """The whole page."""
     both = [(subject, known[name]) for name, subject in subjects.items() if name in known]
-    columns = ("module", "files", "faults", "noticed", "share", "survive", "date", "Python")
+    columns = ("module", "files", "faults", "tried", "noticed", "share", "survive", "date", "Python")
     lines = [HEAD, *listed(columns, (_row(*one) for one in both))]
     for one in both:
         lines += _section(*one)

@@ -7,12 +7,13 @@ import random
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from scripts.mutants.changes import Mutant, mutants
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DATA = ROOT / "scripts" / "mutants.toml"
+T = TypeVar("T")
 
 
 class Subject(NamedTuple):
@@ -56,14 +57,15 @@ class Verdict(NamedTuple):
 class Wish(NamedTuple):
     """How much is tried and how: a part of it by chance (0 to 1), names with a text in them, all imported anew.
 
-    `functions` leaves out what a module does while it is imported, which takes by far the longest.
+    `tables` is the share (0 to 1) that is tried, by chance, of what a module does while it is imported: its tables,
+    constants and defaults, each of which takes a process that imports everything anew.
     `known` are tests that have noticed faults in an earlier run, by the faults; these are not tried again.
     """
 
     sample: float = 1.0
     only: str = ""
     anew: bool = False
-    functions: bool = False
+    tables: float = 1.0
     at_once: int = 2
     known: Mapping[str, str] = {}
     tell: Callable[[str], None] = lambda _: None
@@ -100,5 +102,11 @@ def faults(subject: Subject, wish: Wish) -> list[Fault]:
     for file in subject.files:
         tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
         found += [Fault(file, tree, one) for one in mutants(tree)]
-    found = [one for one in found if wish.only in one.name and (one.mutant.swapped or not wish.functions)]
-    return random.Random(1).sample(found, round(len(found) * wish.sample)) if wish.sample < 1 else found
+    found = [one for one in found if wish.only in one.name]
+    at_import = [one.name for one in found if not one.mutant.swapped]
+    tables = set(_sample(at_import, wish.tables))
+    return _sample([one for one in found if one.mutant.swapped or one.name in tables], wish.sample)
+
+
+def _sample(of: list[T], share: float) -> list[T]:
+    return random.Random(1).sample(of, round(len(of) * share)) if share < 1 else of

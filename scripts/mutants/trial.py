@@ -36,7 +36,9 @@ def _anew(
 ) -> list[Verdict]:
     """Those that nobody has noticed yet, each with its module imported anew."""
     order = Order(subject, seen)
-    order.kills.update(one.by for one in noticed)
+    file_of = {one.name: one.file for one in told}
+    for one in noticed:
+        order.noticed(file_of[one.fault], one.by)
     done = {one.fault for one in noticed}
     left = [one for one in told if one.name not in done]
     found = [Verdict(one.name, "") for one in left if not order.of(one)]
@@ -49,7 +51,7 @@ def _anew(
     tried: list[Verdict] = []
     for fault, by in each(todo, work, order.limit + 3, wish.at_once):
         tried.append(Verdict(fault.name, "time" if by is None else by))
-        order.kills[tried[-1].by] += 1
+        order.noticed(fault.file, tried[-1].by)
         wish.tell(progress(tried, len(todo)))
     return found + tried
 

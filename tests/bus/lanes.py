@@ -224,6 +224,7 @@ class CanScript:
         out = []
         while (data := self.turns.send(self.now)) is not None:
             assert isinstance(data, CanFrame)
+            self.turns.left(self.now)
             out.append(data.id - 0x600)
         return out
 

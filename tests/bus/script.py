@@ -66,7 +66,9 @@ class Script:
         return flight
 
     def send(self) -> Data | Retune | None:
-        return self.turns.send(self.now)
+        out = self.turns.send(self.now)
+        self.turns.left(self.now)
+        return out
 
     def sent(self) -> bytes:
         """What goes out now; fails when nothing does."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 import pytest
 
 from motorbus.bus.pace import EARLY, SHOWN, Pace, least_time
-from motorbus.core.operation import ANY, CanFrame, Due, Exchange
-from motorbus.families.feetech import FAMILY
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import ANY, Answer, CanFrame, Due, Exchange
+from motorbus.families.feetech import FAMILY, sync_read
+from motorbus.link.memory import MemoryLink
+from motorbus.motion.safety import Gate
 from tests.bus.script import position
 
 LEAST = 0.0005
@@ -68,3 +71,25 @@ def test_the_least_time_of_frames_counts_no_stuffed_bit_of_the_answer() -> None:
 def test_the_least_time_of_bytes_is_their_air_time() -> None:
     for exchange in (position(1), Exchange(b"ask", ANY)):
         assert least_time(exchange, FAMILY, 9600) == FAMILY.air_time(exchange, 9600)
+
+
+def test_whom_nobody_waits_for_makes_no_answer_early() -> None:
+    """Of a group read in which one servo is away the others are all there sooner."""
+    three: Exchange[Answer] = Exchange(b"ask", tuple(Due(node, node, 13) for node in (1, 2, 3)))
+    two: Exchange[Answer] = Exchange(b"ask", tuple(Due(node, node, 13) for node in (1, 3)))
+    assert least_time(three, FAMILY, 9600, without=(2,)) == least_time(two, FAMILY, 9600)
+    assert least_time(three, FAMILY, 9600) > least_time(two, FAMILY, 9600)
+
+
+def test_a_group_with_a_servo_that_is_away_is_read_at_once_on_a_line_that_takes_bit_time() -> None:
+    simulator = FAMILY.simulator((1, 2, 3))
+    with Bus(MemoryLink(simulator, pace=True), FAMILY, admit=Gate()) as bus:
+        bus.run(sync_read(["present_position"], (1, 2, 3)))
+        simulator.nodes[3].unplug()
+        bus.run(sync_read(["present_position"], (1, 2, 3)))
+        again = [bus.statistics.of(node).retries for node in (1, 2)]
+        for _ in range(5):
+            found = bus.run(sync_read(["present_position"], (1, 2, 3)))
+            assert (set(found.values), set(found.errors)) == ({1, 2}, {3})
+        assert [bus.statistics.of(node).retries for node in (1, 2)] == again
+        assert bus.statistics.of(1).errors["early"] == 0

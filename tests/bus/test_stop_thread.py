@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from threading import Thread
 
 import pytest
 
 import motorbus
-from motorbus.errors import LinkError
-from motorbus.families.feetech import Servo
+from motorbus.bus.pump import Bus
+from motorbus.bus.stop import request_estop
+from motorbus.errors import LinkError, PortNotFound
+from motorbus.families.feetech import FAMILY, Servo
+from motorbus.link.memory import MemoryLink
+from tests.bus.responder import Responder, position
+from tests.bus.script import admit_all
 
 
 def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,3 +37,28 @@ def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch
         Servo(bus, 1).enable_torque()
         assert bus.estop().acknowledged == (1, 2)
         assert sim[1].memory["torque_enable"] == 0
+
+
+def test_a_port_that_is_called_otherwise_by_now_is_stopped_under_that_name(tmp_path: Path) -> None:
+    old, new = tmp_path / "old.sock", tmp_path / "new.sock"
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, admit=admit_all, stop_socket=old)
+    bus.run(position(1))
+    bus.stopper.move(new)
+    assert request_estop(new).acknowledged == (1,)
+    with pytest.raises(PortNotFound):
+        request_estop(old)
+    bus.stopper.move(None)  # something else is called so
+    new.touch()
+    with pytest.raises(PortNotFound):
+        request_estop(new)
+    bus.stopper.move(old)
+    assert request_estop(old).acknowledged == (1,)
+    bus.close()
+    assert list(tmp_path.iterdir()) == [new], "what is somebody else's is left there"
+
+
+def test_a_bus_that_no_other_program_reaches_has_nothing_to_move() -> None:
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, admit=admit_all)
+    bus.stopper.move(Path("/nowhere"))
+    assert bus.stopper.socket_path is None
+    bus.close()

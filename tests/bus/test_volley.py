@@ -162,5 +162,8 @@ def test_a_link_that_is_lost_in_the_write_is_told() -> None:
         raise LinkLost("gone")
 
     bus.link.write = lost  # type: ignore[method-assign, assignment]
-    with pytest.raises(MotorbusError, match="gone"):
-        volley(bus, (order(), positions(1, 2)))
+    with bus:
+        with pytest.raises(MotorbusError, match="gone"):
+            volley(bus, (order(), positions(1, 2)))
+        with pytest.raises(MotorbusError, match="gone"):
+            bus.run(order())

@@ -47,14 +47,17 @@ class Footprint(NamedTuple):
     kib: int
 
 
+def held() -> tuple[int, int]:
+    """Descriptors and threads."""
+    return len(os.listdir("/proc/self/fd")), threading.active_count()
+
+
 def footprint() -> Footprint:
     """What this process holds now, when all is given back that can be."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     kib = pages * os.sysconf("SC_PAGE_SIZE") // 1024
-    return Footprint(
-        len(os.listdir("/proc/self/fd")), threading.active_count(), sys.getallocatedblocks(), kib
-    )
+    return Footprint(*held(), sys.getallocatedblocks(), kib)
 
 
 class Saving(Wire):

@@ -83,8 +83,12 @@ class Line(FaultyLine):
 class Rig:
     """A bus of one family under fire. `verbs` are what is called, `faults` what strikes, each by its name.
 
-    A fault is a text of a script without its exchange, where `{byte}`, `{bits}`, `{late}` and `{node}` are by lot.
+    A fault is a text of a script without its exchange, where `{byte}`, `{bits}`, `{late}` and `{node}` are by lot; what
+    stands behind a semicolon happens in the exchange after it. `just` is how late a reply comes when it comes at about
+    the moment at which it is given up (s).
     """
+
+    just: ClassVar[tuple[float, float]]
 
     faults: ClassVar[Mapping[str, str]]
     costs: ClassVar[Mapping[str, int]]
@@ -149,12 +153,14 @@ class Rig:
             "byte": random.randrange(11),
             "bits": f"{random.randrange(1, 256):02X}",
             "late": f"{10 ** random.uniform(-4, -0.2):.6f}",
+            "just": f"{random.uniform(*self.just):.6f}",
             "near": f"{10 ** random.uniform(-4, -1.6):.6f}",
             "node": random.choice([*self.history.nodes]),
         }
-        where, _, what = self.faults[name].partition(":")
         exchange = self.line.exchange + random.randrange(1, 4)
-        self.line.add(f"exchange {exchange} {where.format(**place)}:{what.format(**place)}")
+        for one in self.faults[name].format(**place).split(";"):
+            self.line.add(f"exchange {exchange} {one}")
+            exchange += 1
         if "copied" in name:
             self.quarantine = 3
 

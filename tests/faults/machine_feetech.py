@@ -25,6 +25,9 @@ COSTS: Final = {"write a setting": 40, "read": 5, "sync read": 9, "at once": 9}
 FAULTS: Final = {
     "reply lost": ": drop",
     "reply late": ": delay {late}",
+    "reply just late": ": delay {just}",
+    "late, and the next unheard": ": delay {just};to device: drop",
+    "late, and the next but one unheard": ": delay {just};: delay 0.0001;to device: drop",
     "reply copied": ": duplicate",
     "reply held back": ": reorder {near}",
     "reply merged": ": merge",
@@ -53,6 +56,7 @@ class FeetechRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    just = (0.0214, 0.0219)
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator(IDS), 1_000_000, pace=True)

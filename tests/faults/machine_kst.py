@@ -29,6 +29,9 @@ FAULTS: Final = {
     "reply stalled": ": stall {late}",
     "reply held back": ": reorder {near}",
     "reply merged": ": merge",
+    "reply just late": ": delay {just}",
+    "late, and the next unheard": ": delay {just};to device: drop",
+    "late, and the next but one unheard": ": delay {just};: delay 0.0001;to device: drop",
     "reply copied": ": duplicate",
     "request lost": "to device: drop",
     "request broken": "to device: corrupt",
@@ -45,6 +48,7 @@ class KstRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    just = (0.0498, 0.0507)
 
     def __init__(self) -> None:
         family = FAMILY.configured(profile=PROFILE)

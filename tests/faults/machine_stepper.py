@@ -24,6 +24,9 @@ FAULTS: Final = {
     "reply lost": ": drop",
     "reply late": ": delay {late}",
     "reply stalled": ": stall {late}",
+    "reply just late": ": delay {just}",
+    "late, and the next unheard": ": delay {just};to device: drop",
+    "late, and the next but one unheard": ": delay {just};: delay 0.0001;to device: drop",
     "reply copied": ": duplicate",
     "reply held back": ": reorder {near}",
     "reply merged": ": merge",
@@ -51,6 +54,7 @@ class StepperRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    just = (0.19, 0.25)
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator((1,)), 9600, pace=True)

@@ -81,6 +81,7 @@ class Scene:
         self.link = link(self.simulator, rate=found.link.rate, line=line or self.wire, **more)
         self.events: list[object] = []
         self.bus: Any = face(self.link, self.family, admit=Gate(), report=self.events.append)
+        self.run: Callable[[Any], Any] = self.bus.run  # on an event loop whoever has one sets another
         self.devices: list[Any] = [self.family.devices.blocking(self.bus, node) for node in self.ids]
         self.count = 0
 
@@ -157,8 +158,8 @@ def positions(there: Scene) -> Runnable[Any]:
 
 def torque(there: Scene) -> None:
     """Everyone holds."""
-    for device in there.devices:
-        device.enable_torque()
+    for device in range(len(there.devices)):
+        there.run(there.said("enable_torque", device=device))
 
 
 def at(place: float) -> Callable[[Scene, Any], bool]:
@@ -180,12 +181,12 @@ def stands(there: Scene, _: Any) -> bool:
 def off(there: Scene) -> None:
     """A long movement that is not waited for."""
     if there.name == "feetech":
-        there.devices[0].enable_torque()
-        there.devices[0].move(6.0, velocity=0.5, wait=False)
+        there.run(there.said("enable_torque"))
+        there.run(there.said("move", 6.0, velocity=0.5, wait=False))
     elif there.name == "kst":
-        there.devices[0].move(1.5, wait=False)
+        there.run(there.said("move", 1.5, wait=False))
     else:
-        there.devices[0].start_project(1)
+        there.run(there.said("start_project", 1))
 
 
 KINDS: dict[str, Kind] = {

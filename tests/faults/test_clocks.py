@@ -168,6 +168,21 @@ def test_l15_a_reply_that_came_before_the_night_is_not_called_late(family: str) 
     assert there.bus.statistics.of(there.ids[0]).retries == 0
 
 
+@pytest.mark.parametrize("family", ["feetech", "kst"])
+def test_l15_what_was_heard_before_the_night_is_as_old_as_it_is(family: str) -> None:
+    """So nobody holds a motor, or lets one move, by where it was hours ago."""
+    there = Scene(family, link=Freezing)
+    link = there.link
+    assert isinstance(link, Freezing)
+    there.bus.run(there.asked())
+    link.freeze_at = link.looks + 2
+    there.bus.run(there.asked())
+    assert link.frozen
+    assert link.now() >= NIGHT
+    assert there.devices[0].at < 1.0
+    assert there.bus.turns.known.fresh(link.now())[there.ids[0]] is None
+
+
 def test_l15_after_a_night_the_lease_is_lost_and_what_moved_is_stopped_and_stays_so() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
         device = robot["a1"].device

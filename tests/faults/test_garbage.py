@@ -1,4 +1,4 @@
-"""Row L9: something that never stops talking, at line rate, on the line of each family. No call hangs, nothing piles up.
+"""Row L9: something that never stops talking, at line rate, on each family's line. No call hangs, nothing piles up.
 
 In the soak it is ten minutes of each kind of garbage. What processor time a minute of it takes is told and not judged.
 """
@@ -125,7 +125,7 @@ CONTROLLER: dict[str, Callable[[Random], list[Data]]] = {
 
 
 def servos() -> tuple[Any, Callable[[], object], Callable[[], int]]:
-    rig = Rig(ids=(1,))
+    rig = Rig(ids=(1,), options={"pace": True})
     return rig, lambda: read_word(rig), lambda: _receiver(rig).held
 
 
@@ -144,11 +144,12 @@ def text() -> tuple[Any, Callable[[], object], Callable[[], int]]:
 def controller() -> tuple[Any, Callable[[], object], Callable[[], int]]:
     rig = StepperRig(PerfectLine(), 1)
     rig.open()
-    return rig, lambda: rig.output() or _raise(rig.errors[-1]), lambda: _receiver(rig).held
 
+    def output() -> None:
+        if not rig.output():
+            raise rig.errors[-1]
 
-def _raise(error: MotorbusError) -> None:
-    raise error
+    return rig, output, lambda: _receiver(rig).held
 
 
 def _receiver(rig: Any) -> Any:
@@ -183,7 +184,7 @@ def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Roun
     link.simulator = babble = Babble(link.simulator, kinds[kind])
     babble.next = link.now()
     rig.bus.turns.receiver = watched = Watched(rig.bus.turns.receiver, held)
-    seconds = rounds(MINUTES * 60, 3)
+    seconds = rounds(MINUTES * 60, 1)
     end, took, calls, good = link.now() + seconds, 0.0, 0, 0
     before = time.process_time()
     while link.now() < end:
@@ -191,6 +192,7 @@ def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Roun
         good += succeeds(act)
         took = max(took, link.now() - began)
         calls += 1
+        link.advance(0.001)  # some lines take no time for what they carry
     used = time.process_time() - before
     assert babble.pieces >= 0.99 * seconds / EVERY
     assert watched.most <= MOST

@@ -170,5 +170,5 @@ def test_l17_a_run_that_is_cut_before_its_start_is_not_said_to_go_on() -> None:
         started = any(bytes(data[:3]) == b"\xff\xaa\x4e" for data in there.wire.sent)
         if "goes on" in told(came.error):
             said[started] += 1
-    assert said[True] > 20
+    assert said[True] >= 10
     assert said[False] <= 3, "but for the few lines between the last judgement of it and its leaving"

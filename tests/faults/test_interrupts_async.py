@@ -19,23 +19,17 @@ from tests.faults.cutting import NEVER, Outcome, afterwards, cut, places
 from tests.faults.scenes import KINDS, Scene
 from tests.faults.test_interrupts import ERRORS, VISITS
 
-ASYNC = [kind for kind, how in KINDS.items() if how.prepare in (Scene.stir, KINDS["kst read"].prepare)]
-"""All but those that are prepared by verbs of a blocking bus."""
-
 
 @contextmanager
 def looped(kind: str) -> Iterator[tuple[Scene, asyncio.AbstractEventLoop]]:
     """A scene of this kind on an async bus, and the loop it lives on."""
     loop = asyncio.new_event_loop()
     try:
-        yield Scene(KINDS[kind].family, face=AsyncBus), loop
+        there = Scene(KINDS[kind].family, face=AsyncBus)
+        there.run = lambda operation: loop.run_until_complete(there.bus.run(operation))
+        yield there, loop
     finally:
         loop.close()
-
-
-def waited(there: Scene, loop: asyncio.AbstractEventLoop, operation: Any) -> Any:
-    """Run it in a task of its own until that ends."""
-    return loop.run_until_complete(there.bus.run(operation))
 
 
 def cut_in_loop(
@@ -55,7 +49,7 @@ def cut_in_loop(
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("kind", ASYNC)
+@pytest.mark.parametrize("kind", KINDS)
 def test_l17_an_interrupt_at_any_line_of_a_task(kind: str, rounds: Rounds, figures: Figures) -> None:
     cuts = 0
     for error in ERRORS:
@@ -76,12 +70,12 @@ def faults_of_task(kind: str, at: int, error: type[BaseException]) -> list[str]:
         came = cut_in_loop(there, loop, kind, at, error)
         wrong = [] if came.where is not None else ["it was not cut"]
         wrong += [] if isinstance(came.error, error) else [f"it ended with {came.error!r}, {came.value!r}"]
-        wrong += afterwards(there, lambda operation: waited(there, loop, operation))
+        wrong += afterwards(there, there.run)
         return [f"{one}, cut at {came.where}" for one in wrong]
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("kind", ASYNC)
+@pytest.mark.parametrize("kind", KINDS)
 def test_l17_a_task_that_is_cancelled_at_any_await(kind: str, rounds: Rounds, figures: Figures) -> None:
     awaits, cancelled = 0, True
     step = 1 if rounds(7, 1) == 7 else 7  # every one in the long runs
@@ -96,7 +90,7 @@ def test_l17_a_task_that_is_cancelled_at_any_await(kind: str, rounds: Rounds, fi
             assert cancelled or not told(kind) or KINDS[kind].done(there, ended), (
                 "never a value that is wrong"
             )
-            wrong = afterwards(there, lambda operation: waited(there, loop, operation))
+            wrong = afterwards(there, there.run)
             assert wrong == [], awaits
             assert awaits < 10_000, "it has no end"
     figures(f"L17 cancelled: {kind}", family=KINDS[kind].family, awaits=awaits, cuts=count, stuck=0, wrong=0)

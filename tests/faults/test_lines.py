@@ -12,6 +12,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError, NoReply
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
+from tests.conftest import Rounds
 from tests.faults.rig import KINDS, Rig, ping, read_word, sync_read, write_byte
 
 
@@ -26,7 +27,7 @@ def try_(exchange: Callable[[Rig], None], rig: Rig) -> bool:
 
 @pytest.mark.timeout(600)
 def test_l7_replies_that_are_overtaken_within_the_quiet_time_are_not_stale_either(
-    rounds: Callable[[int], int],
+    rounds: Rounds,
 ) -> None:
     total = rounds(100_000, 3_000)
     rig = Rig(NoisyLine(8, late=0.01, late_by=(0.001, 0.04), overtake=True))
@@ -36,7 +37,7 @@ def test_l7_replies_that_are_overtaken_within_the_quiet_time_are_not_stale_eithe
     assert good > 0.99 * total
 
 
-def test_l7_replies_overtaken_by_more_than_that_are_the_known_limit(rounds: Callable[[int], int]) -> None:
+def test_l7_replies_overtaken_by_more_than_that_are_the_known_limit(rounds: Rounds) -> None:
     """Nothing in a FEETECH reply tells it from an older one of its kind: see docs/explanation/taint.md.
 
     The probe is a barrier only where nothing is overtaken. This measures what is left where that does not hold.
@@ -90,7 +91,7 @@ class Doubled:
         return out
 
 
-def test_a_reply_that_comes_twice_is_believed_once(rounds: Callable[[int], int]) -> None:
+def test_a_reply_that_comes_twice_is_believed_once(rounds: Rounds) -> None:
     """The copy reaches a host that already waits for the next answer, which looks just like it but for its length."""
     total = rounds(100_000, 3_000)
     line = Doubled(5, 0.001)

@@ -14,6 +14,7 @@ from tests.interop.differential.notes import GROUP, NOTES, READ, REQUEST_NOTES, 
 from tests.interop.differential.outside import CANOPEN, FEETECH, NEW, OLD, RUST, Decoder
 
 SEED = 20
+EXPLAINED = NOTES.keys() | SDO_NOTES.keys()
 BY = {OLD: "old", NEW: "new", RUST: "rust", CANOPEN: "canopen"}
 
 
@@ -57,8 +58,11 @@ def told(figures: Figures, decoder: Decoder, found: table.Found) -> None:
         family="kst" if decoder is CANOPEN else "feetech",
         seed=SEED,
         streams=found.cases,
-        **{name.replace("-", " "): count for name, count in sorted(found.counts.items())},
+        differences=sum(found.counts.values()),
         unexplained=found.counts[judging.UNEXPLAINED],
+        **{
+            name.replace("-", " "): count for name, count in sorted(found.counts.items()) if name in EXPLAINED
+        },
     )
 
 

@@ -34,7 +34,7 @@ class Hall:
         simulator: Any = families.load(family).simulator((1,), "", **options)
         self.slept = 0.0  # s that a test has added to the clock
         self.world = World(simulator, now=self.clock())
-        rate = families.load(family).link.rate if family == "kst" else None
+        rate = None if isinstance(place, TcpListener) else families.load(family).link.rate
         self.mount = Mount(self.world, place, rate=rate, clock=self.clock)
         self.faulted = Faulted(self.mount, self.world)
 

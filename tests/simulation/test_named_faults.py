@@ -36,10 +36,19 @@ def test_a_script_at_any_time_and_what_happened() -> None:
         assert sim.line is sim.faults
 
 
-def test_the_same_script_does_the_same_again() -> None:
+@pytest.mark.parametrize(
+    "script",
+    [
+        "seed 8; 2% of bytes: corrupt; 5%: delay 0.01-0.3; 3% to device: drop; 2%: duplicate",
+        "seed 9; 6%: brown-out 0.05; 6%: power-cycle all; at 0.2 s: clock-step 60; 3%: merge; exchange 40: unplug 0.2",
+        "seed 3; exchange 2: torn-eeprom 1; 2% of bytes: power-cycle 2; 3%: reorder 0.01-0.2; 5%: echo; 4%: stall 0.1",
+    ],
+)
+def test_the_same_script_does_the_same_again(script: str) -> None:
     def run(script: str) -> tuple[list[str], str]:
         said = []
-        with motorbus.simulate("feetech", ids="1-3", faults=script) as sim, motorbus.open(sim.url) as bus:
+        there = motorbus.simulate("feetech", ids="1-3", faults=script, name="again")
+        with there as sim, motorbus.open(sim.url) as bus:
             servos = [motorbus.feetech.Servo(bus, id) for id in (1, 2, 3)]
             for servo in servos * 15:
                 try:
@@ -48,7 +57,7 @@ def test_the_same_script_does_the_same_again() -> None:
                     said.append(f"{error.summary} {bus.link.now():.9f}")
             return said, str(sim.faults.record)
 
-    said, record = run("seed 8; 2% of bytes: corrupt; 5%: delay 0.01-0.3; 3% to device: drop; 2%: duplicate")
+    said, record = run(script)
     assert len(record.splitlines()) > 5
     assert run(record) == (said, record)
 

@@ -135,13 +135,15 @@ def test_a_bus_of_the_system_is_not_locked_by_its_devices(
         def __init__(self, name: str) -> None:
             self.name = name
 
-        def acquire(self) -> None:
+        def acquire(self) -> Lock:
             taken.append(self.name)
+            return self
 
         def release(self) -> None:
             pass
 
-    monkeypatch.setattr("motorbus.link.can.PortLock", Lock)
+    for module in ("can", "lock"):
+        monkeypatch.setattr(f"motorbus.link.{module}.PortLock", Lock)
     with pytest.raises(MotorbusError):  # there is no such interface
         CanLink("can://socketcan/nocan7", rate=500_000, shared=shared)
     assert bool(taken) is locked

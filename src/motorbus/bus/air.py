@@ -13,7 +13,7 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
-from motorbus.bus.pace import Pace, least_time
+from motorbus.bus.pace import Pace, byte_time, least_time
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket
 from motorbus.bus.trace import Feed, TraceRecord
@@ -62,6 +62,7 @@ class Air:
         self.known = Known(family, rate)
         self.settled = 0
         self._flying: dict[int, Flight] = {}
+        self._leaving: list[Flight] = []  # handed out and not known to be written, of those that nobody answers
         self._free_at = 0.0
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
@@ -111,8 +112,14 @@ class Air:
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", exchange.request))
         if not awaited:
-            self._settle(flight, flight.answer(now))
+            self._leaving.append(flight)
         return exchange.request
+
+    def left(self, now: float) -> None:
+        """What was handed out last has been written: only now does what nobody answers count as sent."""
+        leaving, self._leaving = self._leaving, []
+        for flight in leaving:
+            self._settle(flight, flight.answer(now))
 
     def _share_wire(self, flight: Flight, air: float) -> None:
         """Lanes share one wire: whichever goes first, each may have to wait for all the others, once."""
@@ -170,14 +177,9 @@ class Air:
                 continue
             if (echo := self.echo.may_be(last.data)) or size < len(last.data):
                 flight.settling = True
-                pause = (ECHO_SETTLE if echo else SETTLE) * self._byte_time(flight) + echo * self.latency
+                byte = byte_time(flight.exchange, self.family, self.rate)
+                pause = (ECHO_SETTLE if echo else SETTLE) * byte + echo * self.latency
                 flight.deadline = min(flight.deadline, now + pause)
-
-    def _byte_time(self, flight: Flight) -> float:
-        exchange = flight.exchange
-        dues = () if exchange.replies is ANY else exchange.replies
-        size = len(exchange.request) + sum(due.length for due in dues)
-        return self.family.air_time(exchange, self.rate) / size
 
     def _take(self, event: Reply | Notice | Noise, now: float) -> None:
         if isinstance(event, Reply):
@@ -335,7 +337,7 @@ class Air:
             self._lost_try(lane, flight, now)
 
     def _accepted(self, lane: int, flight: Flight, now: float) -> None:
-        answer = flight.answer(now)
+        answer = flight.answer(min(now, flight.deadline))  # a host that was held up takes it in later than it came
         exchange = flight.exchange
         if flight.parent is not None and not (exchange.read is not None and exchange.read(answer)):
             flight.spoiled = "unexpected"

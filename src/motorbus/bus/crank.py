@@ -91,6 +91,7 @@ def flush(link: Link, turns: Turns) -> float:
             retune(link, turns, out)
         else:
             link.write(out)
+            turns.left(now)
     return now
 
 
@@ -130,6 +131,7 @@ def launch(link: Link, turns: Turns, *flights: Flight) -> bool:
                     requests.append(request)
                 if requests:
                     link.write(requests[0] if len(requests) == 1 else b"".join(requests))
+                    turns.left(now)
                     return len(requests) == len(flights)
             turns.submit(flights[0], now)
     except LinkError as error:

@@ -73,3 +73,10 @@ def least_time(exchange: Exchange[Any], family: Family, rate: int, without: Coll
     if not isinstance(request, CanFrame) or dues is ANY:
         return family.air_time(exchange, rate)
     return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / rate
+
+
+def byte_time(exchange: Exchange[Any], family: Family, rate: int) -> float:
+    """s that one byte of this exchange takes, on average."""
+    dues = () if exchange.replies is ANY else exchange.replies
+    size = len(exchange.request) + sum(due.length for due in dues)
+    return family.air_time(exchange, rate) / size

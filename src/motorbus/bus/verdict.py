@@ -143,7 +143,8 @@ def ungated(exchange: Exchange[Any]) -> RequestError:
 def sought(error: LinkLost) -> LinkLost:
     """The same error, of a link that is looked for again; one that says so itself is left as it is."""
     if SOUGHT not in error.advice:
-        error.advice = f"see to the other end; {SOUGHT}"
+        advice = error.advice.removesuffix(", then open the bus anew") or "see to the other end"
+        error.advice = f"{advice}; {SOUGHT}"
     return error
 
 

@@ -32,19 +32,25 @@ PLACES = (
 
 def script_of(said: str) -> Script:
     """What the flag says: a script, or the name of a file that is there; "" is none. RequestError for neither."""
-    path = Path(said)
     if not said:
         return Script()
-    if "\n" not in said and ":" not in said:
-        if not path.is_file():
-            raise RequestError(
-                f"--faults {said}: neither a file nor a script",
-                expected='a file, or a script as "exchange 17 byte 3: drop"',
-                advice="`--faults help` lists what can be said",
-            )
-        with usable(path, "read"):
-            said = path.read_bytes().decode(errors="replace")
+    if _is_file(said):
+        with usable(Path(said), "read"):
+            said = Path(said).read_bytes().decode(errors="replace")
+    elif ":" not in said:
+        raise RequestError(
+            f"--faults {said}: neither a file nor a script",
+            expected='a file, or a script as "exchange 17 byte 3: drop"',
+            advice="`--faults help` lists what can be said",
+        )
     return parse(said)
+
+
+def _is_file(said: str) -> bool:
+    try:
+        return Path(said).is_file()
+    except (OSError, ValueError):  # longer than any name, or with what no name can have
+        return False
 
 
 def listed(output: Output) -> Exit:

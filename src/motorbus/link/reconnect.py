@@ -65,7 +65,7 @@ class Reconnecting:
         self._mended = 0  # this loss, and all before, are over
         self._wait = 0.0
         self._next = 0.0
-        self._why = ""
+        self._error: BaseException | None = None
         self._lock: PortLock = link.lock
         link.lock = self._lock.lent()
         self._take(link)
@@ -143,7 +143,7 @@ class Reconnecting:
             except (MotorbusError, OSError) as error:
                 self._look_later(error)
                 raise self._gone() from error
-            self._mended, self._wait, self._next = losses, 0.0, 0.0
+            self._mended, self._wait, self._next = losses, 0.0, time.monotonic() + FIRST
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
@@ -159,7 +159,7 @@ class Reconnecting:
     def _put(self, link: Any) -> None:
         """It is there. Its lock is kept from now on; the one of the name before is given back."""
         link.name = self.name
-        before, own = self._lock, link.lock
+        before, own, self._error = self._lock, link.lock, None
         if own.held:
             self._lock, link.lock = own, own.lent()
             before.release()
@@ -170,7 +170,6 @@ class Reconnecting:
     def _look_later(self, error: BaseException) -> None:
         self._wait = min(2 * self._wait or FIRST, LONGEST)
         self._next = time.monotonic() + self._wait
-        self._why = error.summary if isinstance(error, MotorbusError) else str(error)
         self._error = error
         if (
             isinstance(error, LinkLost) and self._lock.held
@@ -179,7 +178,7 @@ class Reconnecting:
             self.moved("")
 
     def _gone(self) -> LinkLost:
-        error = self.__dict__.get("_error")
+        error = self._error
         if isinstance(error, LinkLost):
             return LinkLost(
                 error.summary,
@@ -187,7 +186,9 @@ class Reconnecting:
                 cause=error.cause,
                 advice=f"{error.advice}; {AGAIN}",
             )
-        found = lost(self.name, self._why or "it went away")
+        found = lost(
+            self.name, error.summary if isinstance(error, MotorbusError) else error or "it went away"
+        )
         found.advice = f"see to the other end; {AGAIN}"
         return found
 

@@ -185,6 +185,8 @@ class Mount:
         self._back_at = None
         for place in self._ports:
             place.plug()
+            if isinstance(place, SerialClient) and self._usual is not None:
+                _preset(place.fileno(), self._usual)
         self.course.tune(self._others_rate())
 
     def _sweep(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.core.operation import ANY, Effect, Timeout
-from motorbus.errors import DeviceError, VerificationFailed
+from motorbus.errors import DeviceError, OutcomeUnknown, VerificationFailed
 from motorbus.families.kst import FAMILY, driver
 from motorbus.families.kst.driver.keeping import keep, save_exchange
 from tests.families.kst.bench import abort, bench, node, play
@@ -59,6 +59,16 @@ def test_a_write_that_fails_is_tried_three_times() -> None:
     with pytest.raises(VerificationFailed, match="reads back -1000, not -500") as raised:
         play(keep(one, [(row, -500)]), *[(LIMIT, ack), (READ, OTHER)] * 3)
     assert raised.value.received == bytes.fromhex("18fc")
+
+
+def test_a_write_that_left_and_cannot_be_read_back_is_of_unknown_outcome() -> None:
+    one = node("kst-ext")
+    with pytest.raises(OutcomeUnknown, match="whether the write of negative_limit took effect is not known"):
+        play(
+            keep(one, [(one.table["negative_limit"], -500)]),
+            (LIMIT, "600a300000000000"),
+            (READ, None),
+        )
 
 
 def test_what_the_save_undid_is_told() -> None:

@@ -57,6 +57,8 @@ def _taken(case: SdoCase, frames: list[Frame], others: str) -> str:
         return "acknowledgement-of-another" if other else UNEXPLAINED
     first = wire.decode_reply(data)
     segments = [wire.decode_reply(one) for _, one in frames[1:]]
+    ends = [place for place, one in enumerate(segments) if one is not None and one.last]
+    segments = segments[: ends[0] + 1] if ends else segments
     sizes = [len(one.data) for one in segments if one is not None]
     if first is None or first.kind != "upload-start":
         return UNEXPLAINED

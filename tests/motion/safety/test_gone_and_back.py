@@ -42,7 +42,7 @@ def test_where_axes_are_is_asked_anew() -> None:
             assert guard.track.sample is None
         sims["arm"].line = line = Heard()
         robot["a1"].enable_torque()
-        robot["a1"].device.move(3.2, wait=False)
+        robot["a1"].device.move(3.2, velocity=0.5, wait=False)
         assert line.sent[0][4] == 0x02, "a read comes before anything is written"
 
 
@@ -72,18 +72,18 @@ def test_one_that_kept_its_torque_goes_on_when_it_is_told_to_and_not_before() ->
 
 
 def test_a_movement_that_was_cut_off_is_not_taken_up_again() -> None:
-    with machine(arm="1-2", can="0x25", exit="leave") as (made, sims):
-        with Robot.of(made) as robot:
-            link: Any = robot.buses["arm"].link
-            link.unplug(link.now() + 0.6, AWAY)
-            with pytest.raises(LinkLost):
-                robot.move({"a1": 1.0, "c1": 0.6}, duration=2.0)
-            robot.buses["arm"].run(pause(AWAY + 0.5))
-            here = robot["a1"].position()
-            assert abs(here - 1.0) > 0.1, "it was cut off"
-            robot.buses["arm"].run(pause(1.0))
-            assert robot["a1"].position() == pytest.approx(here, abs=0.01)
-            assert sims["can"][0x25].status()["moving"] in (0, False)
+    with machine(arm="1-2", can="0x25", exit="leave") as (made, sims), Robot.of(made) as robot:
+        link: Any = robot.buses["arm"].link
+        link.unplug(link.now() + 0.6, AWAY)
+        with pytest.raises(LinkLost):
+            robot.move({"a1": 1.0, "c1": 0.6}, duration=2.0)
+        robot.buses["arm"].run(pause(AWAY + 0.5))
+        here = robot["a1"].position()
+        assert abs(here - 1.0) > 0.1, "it was cut off"
+        robot.buses["arm"].run(pause(1.0))
+        assert robot["a1"].position() == pytest.approx(here, abs=0.01)
+        robot.buses["can"].run(pause(1.0))
+        assert sims["can"][0x25].status()["moving"] in (0, False)
 
 
 def test_where_a_stepper_stands_is_not_known_any_more() -> None:

@@ -146,6 +146,17 @@ def test_a_torn_eeprom_is_what_the_switch_says() -> None:
         assert world.simulator.servos[0].lives > 1
 
 
+def test_what_lies_in_wait_cuts_nothing_that_is_under_way() -> None:
+    link, _, line, _ = host("exchange 1 byte 3 to host: torn-eeprom 1; exchange 2: torn-eeprom 1")
+    for _ in range(2):
+        sent = link.now()
+        link.write(PING)
+        assert link.read(1.0) == [PONG]
+        assert link.now() - sent < 1e-6
+    assert line.fired == []
+    assert len(line.pending) == 2
+
+
 def test_a_torn_save_of_other_families() -> None:
     link, world, line, _ = host("exchange 1: torn-eeprom 0x25", "kst", (0x25,), flash_cut="new")
     servo = world.nodes[0x25]

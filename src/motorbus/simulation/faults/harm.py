@@ -50,6 +50,9 @@ def harmed(
         run += bytes(rest[start:place]) if not lost else b""
         byte, start = bytes(rest[place : place + 1]), place + 1
         for _, _, fault in group:
+            if fault.word.waits:
+                happen(fault, shift)
+                continue
             if fault.action in ("delay", "stall", "split") or fault.word.world:
                 pieces.append((shift, run))
                 run = b""

@@ -265,7 +265,8 @@ class FaultyLine:
             action = fault.action
             if fault.word.world:
                 self._happen(fault, at)
-                pieces = [(shift + INSTANT, piece) for shift, piece in pieces]
+                pause = 0.0 if fault.word.waits else INSTANT
+                pieces = [(shift + pause, piece) for shift, piece in pieces]
             elif action in ("merge", "reorder") and not fault.seconds:
                 held = way.front if action == "merge" else way.behind
             elif action == "echo":
@@ -324,7 +325,7 @@ class FaultyLine:
             self._world.happen(fault, at, lambda moment: self._note(fault, moment, fault.to, b"", torn=True))
 
     def _note(self, fault: Fault, at: float, to: Side, data: Data, *, torn: bool = False) -> None:
-        if fault.action == "torn-eeprom" and not torn:
+        if fault.word.waits and not torn:
             return  # it has happened when something was stored and torn
         self.count += 1
         self._record.append(fault)

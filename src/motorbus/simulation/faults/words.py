@@ -45,6 +45,11 @@ class Word(NamedTuple):
     world: bool = False
 
     @property
+    def waits(self) -> bool:
+        """It only lies in wait for what a device does later, so nothing that is under way is cut by it."""
+        return self.name == "torn-eeprom"
+
+    @property
     def outward(self) -> bool:
         """Whether it strikes what goes to the device when no side is named."""
         return self.world or self.name == "echo"

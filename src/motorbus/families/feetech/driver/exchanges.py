@@ -83,9 +83,10 @@ def read_block(
         return take(frame[5 : 5 + count])
 
     def exchange(count: int, other: int) -> Exchange[T]:
+        request, dues = _question(node, address, count)
         return Exchange(
-            wire.read(node.node, address, count),
-            (Due(node.node, node.node, wire.OVERHEAD + count),),
+            request,
+            dues,
             read,
             rank=rank,
             timeout=timeout,
@@ -95,6 +96,15 @@ def read_block(
         )
 
     return exchange(count, another(address, count))
+
+
+def _question(node: Node, address: int, count: int) -> tuple[bytes, tuple[Due, ...]]:
+    """The packet that reads this, and the reply that is due; made once for each servo, for they never change."""
+    made = node.questions.get((address, count))
+    if made is None:
+        due = Due(node.node, node.node, wire.OVERHEAD + count)
+        made = node.questions[address, count] = wire.read(node.node, address, count), (due,)
+    return made
 
 
 def told_by(

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
-from motorbus.core.operation import Goal
+from motorbus.core.operation import Due, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import (
@@ -100,7 +100,8 @@ class Node:
     `alarm` holds the names of the alarm bits of the last reply and `at` its arrival on the link's clock (s);
     `pending` the goals that wait in it for an ACTION, None when none from here do. `bound` is the raw bound of the
     current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
-    those (rad) that were given up to make a motor of it, where limits decide about that.
+    those (rad) that were given up to make a motor of it, where limits decide about that. `questions` are packets that
+    were made to read it, with the reply due, by address and count.
     """
 
     def __init__(self, node: int) -> None:
@@ -113,6 +114,7 @@ class Node:
         self.pending: Pending | None = None
         self.bound: int | None = None
         self.former_limits: tuple[float, float] | None = None
+        self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Due, ...]]]] = {}
 
     @property
     def limits(self) -> tuple[float, float] | None:
