@@ -92,7 +92,9 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
     parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
     parser.add_argument("--only", default="", help="a text that the name of a fault must have")
-    parser.add_argument("--tables", type=float, default=1.0, help="share of what happens at import, which is slow")
+    parser.add_argument(
+        "--tables", type=float, default=1.0, help="share of what happens at import, which is slow"
+    )
     parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--json", default="", help="a file for every verdict")

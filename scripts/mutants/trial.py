@@ -34,16 +34,18 @@ def trial(subject: Subject, wish: Wish) -> list[Verdict]:
 def _anew(
     subject: Subject, told: list[Fault], noticed: list[Verdict], seen: Seen, wish: Wish, scratch: str
 ) -> list[Verdict]:
-    """Those that nobody has noticed yet, each with its module imported anew."""
+    """Those that nobody has noticed yet, each with its module imported anew; one with a reason has had its trial."""
     order = Order(subject, seen)
     file_of = {one.name: one.file for one in told}
     for one in noticed:
         order.noticed(file_of[one.fault], one.by)
     done = {one.fault for one in noticed}
     left = [one for one in told if one.name not in done]
-    found = [Verdict(one.name, "") for one in left if not order.of(one)]
-    todo = [one for one in left if order.of(one)]
-    wish.tell(f"{len(todo)} with a new import, {len(found)} that no fast test runs")
+    explained = {one.name for one in left if one.mutant.swapped and one.name in subject.reasons}
+    todo = [one for one in left if order.of(one) and one.name not in explained]
+    due = {one.name for one in todo}
+    found = [Verdict(one.name, "") for one in left if one.name not in due]
+    wish.tell(f"{len(todo)} with a new import, {len(found)} that no fast test runs or that have a reason")
 
     def work(fault: Fault) -> str:
         return Anew(fault, order, scratch).judge()

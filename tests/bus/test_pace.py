@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.bus.pace import EARLY, SHOWN, Pace, least_time
+from motorbus.bus.pace import EARLY, SHOWN, Pace, byte_time, least_time
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import ANY, Answer, CanFrame, Due, Exchange
 from motorbus.families.feetech import FAMILY, sync_read
@@ -93,3 +93,10 @@ def test_a_group_with_a_servo_that_is_away_is_read_at_once_on_a_line_that_takes_
             assert (set(found.values), set(found.errors)) == ({1, 2}, {3})
         assert [bus.statistics.of(node).retries for node in (1, 2)] == again
         assert bus.statistics.of(1).errors["early"] == 0
+
+
+def test_a_byte_takes_its_share_of_the_air_time() -> None:
+    for exchange in (position(1), Exchange(b"ask", ANY)):
+        dues = () if exchange.replies is ANY else exchange.replies
+        size = len(exchange.request) + sum(due.length for due in dues)
+        assert byte_time(exchange, FAMILY, 9600) == FAMILY.air_time(exchange, 9600) / size

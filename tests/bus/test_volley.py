@@ -29,10 +29,9 @@ class Heard(PerfectLine):
         return super().carry(sender, data, at)
 
 
-def real() -> tuple[Bus, Responder, Heard]:
-    """A bus whose link says that its time is real: there a volley leaves in one write."""
+def heard_bus() -> tuple[Bus, Responder, Heard]:
+    """A bus, what answers on it, and what was written."""
     bus, simulator = memory_bus(line := Heard())
-    bus.link.virtual = False  # on this one only
     return bus, simulator, line
 
 
@@ -47,7 +46,7 @@ def joined(*exchanges: Exchange[Any]) -> bytes:
 
 
 def test_goals_and_the_question_behind_them_leave_in_one_write() -> None:
-    bus, simulator, line = real()
+    bus, simulator, line = heard_bus()
     read, other = positions(1, 2), position(3)
     with bus:
         told = volley(bus, (order(5), order(6), read, other))
@@ -60,27 +59,25 @@ def test_goals_and_the_question_behind_them_leave_in_one_write() -> None:
 
 
 def test_it_comes_to_the_same_as_one_after_the_other() -> None:
-    found = []
-    for make in (real, lambda: (*memory_bus(line := Heard()), line)):
-        bus, simulator, _ = make()
+    found, written = [], []
+    for together in (True, False):
+        bus, simulator, line = heard_bus()
         watch = bus.trace.subscribe()
-        with bus:
-            told = volley(bus, (order(), positions(1, 2, 3)))
+        told = volley(bus, (order(), positions(1, 2, 3)), together=together)
         assert isinstance(told[1], Answer)
         said = [(record.direction, record.data) for record in watch]
         counts = {node: (one.sent, one.ok) for node, one in bus.statistics.nodes.items()}
         found.append((told[0], told[1].replies, simulator.heard, said, counts, bus.statistics.other))
+        written.append(line.sent)
     assert found[0] == found[1]
-
-
-def test_where_time_is_virtual_each_packet_keeps_its_own_write() -> None:
-    bus, _ = memory_bus(line := Heard())
-    volley(bus, (order(), positions(1, 2)))
-    assert line.sent == [order().request, positions(1, 2).request]
+    assert written == [
+        [joined(order(), positions(1, 2, 3))],
+        [order().request, positions(1, 2, 3).request],
+    ]
 
 
 def test_who_is_doubtful_is_probed_between_the_order_and_the_question() -> None:
-    bus, simulator, line = real()
+    bus, simulator, line = heard_bus()
     simulator.dead.add(1)
     with bus:
         with pytest.raises(NoReply):
@@ -94,7 +91,7 @@ def test_who_is_doubtful_is_probed_between_the_order_and_the_question() -> None:
 
 
 def test_what_is_forgiven_takes_the_place_of_its_value_and_the_rest_goes_on() -> None:
-    bus, simulator, _ = real()
+    bus, simulator, _ = heard_bus()
     simulator.dead.add(1)
     with bus:
         told = volley(bus, (order(), position(1), position(2)), FORGIVEN)
@@ -104,7 +101,7 @@ def test_what_is_forgiven_takes_the_place_of_its_value_and_the_rest_goes_on() ->
 
 
 def test_an_order_that_is_refused_keeps_all_behind_it_from_leaving() -> None:
-    bus, _, line = real()
+    bus, _, line = heard_bus()
 
     def refuse(exchange: Exchange[Any]) -> None:
         raise Refused("no", reason="limits")
@@ -120,7 +117,7 @@ def test_an_order_that_is_refused_keeps_all_behind_it_from_leaving() -> None:
 
 
 def test_what_must_be_asked_is_asked_before_the_order() -> None:
-    bus, simulator, _ = real()
+    bus, simulator, _ = heard_bus()
     bus.turns.look = lambda order: [position(3)] if order.effect and not simulator.heard else []
     with bus:
         volley(bus, (order(), positions(1, 2)))
@@ -133,7 +130,7 @@ def test_what_must_be_asked_is_asked_before_the_order() -> None:
 
 @pytest.mark.parametrize("line_number", range(1, 4))
 def test_an_interruption_leaves_the_bus_usable(line_number: int) -> None:
-    bus, _, _ = real()
+    bus, _, _ = heard_bus()
     link: Any = bus.link
     write, read = link.write, link.read
     cut = [True]
@@ -156,7 +153,7 @@ def test_an_interruption_leaves_the_bus_usable(line_number: int) -> None:
 
 
 def test_a_link_that_is_lost_in_the_write_is_told() -> None:
-    bus, _, _ = real()
+    bus, _, _ = heard_bus()
 
     def lost(_: Data) -> None:
         raise LinkLost("gone")
@@ -165,5 +162,6 @@ def test_a_link_that_is_lost_in_the_write_is_told() -> None:
     with bus:
         with pytest.raises(MotorbusError, match="gone"):
             volley(bus, (order(), positions(1, 2)))
-        with pytest.raises(MotorbusError, match="gone"):
-            bus.run(order())
+        for alone in (order(), iter(order())):  # nobody answers it, and it is no success all the same
+            with pytest.raises(MotorbusError, match="gone"):
+                bus.run(alone)

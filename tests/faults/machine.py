@@ -306,13 +306,18 @@ def walk(rig: Rig, seed: int, exchanges: int, often: float = 0.02) -> None:
     """Steps by chance until so many exchanges have been made; `often` is the share of steps that are faults."""
     random = Random(seed)
     verbs, faults = [*rig.verbs, *OTHER], [*rig.faults]
+    step = verbs[0], 0
     while rig.line.exchange < exchanges:
         if random.random() < often:
             rig.strike(random.choice(faults), random.randrange(LOTS))
         elif random.random() < 0.001:
             rig.rest()
         else:
-            rig.call(random.choice(verbs), random.randrange(LOTS))
+            if (
+                random.random() < 0.5
+            ):  # else the same of the same device again: what is old looks most alike then
+                step = random.choice(verbs), random.randrange(LOTS)
+            rig.call(*step)
         rig.sound()
     with suppress(MotorbusError):
         rig.rest()

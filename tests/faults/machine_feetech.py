@@ -56,7 +56,7 @@ class FeetechRig(Rig):
 
     costs = COSTS
     faults = FAULTS
-    just = (0.0214, 0.0219)
+    just = (0.0215, 0.0217)
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator(IDS), 1_000_000, pace=True)

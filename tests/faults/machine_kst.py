@@ -48,7 +48,7 @@ class KstRig(Rig):
 
     costs = COSTS
     faults = FAULTS
-    just = (0.0498, 0.0507)
+    just = (0.0499, 0.0505)
 
     def __init__(self) -> None:
         family = FAMILY.configured(profile=PROFILE)

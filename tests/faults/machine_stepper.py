@@ -54,7 +54,7 @@ class StepperRig(Rig):
 
     costs = COSTS
     faults = FAULTS
-    just = (0.19, 0.25)
+    just = (0.195, 0.24)
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator((1,)), 9600, pace=True)

@@ -174,7 +174,7 @@ def at_the_end_of(port: bool, device: Counting) -> Iterator[Link]:
 @pytest.mark.parametrize("port", [False, True], ids=["virtual", "pseudo-terminal"])
 @pytest.mark.parametrize("kind", ["threads", "tasks"])
 def test_l16_a_crowd_on_one_bus(kind: str, port: bool, rounds: Rounds, figures: Figures) -> None:
-    full, usual = (25_600, 320) if port else (500_000, 3_200)
+    full, usual = (25_600, 320) if port else (200_000 if kind == "threads" else 800_000, 3_200)
     times = rounds(full, usual) // CROWD
     device, crowd = Counting(), Crowd()
     with at_the_end_of(port, device) as link:

@@ -21,6 +21,7 @@ from motorbus.link.base import PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.conftest import Figures, Rounds
 from tests.families.stepper.fault_rig import Rig as StepperRig
+from tests.faults import off
 from tests.faults.kst_kinds import KstRig, read_2
 from tests.faults.rig import Rig, read_word
 from tests.faults.slcan_rig import SlcanRig, TextLink
@@ -53,12 +54,12 @@ class Babble:
         self.inner.receive(data, at)
 
     def due(self) -> float:
-        due = self.inner.due()
-        return self.next if due is None else min(due, self.next)
+        due, next_ = self.inner.due(), float("inf") if off.faults_are_off else self.next
+        return next_ if due is None else min(due, next_)
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
         out: list[tuple[float, Data]] = list(self.inner.advance(to))
-        while self.next <= to:
+        while self.next <= to and not off.faults_are_off:
             out += [(self.next, data) for data in self.garbage(self.random)]
             self.pieces += 1
             self.next += EVERY

@@ -24,6 +24,8 @@ FULL = 10_000
 BLOCKS = 2_000
 """Blocks of Python's memory that may come and go; one that is lost in each cycle would be more than that."""
 KIB = 1024
+ASKED = 20
+"""How often somebody who must be there is asked."""
 
 
 def slope(warm: Callable[[int], None], cycles: int) -> tuple[Footprint, Footprint]:
@@ -75,7 +77,8 @@ def plugged_and_pulled(number: int) -> None:
     try:
         with served(Mount(FAMILY.simulator((1, 2)), master)):
             bus = motorbus.open(f"feetech:{master.slave_name}")
-            assert motorbus.feetech.Servo(bus, 1 + number % 2).ping()
+            servo = motorbus.feetech.Servo(bus, 1 + number % 2)
+            assert any(servo.ping() for _ in range(ASKED)), "at once, unless this computer is very busy"
     finally:
         master.close()
     try:

@@ -1,4 +1,4 @@
-"""Rows L10 and L11: replies in every way they can be cut into pieces are the same replies, and so are several in one piece.
+"""Rows L10 and L11: a reply is the same in whatever pieces it comes, and so are several that come in one.
 
 A reply of n bytes has 2^(n-1) ways; all of them for up to ten bytes, and chance for longer ones (`test_lines.py`).
 """
@@ -6,7 +6,7 @@ A reply of n bytes has 2^(n-1) ways; all of them for up to ten bytes, and chance
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import pytest
@@ -73,7 +73,7 @@ class Cut(PerfectLine):
             return super().carry(sender, data, at)
         self.fired += 1
         ends = (0, *(place for place in self.pieces if place < len(data)), len(data))
-        pieces = [data[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+        pieces = [data[a:b] for a, b in pairwise(ends)]
         return [Delivery(at + number * self.apart, Side.HOST, piece) for number, piece in enumerate(pieces)]
 
 
@@ -99,5 +99,5 @@ def test_l11_answers_in_one_piece_with_noise_between_are_each_heard_once() -> No
     replies = [feetech.encode_status(id, 0, bytes((id, 2 * id))) for id in range(1, 20)]
     noise = (b"", b"\xff", b"\xff\xff", b"\x00", b"\xff\xff\xfe", b"\xff\x55\xaa")
     joined = b"".join(noise[number % len(noise)] + reply for number, reply in enumerate(replies))
-    heard = [event.data for event in told(FEETECH.receiver, [joined]) if type(event).__name__ == "Reply"]  # type: ignore[union-attr]
+    heard = [event.data for event in told(FEETECH.receiver, [joined]) if type(event).__name__ == "Reply"]
     assert heard == replies

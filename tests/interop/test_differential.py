@@ -35,6 +35,7 @@ def test_no_difference_of_a_stream_is_without_a_name(
     assert set(found.counts) == {name for name, note in NOTES.items() if decoder in note.decoders}
 
 
+@pytest.mark.timeout(1800)
 def test_no_difference_of_an_sdo_stream_is_without_a_name(
     rounds: Callable[[int], int], figures: Figures
 ) -> None:
@@ -44,6 +45,7 @@ def test_no_difference_of_an_sdo_stream_is_without_a_name(
     assert set(found.counts) == set(SDO_NOTES)
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("decoder", table.DECODERS, ids=BY.__getitem__)
 def test_the_same_request_is_the_same_bytes(decoder: Decoder, rounds: Callable[[int], int]) -> None:
     found = table.requests(decoder, SEED, drawn(rounds, 20_000))
@@ -94,6 +96,7 @@ def test_an_example_of_sdo_shows_its_class(name: str) -> None:
     assert sdo_judging.classes(example, ours.sdo_decoded(example), heard.outcome) == {name}
 
 
+@pytest.mark.timeout(1800)
 def test_what_we_take_is_a_whole_packet_of_the_length_that_is_due(rounds: Callable[[int], int]) -> None:
     """By another way of finding packets than the one that is tested."""
     taken = 0

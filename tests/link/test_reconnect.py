@@ -234,6 +234,21 @@ def test_a_loss_that_another_thread_has_mended_needs_nothing(usb: Usb, master: P
     link.close()
 
 
+def test_what_keeps_it_from_being_opened_is_told(usb: Usb, master: PtyMaster) -> None:
+    usb.ports[master.slave_name] = "A"
+
+    def held(rate: int, listen_only: bool, kept: PortLock) -> Any:
+        raise PortBusy("held by process 17", cause="it was quicker", advice="close it there")
+
+    link = Reconnecting(open_link(master.slave_name, rate=RATE), held)
+    with pytest.raises(LinkLost, match="is gone: held by process 17") as told:
+        link.renew(1)
+    assert told.value.cause == "it was quicker"
+    assert told.value.advice.startswith("close it there; it is looked for again")
+    assert link.lock_name == master.slave_name, "the lock is ours still"
+    link.close()
+
+
 def test_what_is_closed_is_not_looked_for(usb: Usb, master: PtyMaster) -> None:
     link = adapter(master, usb)
     link.close()

@@ -15,7 +15,7 @@ from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
 from motorbus.bus.pace import Pace, byte_time, least_time
 from motorbus.bus.statistics import Statistics
-from motorbus.bus.ticket import Flight, Ticket
+from motorbus.bus.ticket import Flight, Ticket, all_taken
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.trust import Trust
 from motorbus.core.family import Family
@@ -62,7 +62,9 @@ class Air:
         self.known = Known(family, rate)
         self.settled = 0
         self._flying: dict[int, Flight] = {}
-        self._leaving: list[Flight] = []  # handed out and not known to be written, of those that nobody answers
+        self.leaving: list[
+            Flight
+        ] = []  # handed out and not known to be written, of those that nobody answers
         self._free_at = 0.0
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
@@ -88,9 +90,10 @@ class Air:
         if exchange.other is not None and self.trust.alike(exchange):
             exchange = flight.exchange = exchange.other()
         if flight.left:
-            echo_checked = (flight.spoiled == "echo" or flight.echo_checked) and self.echo.present is False
+            flight.echo_checked = (
+                flight.spoiled == "echo" or flight.echo_checked
+            ) and self.echo.present is False
             flight.reset()
-            flight.echo_checked = echo_checked
         start, air = max(now, self._free_at), self.family.air_time(exchange, self.rate)
         flight.sent_at, flight.left = now, True
         awaited = exchange.replies != ()
@@ -112,14 +115,14 @@ class Air:
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", exchange.request))
         if not awaited:
-            self._leaving.append(flight)
+            self.leaving.append(flight)
         return exchange.request
 
     def left(self, now: float) -> None:
         """What was handed out last has been written: only now does what nobody answers count as sent."""
-        leaving, self._leaving = self._leaving, []
-        for flight in leaving:
-            self._settle(flight, flight.answer(now))
+        while self.leaving:
+            self._settle(self.leaving[0], self.leaving[0].answer(now))
+            del self.leaving[0]
 
     def _share_wire(self, flight: Flight, air: float) -> None:
         """Lanes share one wire: whichever goes first, each may have to wait for all the others, once."""
@@ -151,7 +154,7 @@ class Air:
                     self._echo_broke(now)
             if data:
                 events = self.receiver.feed(data)
-                if not self._take_all(events):
+                if not all_taken(self._flying, events, self.echo.recent):
                     for event in events:
                         self._take(event, now)
             if isinstance(data, bytes):
@@ -160,11 +163,6 @@ class Air:
                 self._let_settle(len(data), now)
         self._land(now)
         self.expire(now if looked is None else looked)
-
-    def _take_all(self, events: Sequence[Event]) -> bool:
-        """The usual case: one exchange is in the air, and these are its replies, all of them and nothing else."""
-        flying = self._flying
-        return len(flying) == 1 and next(iter(flying.values())).take_all(events, self.echo.recent)
 
     def _let_settle(self, size: int, now: float) -> None:
         """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.
@@ -337,7 +335,7 @@ class Air:
             self._lost_try(lane, flight, now)
 
     def _accepted(self, lane: int, flight: Flight, now: float) -> None:
-        answer = flight.answer(min(now, flight.deadline))  # a host that was held up takes it in later than it came
+        answer = flight.answer(min(now, flight.deadline))  # a host that was held up takes it in late
         exchange = flight.exchange
         if flight.parent is not None and not (exchange.read is not None and exchange.read(answer)):
             flight.spoiled = "unexpected"

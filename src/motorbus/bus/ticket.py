@@ -6,7 +6,7 @@ any line leaves either an unfinished ticket or a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -232,3 +232,11 @@ class Flight(Ticket):
         here = [i for i, due in enumerate(dues) if i in got and due.node not in self.unbelieved]
         missing = tuple(due.node for i, due in enumerate(dues) if i not in here)
         return Answer(tuple(got[i] for i in here), missing, at)
+
+
+def all_taken(flying: Mapping[int, Flight], events: Sequence[Event], sent: Container[bytes]) -> bool:
+    """The usual case: one exchange is in the air, and these are its replies, all of them and nothing else."""
+    if len(flying) != 1:
+        return False
+    (flight,) = flying.values()
+    return flight.take_all(events, sent)

@@ -129,7 +129,7 @@ class Turns(Absence, Air):
     @property
     def idle(self) -> bool:
         """Nothing waits, nothing flies, nobody holds the bus."""
-        return not (self._flying or self._claims or self.latched or self._leaving or any(self._queues))
+        return not (self._flying or self._claims or self.latched or any(self._queues))
 
     @property
     def _takes_time(self) -> bool:
@@ -140,8 +140,8 @@ class Turns(Absence, Air):
     def send(self, now: float) -> Data | Retune | None:
         """What the pump must do next: write this data, change the rate, or (None) wait."""
         self._look_at = inf
-        while self._leaving:  # an interrupt fell between handing it out and writing it
-            self._settle(self._leaving.pop(), error=verdict.cancelled())
+        while self.leaving:  # an interrupt fell between handing it out and writing it
+            self._settle(self.leaving.pop(), error=verdict.cancelled())
         if self._claims.waiting and not self._flying:  # who was to hand it on may have been interrupted
             self._grant_claim()
         if len(self._flying) >= self.window:
@@ -392,8 +392,8 @@ class Turns(Absence, Air):
         for queue in self._queues:
             waiting += queue
             queue.clear()
-        waiting += self._leaving
-        self._leaving.clear()
+        waiting += self.leaving
+        self.leaving.clear()
         self._flying.clear()
         self._claims.waiting.clear()
         for ticket in waiting:

@@ -2,8 +2,7 @@
 
 What nobody answers leaves together with what follows it, where the bus is idle: so a cycle takes one look at the line,
 one write and one answer. Where that cannot be, because somebody else is on the bus, a node must be probed, the line
-takes its time, or something must be asked before an order can be judged, each exchange goes its own way. So it does
-where time is virtual, for there a write costs nothing.
+takes its time, or something must be asked before an order can be judged, each exchange goes its own way.
 """
 
 from __future__ import annotations
@@ -22,10 +21,13 @@ if TYPE_CHECKING:
 Exchanges = Sequence[Exchange[Any]]
 
 
-def volley(bus: Bus, exchanges: Exchanges, forgiven: tuple[type[Exception], ...] = ()) -> list[Any]:
+def volley(
+    bus: Bus, exchanges: Exchanges, forgiven: tuple[type[Exception], ...] = (), *, together: bool = True
+) -> list[Any]:
     """Carry these out in their order; the value of each, or the error, where that is one of those `forgiven`.
 
-    Raises the first other error, as `Bus.run` does; what comes behind has not been sent then.
+    Without `together` each leaves in a write of its own. Raises the first other error, as `Bus.run` does; what comes
+    behind has not been sent then.
     """
     told: list[Any] = []
     begin = 0
@@ -33,7 +35,7 @@ def volley(bus: Bus, exchanges: Exchanges, forgiven: tuple[type[Exception], ...]
         if exchange.replies == () and end < len(exchanges) and isinstance(exchange.request, bytes):
             continue  # nobody answers it, so it goes with the next
         burst, begin = exchanges[begin:end], end
-        sent = _sent(bus, burst)
+        sent = _sent(bus, burst) if together and len(burst) > 1 else []
         for number, one in enumerate(burst):
             try:
                 if number < len(sent):
@@ -47,8 +49,6 @@ def volley(bus: Bus, exchanges: Exchanges, forgiven: tuple[type[Exception], ...]
 
 def _sent(bus: Bus, burst: Exchanges) -> list[Flight]:
     """Send them as one, and wait until all that left so are settled; they are the first ones of the burst."""
-    if len(burst) < 2 or bus.link.virtual:
-        return []
     for one in burst:
         if one.effect and questions(bus.turns, one):
             return []

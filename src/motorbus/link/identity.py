@@ -23,6 +23,10 @@ Lister = Callable[[], Iterable[Any]]
 """What tells of the serial ports there are, as `serialx.list_serial_ports` does."""
 
 
+class AnotherAdapter(LinkLost):
+    """The port is gone, and its name leads to something else by now."""
+
+
 class Identity(NamedTuple):
     """What makes an adapter this one and no other; `vid` is None for what is on no USB.
 
@@ -115,9 +119,9 @@ def found_again(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path(
     raise PortNotFound(f"{name}: {wanted} is not there")
 
 
-def another(name: str, wanted: Identity | str, there: str) -> LinkLost:
+def another(name: str, wanted: Identity | str, there: str) -> AnotherAdapter:
     """The error for another adapter that is where the lost one was."""
-    return LinkLost(
+    return AnotherAdapter(
         f"{name} is gone, and there is another in its place: {there}",
         expected=str(wanted),
         cause="another adapter was plugged in, and it got the name of the one that is gone",

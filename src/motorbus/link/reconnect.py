@@ -21,7 +21,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import LinkLost, MotorbusError, PortNotFound
 from motorbus.link.base import Link
 from motorbus.link.can_config import SOCKETCAND_PORT
-from motorbus.link.identity import PSEUDO_TERMINALS, Lister, another, found_again, identity_of
+from motorbus.link.identity import PSEUDO_TERMINALS, AnotherAdapter, Lister, another, found_again, identity_of
 from motorbus.link.lock import PortLock
 from motorbus.link.refusal import lost
 from motorbus.link.tcp import split_address
@@ -171,24 +171,19 @@ class Reconnecting:
         self._wait = min(2 * self._wait or FIRST, LONGEST)
         self._next = time.monotonic() + self._wait
         self._error = error
-        if (
-            isinstance(error, LinkLost) and self._lock.held
-        ):  # its name is another's by now, to be opened by anybody
+        if isinstance(error, AnotherAdapter) and self._lock.held:  # which may be opened by anybody
             self._lock.release()
             self.moved("")
 
     def _gone(self) -> LinkLost:
         error = self._error
-        if isinstance(error, LinkLost):
-            return LinkLost(
-                error.summary,
-                expected=error.expected,
-                cause=error.cause,
-                advice=f"{error.advice}; {AGAIN}",
+        if isinstance(error, MotorbusError) and not isinstance(error, PortNotFound):
+            summary = (
+                error.summary if isinstance(error, LinkLost) else f"{self.name} is gone: {error.summary}"
             )
-        found = lost(
-            self.name, error.summary if isinstance(error, MotorbusError) else error or "it went away"
-        )
+            advice = f"{error.advice or 'see to that'}; {AGAIN}"
+            return LinkLost(summary, expected=error.expected, cause=error.cause, advice=advice)
+        found = lost(self.name, error.summary if isinstance(error, PortNotFound) else error or "it went away")
         found.advice = f"see to the other end; {AGAIN}"
         return found
 

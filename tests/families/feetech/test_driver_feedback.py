@@ -7,7 +7,7 @@ from math import tau
 import pytest
 
 from motorbus.core.operation import Exchange
-from motorbus.errors import DeviceError
+from motorbus.errors import DeviceError, VerificationFailed
 from motorbus.families.feetech.driver import (
     Node,
     current,
@@ -95,3 +95,18 @@ def test_what_an_unknown_servo_cannot_tell_in_a_unit_is_refused(verb: object) ->
 
 def test_an_unknown_servo_tells_its_voltage() -> None:
     assert play(voltage(Node(3)), prepares(at_0=9), reads(3, 62, 74)) == pytest.approx(7.4)
+
+
+def test_a_confirmed_position_is_one_that_two_readings_in_a_row_tell() -> None:
+    told = play(
+        position(prepared(), confirmed=True),
+        reads(3, 56, 0x18, 0x05),
+        reads(3, 56, 0x18, 0x06),
+        reads(3, 56, 0x18, 0x06),
+    )
+    assert told == pytest.approx(0x618 * COUNT)
+
+
+def test_a_position_that_changes_all_the_time_is_not_confirmed() -> None:
+    with pytest.raises(VerificationFailed, match="position"):
+        play(position(prepared(), confirmed=True), *[reads(3, 56, low, 0x05) for low in range(8)])

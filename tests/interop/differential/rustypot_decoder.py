@@ -14,6 +14,7 @@ import os
 import select
 import sys
 import termios
+import time
 import tty
 from importlib import import_module
 from typing import Any
@@ -28,7 +29,7 @@ def serve(master: int, orders: int, answers: int) -> None:
         ready, _, _ = select.select([master, orders], [], [])
         if master in ready:
             heard += os.read(master, 65536)
-            if not said and len(heard) > 3 and len(heard) >= heard[3] + 4:
+            if not said and _is_whole(heard):
                 said = True
                 os.write(master, stream)
         if orders in ready:
@@ -40,6 +41,10 @@ def serve(master: int, orders: int, answers: int) -> None:
                 os.write(answers, heard.hex().encode() + b"\n")
                 if line:
                     heard, said, stream = b"", False, bytes.fromhex(line.decode().strip("."))
+
+
+def _is_whole(packet: bytes) -> bool:
+    return len(packet) > 3 and len(packet) >= packet[3] + 4
 
 
 class Line:
@@ -84,7 +89,13 @@ class Decoder:
             gives = {"ok": getattr(self, case["kind"])(controller, case)}
         except Exception as error:
             gives = {"no": str(error)}
-        return {"sent": line.tell(""), **gives}
+        sent = line.tell("")
+        while "ok" in gives and not _is_whole(
+            bytes.fromhex(sent)
+        ):  # what is not answered may still be on its way
+            time.sleep(QUICK)
+            sent = line.tell("")
+        return {"sent": sent, **gives}
 
     def ping(self, controller: Any, case: dict[str, Any]) -> int:
         """It says no more than yes or no."""

@@ -150,7 +150,8 @@ class Part:
         return told
 
     def at_once(self, bus: Bus, orders: Sequence[Exchange[Any]], moment: float) -> list[Any]:
-        """`cycle` on the only bus there is, where nothing is abreast: goals and the first question leave as one.
+        """`cycle` on the only bus there is, where nothing is abreast; who waits `exactly` sends goals and the first
+        question in one write.
 
         There is nothing to clean up, so an interruption is raised at once.
         """
@@ -161,7 +162,7 @@ class Part:
         for pause in self._wait(moment + self.origin):
             bus.run(iter(pause))
         self.began = self.link.now() - self.origin
-        told = volley(bus, (*orders, *self.reads), LOST)
+        told = volley(bus, (*orders, *self.reads), LOST, together=self.exactly)
         self.ended = self.link.now() - self.origin
         return told
 
