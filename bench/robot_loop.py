@@ -34,6 +34,8 @@ SHARE = 0.8
 ACHIEVED = 0.88
 SECONDS = 60.0
 FLAT_OUT = 5.0
+LOOKS = 3
+"""How often a look at a motor may be sent until it is answered."""
 STEP = math.tau / COUNTS
 KINDS = ("followed", "direct")
 COLUMNS = (
@@ -145,8 +147,8 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
 def judged(readings: Sequence[tuple[dict[str, float], frozenset[str]]]) -> None:
     """Each reading shows one count more than the one before, and one for each that was lost and told as lost.
 
-    One more stands for a look at how the motor fares, which reads its position too. At the end of its range a servo
-    counts down again; at the first reading it counts up. Raises Wrong.
+    More stand for a look at how the motor fares, which reads its position too, and is tried again where its answer is
+    late. At the end of its range a servo counts down again; at the first reading it counts up. Raises Wrong.
     """
     first, *others = readings
     number = {name: counted(here) for name, here in first[0].items()}
@@ -157,7 +159,8 @@ def judged(readings: Sequence[tuple[dict[str, float], frozenset[str]]]) -> None:
             if name in missing:
                 continue
             since, shown = due[name], counted(here)
-            came = [more for more in (since, since + 1) if to_and_fro(number[name] + more) == shown]
+            seen = range(since, since + LOOKS + 1)
+            came = [more for more in seen if to_and_fro(number[name] + more) == shown]
             if not came:
                 raise Wrong(
                     f"cycle {cycle}: {name} shows {shown}, {since} readings after {to_and_fro(number[name])}"

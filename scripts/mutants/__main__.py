@@ -60,7 +60,9 @@ def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
             os.write(voice, f"  {time.monotonic() - begun:5.0f} s  {text}\n".encode())
 
     print(subject.name, file=sys.stderr)
-    wish = Wish(told.sample, told.only, told.anew, told.tables, told.jobs, _known(subject, told), tell)
+    wish = Wish(
+        told.sample, told.only, told.anew, told.tables, told.swapped, told.jobs, _known(subject, told), tell
+    )
     verdicts = trial(subject, wish)
     os.close(voice)
     result = outcome(verdicts, len(verdicts))
@@ -96,6 +98,9 @@ def _asked() -> argparse.Namespace:
         "--tables", type=float, default=1.0, help="share of what happens at import, which is slow"
     )
     parser.add_argument("--anew", action="store_true", help="import the module anew for every fault")
+    parser.add_argument(
+        "--swapped", action="store_true", help="count what survives without a trial by a new import"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--json", default="", help="a file for every verdict")
     parser.add_argument("--again", default="", help="such a file: only what survived there is tried")

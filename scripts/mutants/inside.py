@@ -76,13 +76,11 @@ class Order:
 
     def of(self, fault: Fault) -> list[str]:
         """The fast tests that run one of its lines; of what happens at import, all that run any line of its file."""
+        found = set[str]()
         if fault.mutant.swapped:
-            lines = ((fault.path, line) for line in fault.mutant.lines)
-            found = set[str]().union(*(self._by_line[line] for line in lines))
-        else:
-            found = set[str]().union(
-                *(tests for line, tests in self._by_line.items() if line[0] == fault.path)
-            )
+            found = found.union(*(self._by_line[fault.path, line] for line in fault.mutant.lines))
+        if not found:  # a function that runs at import only is one of these too
+            found = found.union(*(tests for line, tests in self._by_line.items() if line[0] == fault.path))
         return sorted(found, key=lambda name: (-self.kills[name], self.lasted[name], name))
 
 

@@ -59,6 +59,7 @@ class Wish(NamedTuple):
 
     `tables` is the share (0 to 1) that is tried, by chance, of what a module does while it is imported: its tables,
     constants and defaults, each of which takes a process that imports everything anew.
+    With `swapped` what survives is not tried once more with a new import, and counts as surviving: a lower bound, soon.
     `known` are tests that have noticed faults in an earlier run, by the faults; these are not tried again.
     """
 
@@ -66,6 +67,7 @@ class Wish(NamedTuple):
     only: str = ""
     anew: bool = False
     tables: float = 1.0
+    swapped: bool = False
     at_once: int = 2
     known: Mapping[str, str] = {}
     tell: Callable[[str], None] = lambda _: None

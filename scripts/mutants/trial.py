@@ -41,7 +41,9 @@ def _anew(
         order.noticed(file_of[one.fault], one.by)
     done = {one.fault for one in noticed}
     left = [one for one in told if one.name not in done]
-    explained = {one.name for one in left if one.mutant.swapped and one.name in subject.reasons}
+    explained = {
+        one.name for one in left if one.mutant.swapped and (wish.swapped or one.name in subject.reasons)
+    }
     todo = [one for one in left if order.of(one) and one.name not in explained]
     due = {one.name for one in todo}
     found = [Verdict(one.name, "") for one in left if one.name not in due]

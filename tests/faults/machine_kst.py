@@ -80,8 +80,8 @@ class KstRig(Rig):
                 servo.raw_position = random.randrange(-RANGE, RANGE)
 
     def foreign(self, random: Random) -> Data:
-        node, data = random.choice(IDS), random.randbytes(4)
-        position = self.table["present_position"]
+        node, position = random.choice(IDS), self.table["present_position"]
+        data = position.encode(random.randrange(-900, 900))
         return random.choice(
             [
                 encode_upload_reply(node, position.address, random.randrange(1, 256), data),

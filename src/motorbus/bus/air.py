@@ -26,7 +26,6 @@ from motorbus.core.operation import (
     CanFrame,
     Data,
     Due,
-    Event,
     Exchange,
     Noise,
     Notice,

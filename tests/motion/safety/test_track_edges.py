@@ -82,9 +82,9 @@ def test_a_reading_from_before_changes_nothing() -> None:
 
 def test_a_doubt_from_later_is_not_confirmed_by_what_came_before_it() -> None:
     track = seen()
-    track.take(5.0, 0.04)
-    assert track.take(5.0, 0.02).quality is Quality.SUSPECT
-    assert track.take(5.0, 0.02).quality is Quality.CONFIRMED, "and by one of the same moment it is"
+    track.take(5.0, 0.041)
+    assert track.take(5.0, 0.04).quality is Quality.SUSPECT
+    assert track.take(5.0, 0.04).quality is Quality.CONFIRMED, "and by one of the same moment it is"
 
 
 def test_no_number_is_a_doubt_that_displaces_none() -> None:
