@@ -122,8 +122,8 @@ def test_a_trial_says_which_test_noticed_and_which_fault_none() -> None:
 
 
 def test_what_survives_needs_a_reason_and_a_reason_something_that_survives() -> None:
-    told = record.outcome([Verdict("a", "test_x"), Verdict("b", ""), Verdict("c", "time")], 5)
-    assert (told["there are"], told["faults"], told["noticed"], told["without end"]) == (5, 3, 2, 1)
+    told = record.outcome([Verdict("a", "test_x"), Verdict("b", ""), Verdict("c", "time")], 3)
+    assert (told["there are"], told["faults"], told["noticed"], told["without end"]) == (3, 3, 2, 1)
     subject = ABORT._replace(reasons={"c": "it does the same"})
     said = list(record.complaints(subject, told))
     assert [line for line in said if "66.6 % of the faults are noticed" in line]

@@ -75,12 +75,11 @@ class Order:
         return sorted(files, key=lambda file: -kills[file])
 
     def of(self, fault: Fault) -> list[str]:
-        """The fast tests that run one of its lines; of what happens at import, all that run any line of its file."""
+        """The fast tests that run one of its lines; all of them for what happens at import, which may show anywhere."""
         found = set[str]()
         if fault.mutant.swapped:
             found = found.union(*(self._by_line[fault.path, line] for line in fault.mutant.lines))
-        if not found:  # a function that runs at import only is one of these too
-            found = found.union(*(tests for line, tests in self._by_line.items() if line[0] == fault.path))
+        found = found or set(self.lasted)  # a function that runs at import only is one of these too
         return sorted(found, key=lambda name: (-self.kills[name], self.lasted[name], name))
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Timer
+from motorbus.core.goal import Later
 from motorbus.core.operation import Due, Effect, Exchange, Listen, Rank, Tune
 from motorbus.errors import Interrupted, RequestError
 from motorbus.families.feetech import wire
-from tests.bus.lanes import CanScript
+from tests.bus.lanes import POSITION, READ, CanScript
 from tests.bus.script import Script, position, reply
 
 
@@ -71,6 +72,16 @@ def test_a_claim_that_is_given_up_lets_the_others_go() -> None:
     assert isinstance(second.error, Interrupted)
     script.submit(position(1))
     script.turns.release(first)
+    assert script.sent()[2] == 1
+    script.feed(reply(1))
+    script.submit(position(2))
+    assert script.sent()[2] == 2
+
+
+def test_who_has_it_and_gives_up_has_it_no_longer() -> None:
+    script = Script()
+    script.turns.abandon(claimed(script, "a"))
+    script.submit(position(1))
     assert script.sent()[2] == 1
 
 
@@ -187,12 +198,14 @@ def test_a_link_that_takes_bit_time_is_free_when_the_bits_have_passed(paced: boo
         assert free > script.now
         assert script.send() is None
         assert script.turns.due() == free
-        assert script.turns.short(Flight(position(1)), script.now) is None
         script.turns._queues[Rank.POLL].clear()
+        assert script.turns.short(Flight(position(1)), script.now) is None
         script.now = free
         assert script.turns.short(Flight(position(1)), script.now) is not None
     else:
         assert script.sent() == wire.action(7)
+        assert script.now < free
+        assert script.turns.short(Flight(position(1)), script.now) is not None
 
 
 def test_bit_time_is_certain_only_where_the_link_says_so() -> None:
@@ -238,6 +251,13 @@ def test_what_is_refused_while_latched_is_not_queued_and_what_is_done_is_not_tak
     assert not script.turns.waiting
 
 
+def test_what_is_settled_otherwise_leaves_the_queue_with_the_next_look() -> None:
+    script = Script()
+    script.submit(position(1)).finish()
+    assert script.send() is None
+    assert not script.turns.waiting
+
+
 def test_after_a_stop_readings_are_asked_and_movements_refused() -> None:
     script = Script()
     script.turns.latch(script.now)
@@ -273,15 +293,22 @@ def test_an_emergency_stop_ends_what_is_awaited_and_lets_the_rest_of_a_reply_pas
     script.turns.latch(script.now)
     for ended in (flight, timer, other):
         assert isinstance(ended.error, Interrupted)
+        assert "reset" in f"{ended.error.summary} {ended.error.advice}"
     assert flight.abandoned
     assert script.now + 0.005 < flight.deadline == script.turns.due() <= due
     assert not retune.done
     assert [*script.turns._queues[Rank.POLL]] == []
+    assert script.turns._timers == []
+    assert other not in script.turns._claims.waiting
 
 
 def test_an_emergency_stop_has_the_frames_of_the_moment_or_those_before() -> None:
     script = CanScript(window=3)
+    script.submit(read(1))
+    script.sent()
+    script.feed(said(1, READ, POSITION, 7))
     frames = script.turns.latch(script.now)
+    assert [one.effect for one in frames.exchanges] == [Effect.MOTION], "held where it was"
     assert script.turns.known.frames is frames
     assert frames.promise == "each holds where it was"
 
@@ -290,3 +317,27 @@ def test_an_emergency_stop_has_the_frames_of_the_moment_or_those_before() -> Non
 
     script.turns.family.stop = fails  # type: ignore[method-assign]
     assert script.turns.latch(script.now) is frames
+
+
+# --- the gate -------------------------------------------------------------------------------------------------------
+
+
+def test_a_stop_passes_where_there_is_no_gate() -> None:
+    script = Script(admit=None)
+    script.submit(torque(1, rank=Rank.STOP))
+    assert script.sent()[2] == 1
+
+
+def test_a_gate_is_told_of_what_will_wait_in_a_device_though_it_moves_nothing_yet() -> None:
+    later: Exchange[Any] = Exchange(wire.write(1, 40, b"\0"), (Due(1, 1, 6),), later=Later(1))
+    told: list[Any] = []
+    script = Script(admit=told.append)
+    script.submit(later)
+    script.submit(position(2))
+    script.sent()
+    script.feed(wire.encode_status(1, 0))
+    script.sent()
+    assert told == [later]
+    script = Script(admit=None)
+    script.submit(later)
+    assert script.sent()[2] == 1

@@ -65,7 +65,7 @@ def test_a_bus_that_was_opened_to_listen_goes_on_listening_at_another_rate() -> 
 
 def test_half_a_reply_of_the_old_rate_is_forgotten_at_the_new_one() -> None:
     script = Script()
-    script.turns.feed([reply(1)[:5]], script.now)
+    script.turns.feed([b"\xff\xff\x01\x80"], script.now)
     retune = Retune(Tune(500_000), None, None)
     script.turns.retuned(retune)
     flight = script.submit(position(1))
@@ -95,6 +95,21 @@ def test_nothing_of_its_queue_takes_off_before_a_change_of_rate_and_what_was_giv
     assert script.turns.send(script.now) is None
     retune.finish()
     assert script.sent() == [2]
+
+
+def test_a_change_of_rate_that_has_no_turn_holds_up_nobody_who_has() -> None:
+    script = CanScript(window=3)
+    script.turns.submit(Claim("a"), script.now)
+    script.turns.submit(Retune(Tune(250_000), None, None), script.now)
+    script.submit(read(2, rank=Rank.CONFIGURATION), "a")
+    assert script.sent() == [2]
+
+
+def test_no_more_fly_than_the_window_lets_however_many_lanes_are_free() -> None:
+    script = CanScript(window=2)
+    for node in (1, 2, 3):
+        script.submit(read(node))
+    assert script.sent() == [1, 2]
 
 
 # --- listeners ------------------------------------------------------------------------------------------------------
@@ -214,3 +229,22 @@ def test_a_scan_that_heard_its_own_echo_is_tried_again() -> None:
     flight = Flight(ping(2))
     script.turns._failed(flight, "silence", script.now)
     assert flight.done
+
+
+def test_a_pair_believes_that_one_is_silent_until_he_is_asked_again() -> None:
+    script = Script()
+    for probed in (False, True, False):
+        flight = script.submit(positions(1, 2))
+        if probed:
+            assert script.send() is None
+            script.wait(script.turns.family.quiet_time(1_000_000))
+            assert script.sent()[2] == 2
+            script.time_out()
+        assert script.sent() == wire.sync_read(56, 2, (1, 2))
+        script.feed(reply(1))
+        if not flight.done:
+            script.time_out()
+        assert flight.result().missing == (2,)
+    script.now = script.turns.trust.of(2).probe_at
+    script.submit(positions(1, 2))
+    assert script.sent()[2] == 2

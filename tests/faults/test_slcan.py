@@ -19,6 +19,7 @@ from tests.faults.single import EVERY, Overheard, Tally, every_fault, number_of,
 from tests.faults.slcan_rig import VALUE, SlcanRig, another_frame, value_changed
 
 NAMES = ("ping", "read 2 bytes", "refused read", "write 1 byte that is kept", "save that is acknowledged")
+ONE_EXCHANGE = (*NAMES, "read 1 byte", "read 4 bytes", "refused write", "write 1 byte", "save")
 TELLING = tuple(b"08Fft\r\x00")
 ANSWER = 2
 """Characters of what an adapter answers to a frame that it is to send, z and CR, before the line of the reply."""
@@ -75,9 +76,9 @@ def test_d14_what_names_the_reply_cannot_change_unseen(place: int) -> None:
 
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("name", [name for name in KINDS if not name.startswith("broadcast")])
+@pytest.mark.parametrize("name", ONE_EXCHANGE)
 def test_d14_every_harm_to_every_character(name: str, figures: Figures) -> None:
-    """All but broadcasts, whose replies come in any order."""
+    """Of all that is said in one exchange; what needs several is made of such."""
     for to, length in lengths(name).items():
         if not length:
             continue

@@ -19,6 +19,12 @@ def pause(seconds: float) -> Operation[None]:
     yield from Pause(seconds)
 
 
+def wait(robot: Robot, bus: str, seconds: float) -> None:
+    """Let time pass on a bus."""
+    there: Any = robot.buses[bus]
+    there.run(pause(seconds))
+
+
 def gone_and_back(robot: Robot, bus: str) -> None:
     """Pull the adapter, notice that, and put it back."""
     there: Any = robot.buses[bus]
@@ -43,7 +49,9 @@ def test_where_axes_are_is_asked_anew() -> None:
         sims["arm"].line = line = Heard()
         robot["a1"].enable_torque()
         robot["a1"].device.move(3.2, velocity=0.5, wait=False)
-        assert line.sent[0][4] == 0x02, "a read comes before anything is written"
+        first = line.sent[0]
+        assert isinstance(first, bytes)
+        assert first[4] == 0x02, "a read comes before anything is written"
 
 
 def test_one_that_has_restarted_meanwhile_is_at_fault() -> None:
@@ -66,7 +74,7 @@ def test_one_that_kept_its_torque_goes_on_when_it_is_told_to_and_not_before() ->
         robot.move({"a1": 0.2, "a2": 0.2})
         gone_and_back(robot, "arm")
         sims["arm"].line = line = Heard()
-        robot.buses["arm"].run(pause(1.0))
+        wait(robot, "arm", 1.0)
         assert line.sent == []
         assert robot.move({"a1": 0.4}).axes["a1"].present == pytest.approx(0.4, abs=0.02)
 
@@ -77,12 +85,12 @@ def test_a_movement_that_was_cut_off_is_not_taken_up_again() -> None:
         link.unplug(link.now() + 0.6, AWAY)
         with pytest.raises(LinkLost):
             robot.move({"a1": 1.0, "c1": 0.6}, duration=2.0)
-        robot.buses["arm"].run(pause(AWAY + 0.5))
+        wait(robot, "arm", AWAY + 0.5)
         here = robot["a1"].position()
         assert abs(here - 1.0) > 0.1, "it was cut off"
-        robot.buses["arm"].run(pause(1.0))
+        wait(robot, "arm", 1.0)
         assert robot["a1"].position() == pytest.approx(here, abs=0.01)
-        robot.buses["can"].run(pause(1.0))
+        wait(robot, "can", 1.0)
         assert sims["can"][0x25].status()["moving"] in (0, False)
 
 
