@@ -12,7 +12,7 @@ from motorbus.core.goal import Later
 from motorbus.core.operation import Due, Effect, Exchange, Listen, Rank, Tune
 from motorbus.errors import Interrupted, RequestError
 from motorbus.families.feetech import wire
-from tests.bus.lanes import POSITION, READ, CanScript
+from tests.bus.lanes import POSITION, READ, CanScript, read, said
 from tests.bus.script import Script, position, reply
 
 

@@ -155,6 +155,31 @@ def test_an_instruction_there_is_not_suits_nothing() -> None:
     assert not wire.suits(0x55, b"")
 
 
+COUNTS = {
+    0x01: {0},
+    0x02: {2},
+    0x03: {2, 3, 4, 253},
+    0x04: {2, 3, 4, 253},
+    0x05: {0},
+    0x06: {0},
+    0x08: {0},
+    0x09: {0},
+    0x0A: {0},
+    0x0B: {0, 2},
+    0x0D: {0},
+    0x82: {3, 4, 253},
+    0x83: {4},
+}
+
+
+@pytest.mark.parametrize(("code", "counts"), COUNTS.items())
+def test_each_instruction_has_its_number_of_parameters(code: int, counts: set[int]) -> None:
+    found = {
+        count for count in (0, 1, 2, 3, 4, 253, 254) if wire.suits(code, bytes((0, 1, *bytes(252)))[:count])
+    }
+    assert found == counts
+
+
 def test_a_length_that_is_impossible_is_told() -> None:
     with pytest.raises(FramingError, match="length 1 is impossible"):
         wire.decode_status(bytes.fromhex("FF FF 07 01 00 F7"))
