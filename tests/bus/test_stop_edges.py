@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 
 from motorbus.bus import obedience, stop
+from motorbus.bus.known import FRESH
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop import BREATH, Stopper, _listening
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Rank
+from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Operation, Pause, Rank
 from motorbus.errors import DeviceError, LinkLost, NoReply
 from motorbus.families.feetech import wire
 from tests.bus.lanes import can_bus, move, read
@@ -181,6 +182,17 @@ def test_a_node_that_has_not_said_where_it_is_is_not_asked_in_the_same_round() -
     failed.error = NoReply("silent")
     assert bus.stopper._following(failed) == []
     assert bus.stopper._following(Flight(Exchange(read(1).request, ANY))) == []
+
+
+def test_a_node_whose_position_has_grown_old_meanwhile_is_not_asked_in_the_same_round() -> None:
+    bus, _ = can_bus(pace=True)
+    bus.run(read(1))
+
+    def wait() -> Operation[None]:
+        yield from Pause(FRESH + 1.0)
+
+    bus.run(wait())
+    assert bus.stopper._following(Flight(read(1))) == []
 
 
 def test_what_goes_to_everyone_does_not_follow_an_answer_of_one() -> None:

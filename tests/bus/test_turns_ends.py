@@ -7,7 +7,7 @@ from typing import Any
 
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Timer
 from motorbus.core.operation import Due, Effect, Exchange, Listen, Notice, Rank, Timeout, Tune
-from motorbus.errors import LinkLost, RequestError
+from motorbus.errors import Interrupted, LinkLost, RequestError
 from motorbus.families.feetech import wire
 from tests.bus.lanes import CanScript, read
 from tests.bus.script import Script, ping, position, positions, reply
@@ -156,6 +156,7 @@ def test_a_lost_link_leaves_nothing_behind_and_counts_what_it_cost() -> None:
     for node in (1, 2):
         assert script.turns.statistics.of(node).errors["lost"] == 1
         assert script.turns.trust.of(node).tainted, "its answer may still come"
+        assert script.turns.trust.of(node).quiet_until > script.now
     assert not script.turns.waiting
 
 
@@ -248,3 +249,13 @@ def test_a_pair_believes_that_one_is_silent_until_he_is_asked_again() -> None:
     script.now = script.turns.trust.of(2).probe_at
     script.submit(positions(1, 2))
     assert script.sent()[2] == 2
+
+
+def test_what_was_handed_out_and_perhaps_never_written_is_not_waited_for() -> None:
+    """An interrupt fell between the two."""
+    script = Script()
+    flight = Flight(position(1))
+    script.turns.leaving.append(flight)
+    assert script.send() is None
+    assert isinstance(flight.error, Interrupted)
+    assert not script.turns.leaving

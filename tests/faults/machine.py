@@ -47,6 +47,8 @@ BUFFER: Final = 4096
 LOTS: Final = 1 << 16
 USUAL: Final = 8
 """Exchanges that a plain verb makes at most, with what it has to ask before."""
+LONG: Final = 30
+"""Exchanges from which on a verb is called seldom in a walk, or there is nothing but such."""
 OTHER: Final = ("unplug", "foreign")
 """What happens to the bus in the middle of a call, beside the faults of a script."""
 KEPT: Final = 20_000
@@ -151,7 +153,7 @@ class Rig:
         random = Random(lot)
         place = {
             "byte": random.randrange(11),
-            "bits": f"{random.randrange(1, 256):02X}",
+            "bits": f"{random.choice([1, random.randrange(1, 256)]):02X}",
             "late": f"{10 ** random.uniform(-4, -0.2):.6f}",
             "just": f"{random.uniform(*self.just):.6f}",
             "near": f"{10 ** random.uniform(-4, -1.6):.6f}",
@@ -316,7 +318,8 @@ def walk(rig: Rig, seed: int, exchanges: int, often: float = 0.02) -> None:
             if (
                 random.random() < 0.5
             ):  # else the same of the same device again: what is old looks most alike then
-                step = random.choice(verbs), random.randrange(LOTS)
+                cheap = [name for name in verbs if rig.costs.get(name, 0) < LONG or random.random() < 0.1]
+                step = random.choice(cheap), random.randrange(LOTS)
             rig.call(*step)
         rig.sound()
     with suppress(MotorbusError):

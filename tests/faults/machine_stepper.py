@@ -32,6 +32,7 @@ FAULTS: Final = {
     "reply merged": ": merge",
     "reply cut": "byte {byte}: split {near}",
     "byte changed": "byte {byte}: corrupt {bits}",
+    "level changed": "byte 5: corrupt 01",
     "byte lost": "byte {byte}: drop",
     "byte inserted": "byte {byte}: insert {bits}",
     "byte doubled": "byte {byte}: duplicate",
@@ -89,7 +90,9 @@ class StepperRig(Rig):
                 self.there.set_input(port, random.random() < 0.5)
 
     def foreign(self, random: Random) -> Data:
-        return wire.NOTICE
+        asked = Random(self.line.exchange).randrange(1, 6)  # the port that `probe` is about to read
+        other = wire.encode("read_input", port=asked % 5 + 1)
+        return random.choice([wire.NOTICE, wire.encode_reply(other, level=random.randrange(2))])
 
     # -- verbs --------------------------------------------------------------------------------------------------------
 
