@@ -83,29 +83,22 @@ def page(subjects: dict[str, Subject], known: dict[str, Any]) -> str:
     both = [(subject, known[name]) for name, subject in subjects.items() if name in known]
     columns = ("module", "files", "faults", "tried", "noticed", "share", "survive", "date", "Python")
     lines = [HEAD, *listed(columns, (_row(*one) for one in both))]
+    left = [f"`{name}`" for name in subjects if name not in known]
+    lines += [f"Not tried to the end yet: {', '.join(left)}.\n"] if left else []
     for one in both:
         lines += _section(*one)
     return "\n".join(lines)
 
 
 def _row(subject: Subject, told: dict[str, Any]) -> list[object]:
-    files = f"`{_common(subject)}`"
-    alive = len(told["survivors"])
-    return [
-        subject.name,
-        files,
-        told["faults"],
-        told["noticed"],
-        share(told),
-        alive,
-        told["date"],
-        told["python"],
-    ]
+    counts = [told["there are"], told["faults"], told["noticed"], share(told), len(told["survivors"])]
+    return [subject.name, _files(subject), *counts, told["date"], told["python"]]
 
 
-def _common(subject: Subject) -> str:
-    file = Path(subject.files[0]).relative_to("src/motorbus")
-    return (file if len(subject.files) == 1 else file.parent).as_posix()
+def _files(subject: Subject) -> str:
+    paths = [Path(file).relative_to("src/motorbus") for file in subject.files]
+    names = " ".join(path.name for path in paths if path.stem != "__init__")
+    return f"`{paths[0].parent.as_posix()}`: {names}" if len(paths) > 1 else f"`{paths[0].as_posix()}`"
 
 
 def _section(subject: Subject, told: dict[str, Any]) -> Iterator[str]:

@@ -65,7 +65,7 @@ class Line(FaultyLine):
         for fault in parse(text):
             self._check(fault)
             self.faults += (fault,)
-            self._place(len(self.faults) - 1, fault)
+            self._waiting.setdefault(fault.exchange or 0, []).append((len(self.faults) - 1, fault))
 
     @property
     def calm(self) -> bool:

@@ -36,7 +36,7 @@ def script_of(said: str) -> Script:
         return Script()
     if _is_file(said):
         with usable(Path(said), "read"):
-            said = Path(said).read_bytes().decode(errors="replace")
+            said = Path(said).read_bytes().decode("utf-8-sig", errors="replace")
     elif ":" not in said:
         raise RequestError(
             f"--faults {said}: neither a file nor a script",

@@ -12,6 +12,7 @@ from copy import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from motorbus.bus import verdict
 from motorbus.core.operation import (
     Alone,
     Effect,
@@ -42,12 +43,15 @@ NEVER: Final = -1
 class Command:
     """The command over some axes of one bus, from now on until somebody else tells one of them something.
 
-    What counts is what was told to the axes from here, and every stop that left on their bus, whoever sent it.
+    What counts is what was told to the axes from here, and every stop that left on their bus, whoever sent it. When the
+    port of the bus is lost, the command is: also where somebody else was told of that, and it is there again by now.
     """
 
     def __init__(self, axes: Iterable[AxisVerbs]) -> None:
         self.axes = tuple(axes)
-        self._known = self.axes[0].bus.turns.known if self.axes else None
+        self._turns = self.axes[0].bus.turns if self.axes else None
+        self._known = None if self._turns is None else self._turns.known
+        self._losses = 0 if self._turns is None else self._turns.losses
         self._stopping = self._stopped_by_now()
         self._stops = {axis.name: _stops(axis) for axis in self.axes}
         self._orders: dict[str, int] = {}
@@ -90,7 +94,10 @@ class Command:
         found = copy(other)
         axes = {axis.name: axis for axis in (*self.axes, *other.axes)}
         found.axes = tuple(axes.values())
-        found._known = self._known if other._known is None else other._known
+        if other._turns is None:
+            found._turns, found._known, found._losses = self._turns, self._known, self._losses
+        elif self._turns is not None:
+            found._losses = min(self._losses, other._losses)
         found._stopping = NEVER
         found._stops = self._stops | other._stops
         found._orders = self._orders | other._orders
@@ -105,12 +112,15 @@ class Command:
         return found
 
     def check(self) -> None:
-        """Raise Interrupted when the command over one of them is lost."""
+        """Raise Interrupted when the command over one of them is lost, LinkLost when their port was gone since."""
         if error := self.lost():
             raise error
 
     def lost(self) -> MotorbusError | None:
         """The error for an axis that somebody else has told something since; None when there is none."""
+        turns = self._turns
+        if turns is not None and turns.losses != self._losses:
+            return verdict.outlived()
         stopping = self._stopped_by_now()
         if stopping == self._stopping:
             for axis, orders in self._counts:

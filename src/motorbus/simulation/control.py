@@ -19,7 +19,8 @@ from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 from motorbus.simulation.faulted import Faulted, read_order
 
-LONGEST_LINE = 4096
+LONGEST_LINE = 1 << 16
+"""Bytes of an order; a long script is the longest."""
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
 FAULTS = "motorbus.simulator-faults/1"
@@ -88,7 +89,10 @@ class ControlSocket:
         except OSError:
             data = b""
         waiting += data
-        if not data or (len(waiting) > LONGEST_LINE and b"\n" not in waiting):
+        if len(waiting) > LONGEST_LINE and b"\n" not in waiting:
+            self._answer(descriptor, client, f"error: an order has at most {LONGEST_LINE} bytes")
+            data = b""
+        if not data:
             self._drop(descriptor)
             return
         while b"\n" in waiting:

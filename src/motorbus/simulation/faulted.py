@@ -63,6 +63,7 @@ class Faulted:
             without_adapter(given)
         line = FaultyLine(given, self._world, most=KEPT)
         text = FaultyLine(given, adapter=True, most=KEPT, began=self._world.now)
+        self._left += self.count - self._seen
         self._before = self._seen = self.count
         self._mount.course.line = line if len(given) else PerfectLine()
         self._mount.text(text if text.faults else None)
@@ -109,8 +110,11 @@ class Faulted:
         """How to have all of it again; "" when nothing happened."""
         if not self.count:
             return ""
+        latest = self.count - self._before
         how = f"faults: {self.count} happened"
-        if self._script.by_chance:
+        if self._before and latest:
+            how += f", {latest} of them by the latest script"
+        if self._script.by_chance and latest:
             how += f", by the seed {self._script.seed}; the same again: --faults '{self._script.line}'"
         return how
 

@@ -71,7 +71,7 @@ def test_what_is_rounded_is_half_a_count_and_not_more() -> None:
         guard.check_speed(speeds[2])
 
 
-@pytest.mark.parametrize("out", [2.4, -1.4])
+@pytest.mark.parametrize("out", [2.4, -1.4, 5.0, -5.0])
 def test_who_stands_outside_may_stay_there_but_for_the_noise_of_arithmetic(out: float) -> None:
     farther = 1 if out > 0 else -1
     for noise, fine in ((0.0, True), (0.8 * NOISE, True), (1.5 * NOISE, False), (1e-6, False)):

@@ -37,7 +37,7 @@ def places(draw: st.DrawFn, action: str) -> dict[str, Any]:
 
 
 @st.composite
-def arguments(draw: st.DrawFn, action: str, at_byte: bool) -> dict[str, Any]:
+def arguments(draw: st.DrawFn, action: str, at_byte: bool, timeless: bool = False) -> dict[str, Any]:
     """What stands behind the word."""
     takes = WORDS[action].takes
     if takes in BY_CHANCE:
@@ -51,7 +51,7 @@ def arguments(draw: st.DrawFn, action: str, at_byte: bool) -> dict[str, Any]:
     if takes is Takes.NOTHING:
         return {}
     found: dict[str, Any] = {"seconds": draw(SECONDS)}
-    if takes.name.startswith("PERHAPS") and draw(st.booleans()):
+    if takes.name.startswith("PERHAPS") and (timeless or draw(st.booleans())):
         return {}
     if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) and draw(st.booleans()):
         found["until"] = found["seconds"] * draw(st.floats(1.5, 10))
@@ -64,7 +64,9 @@ def arguments(draw: st.DrawFn, action: str, at_byte: bool) -> dict[str, Any]:
 def _fault(draw: st.DrawFn, actions: tuple[str, ...]) -> Fault:
     action = draw(st.sampled_from(actions))
     place = draw(places(action))
-    return Fault(action=action, **place, **draw(arguments(action, "byte" in place)))
+    at_byte = "byte" in place or place.get("per_byte", False)
+    timeless = action == "reorder" and (at_byte or place.get("adapter", False))
+    return Fault(action=action, **place, **draw(arguments(action, "byte" in place, timeless)))
 
 
 def faults(*actions: str) -> st.SearchStrategy[Fault]:

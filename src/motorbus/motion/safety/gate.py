@@ -153,9 +153,7 @@ class Gate:
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for goal in goals:
-            _, _, value, low, high, _ = goal
-            if low is None or high is None or not -inf < low <= value <= high < inf:
-                _check(goal)
+            _check(goal)
         if self.faults or self.lease is not None:
             self._check_standing(exchange, goals)
         if self.guards or self.attended:
@@ -163,7 +161,7 @@ class Gate:
             leaving: list[tuple[Guard, Goal]] = []
             for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
                 guard = self.guards.get(goal.node)
-                if guard is not None and guard.track is not None:
+                if guard is not None:
                     self._look(goal.node, guard)
                     if goal.quantity == "position" and guard.is_fine(goal.value, now):
                         continue
@@ -188,7 +186,7 @@ class Gate:
             heard = seen.get(node)
             if heard is not None and heard[1] is not guard.answer:
                 self._look(node, guard)
-            if not (-inf < low <= value <= high < inf and guard.is_fine(value, now)):
+            if not (low <= value <= high and guard.is_fine(value, now)):
                 return False
         return True
 
@@ -196,7 +194,7 @@ class Gate:
         """Whether it is known where each of these is, in one pass; else `look` finds out whom to ask."""
         guards, seen = self.guards, self._seen
         for goal in goals:
-            node = goal[0]
+            node = goal.node
             guard = guards.get(node)
             if guard is None or (track := guard.track) is None:
                 return False
@@ -370,13 +368,16 @@ def _check(goal: Goal) -> None:
         raise _refusal(
             goal, "its limits are not known", "read the device's limits first, for example by identify()"
         )
-    slack = ROUNDING * max(abs(goal.low), abs(goal.high), 1.0)
-    if not goal.low - slack <= goal.value <= goal.high + slack:
+    if not goal.low - _slack(goal.low) <= goal.value <= goal.high + _slack(goal.high):
         raise _refusal(
             goal,
             f"{goal.value:.6g} lies outside {goal.low:.6g} to {goal.high:.6g}",
             "stay inside the limits, or change the limit registers of the device",
         )
+
+
+def _slack(limit: float) -> float:
+    return ROUNDING * max(abs(limit), 1.0)
 
 
 def _refusal(goal: Goal, why: str, advice: str) -> LimitExceeded:

@@ -140,6 +140,8 @@ def _check_what(fault: Fault) -> None:
         raise RequestError(f"fault {fault}: impossible {fault.action}", expected=takes.value)
     if fault.until and (takes not in (Takes.SPAN, Takes.PERHAPS_SPAN) or fault.until <= fault.seconds):
         raise RequestError(f"fault {fault}: impossible span", expected="the lower one first, as 0.02-0.5")
+    if fault.action == "reorder" and fault.seconds and (fault.byte is not None or fault.per_byte):
+        raise RequestError(f"fault {fault}: bytes change places at once", expected="no seconds, or no byte")
     if takes is Takes.NODE and fault.node is None:
         raise RequestError(f"fault {fault.action} needs a device", expected=takes.value)
     if fault.adapter and fault.action not in ON_ADAPTER:
@@ -147,6 +149,8 @@ def _check_what(fault: Fault) -> None:
             f"fault {fault}: {fault.action} cannot be done to the text of an adapter",
             expected=f"one of {', '.join(ON_ADAPTER)}",
         )
+    if fault.adapter and fault.seconds:
+        raise RequestError(f"fault {fault}: the text of an adapter takes no time", expected="no seconds")
 
 
 ON_ADAPTER: Final = ("drop", "duplicate", "corrupt", "flip", "insert", "truncate", "reorder", "merge")

@@ -93,8 +93,10 @@ class FaultyLine:
             self._check(fault)
         if world is not None:
             world.forget()
+        equal: Counter[Fault] = Counter()
         for index, fault in enumerate(self.faults):
-            self._place(index, fault)
+            self._place(index, fault, twin=equal[fault])
+            equal[fault] += 1
 
     def __str__(self) -> str:
         return str(self.script)
@@ -142,10 +144,9 @@ class FaultyLine:
                 )
             self._world.check(fault)
 
-    def _place(self, index: int, fault: Fault) -> None:
+    def _place(self, index: int, fault: Fault, twin: int) -> None:
         if fault.percent:
             seed = self.script.seed or 0
-            twin = self.faults[:index].count(fault)
             self._ways[fault.to].luck.append(Luck(fault, seed, index=index, twin=twin))
         elif fault.moment is not None and fault.word.world and self._world is not None:
             self._timed.add(index)
@@ -156,7 +157,7 @@ class FaultyLine:
             self._waiting.setdefault(fault.exchange or 0, []).append((index, fault))
 
     def _in_time(self, index: int, fault: Fault, moment: float) -> None:
-        if self._world is not None:
+        if self._world is not None and not self._is_moot(fault, self._ways[fault.to], b""):
             self._timed.discard(index)
             self._note(fault, moment, fault.to, b"")
             self._happen(fault, moment)
@@ -165,18 +166,19 @@ class FaultyLine:
         found: list[Strike] = []
         waiting = self._waiting.get(self.exchange)
         if waiting:
-            found += self._scripted(waiting, to, way, size)
+            found += self._scripted(waiting, to, way, size, data)
         for luck in way.luck:
             for place in luck.strikes(size if luck.fault.per_byte else 1):
                 found += self._loose(luck.index, luck.fault, luck, place, way, data)
-        while way.moments and (
-            due := [one for one in way.moments if self._began + (one[1].moment or 0) <= at]
-        ):
-            way.moments.remove(due[0])
-            found += self._loose(*due[0], None, 0, way, data)
+        for one in tuple(way.moments):
+            if self._began + (one[1].moment or 0) <= at and not self._is_moot(one[1], way, data):
+                way.moments.remove(one)
+                found += self._loose(*one, None, 0, way, data)
         return sorted(found, key=lambda strike: strike[:2]) if len(found) > 1 else found
 
-    def _scripted(self, waiting: list[tuple[int, Fault]], to: Side, way: _Way, size: int) -> list[Strike]:
+    def _scripted(
+        self, waiting: list[tuple[int, Fault]], to: Side, way: _Way, size: int, data: Data
+    ) -> list[Strike]:
         """Those of this exchange that strike this packet; they wait no more."""
         found: list[Strike] = []
         for pair in tuple(waiting):
@@ -189,7 +191,7 @@ class FaultyLine:
             )
             if fault.action == "reorder" and place >= 0:
                 here = here and place + 1 < size
-            if fault.to is not to or not here:
+            if fault.to is not to or not here or self._is_moot(fault, way, data):
                 continue
             waiting.remove(pair)
             found.append(Strike(place, index, fault))
@@ -200,12 +202,23 @@ class FaultyLine:
     ) -> list[Strike]:
         """What chance or the clock has brought, by position."""
         random = luck.random if luck else chance(fault, self.script.seed or 0, index)
+        if self._is_moot(fault, way, data):
+            return []
         if not fault.per_byte:
             return [Strike(-1, index, fault.settled(self.exchange, way.packet, None, random))]
         size = len(data.data) if isinstance(data, CanFrame) else len(data)
         if (fault.action == "reorder" and place + 1 >= size) or _is_behind(fault, place, way.passed):
             return []
         return [Strike(place, index, fault.settled(self.exchange, way.packet, way.passed + place, random))]
+
+    def _is_moot(self, fault: Fault, way: _Way, data: Data) -> bool:
+        """Whether it would change nothing: then it does not happen, and what has a place stays pending."""
+        if fault.word.world:
+            # its id may be another one by now
+            return fault.node is not None and self._world is not None and fault.node not in self._world.nodes
+        if fault.action == "split" and fault.byte is None and not fault.per_byte:
+            return isinstance(data, CanFrame) or len(data) < 2
+        return way.lost and fault.action not in ("echo", "stall")
 
     def _somewhere(self, strike: Strike, way: _Way, passed: int, size: int) -> list[Strike]:
         """At a byte by chance, for what needs one."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import floor, log, log1p
 from random import Random
+from typing import Final
 
 from motorbus.simulation.faults.fault import Fault
 
@@ -15,6 +16,10 @@ from motorbus.simulation.faults.fault import Fault
 def chance(fault: Fault, seed: int, twin: int = 0) -> Random:
     """What decides what a fault leaves open: another stream for each fault, and for the `twin`th of equal ones."""
     return Random(f"{seed} {fault} {twin}")
+
+
+_LEAST: Final = 1e-300
+"""A chance below this is never: what passes until then would be more than a number can say."""
 
 
 class Luck:
@@ -27,7 +32,7 @@ class Luck:
         self.fault = fault
         self.index = index
         self.random = chance(fault, seed, twin)
-        self._chance = fault.percent / 100
+        self._chance = max(fault.percent / 100, _LEAST)
         self._left = self._gap()
 
     def strikes(self, size: int) -> list[int]:

@@ -25,6 +25,8 @@ from motorbus.simulation.faults.words import WORDS, Takes
 EXAMPLES: Final = (
     "for example `exchange 17 byte 3: drop`, `1% of bytes: corrupt` or `at 2.5 s: power-cycle 3`"
 )
+LONGEST: Final = 80
+"""Characters of what is wrong that are said again."""
 _KEYS: Final = ("seed", "exchange", "packet", "byte", "bytes", "host", "device", "adapter", "all")
 _WHERE: Final = re.compile(
     r"(?:at\s+)?(?:exchange\s+(?P<exchange>\d+)(?:\s+(?:byte\s+(?P<byte>\d+)|packet\s+(?P<packet>\d+)))?"
@@ -92,8 +94,13 @@ def script_of(script: Script | str | Iterable[Fault]) -> Script:
 
 def _one_seed(before: int | None, said: str, count: int) -> int:
     if before is not None:
-        raise RequestError(f"line {count}: {said!r}: the seed is {before} already", expected="one seed")
-    return int(said.split()[1])
+        raise RequestError(
+            f"line {count}: {short(said)!r}: the seed is {before} already", expected="one seed"
+        )
+    try:
+        return _whole(said.split()[1])
+    except RequestError as error:
+        raise RequestError(f"line {count}: {error.summary}") from None
 
 
 def _fault(said: str, count: int) -> Fault:
@@ -108,12 +115,14 @@ def _fault(said: str, count: int) -> Fault:
         return _made(match, words)
     except RequestError as error:
         raise RequestError(
-            f"line {count}: {said!r} is not a fault: {error.summary}", expected=error.expected
+            f"line {count}: {short(said)!r} is not a fault: {error.summary}", expected=error.expected
         ) from None
 
 
 def _made(match: re.Match[str], words: list[str]) -> Fault:
-    place: dict[str, Any] = {name: int(match[name]) for name in ("exchange", "byte", "packet") if match[name]}
+    place: dict[str, Any] = {
+        name: _whole(match[name]) for name in ("exchange", "byte", "packet") if match[name]
+    }
     place |= {name: _float(match[name]) for name in ("percent", "moment") if match[name]}
     if match["percent"] and not place["percent"]:
         raise RequestError("impossible chance", expected="more than 0 and at most 100 %")
@@ -136,26 +145,48 @@ def _arguments(action: str, said: list[str], *, loose: bool) -> dict[str, Any]:
     try:
         return _values(takes, said)
     except ValueError:
-        raise RequestError(f"impossible {' '.join(said)!r}", expected=takes.value) from None
+        raise RequestError(f"impossible {short(' '.join(said))!r}", expected=takes.value) from None
 
 
 def _values(takes: Takes, said: list[str]) -> dict[str, Any]:
     if not said:
         return {}
     if takes in (Takes.BITS, Takes.BYTE):
-        return {"value": int(said[0], 16)}
+        return {"value": _positive(int(said[0], 16))}
     if takes in (Takes.BIT, Takes.PERHAPS_COUNT):
-        return {"value": int(said[0])}
+        return {"value": _positive(int(said[0]))}
     if takes in (Takes.NODE, Takes.NODES):
         every = takes is Takes.NODES and said[0] == "all"
-        return {"node": None if every else int(said[0], 0)}
+        return {"node": None if every else _node(said[0])}
     if takes is Takes.SECONDS_NODE:
         whom = said[1] if len(said) > 1 else "all"
-        return {"seconds": float(said[0]), "node": None if whom == "all" else int(whom, 0)}
+        return {"seconds": float(said[0]), "node": None if whom == "all" else _node(whom)}
     span = _SPAN.fullmatch(said[0]) if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) else None
     if span:
         return {"seconds": float(span["low"]), "until": float(span["high"])}
     return {"seconds": float(said[0])}
+
+
+def _node(text: str) -> int:
+    """An id, in decimal or as 0x25. Which ones there are is not known here."""
+    value = int(text, 0)
+    if value.bit_length() > 32:
+        raise ValueError(value.bit_length())
+    return value
+
+
+def _positive(value: int) -> int:
+    """What is below 0 means something else in a `Fault`, and nothing in a script."""
+    if value < 0:
+        raise ValueError(value)
+    return value
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:  # more digits than Python turns into a number
+        raise RequestError(f"{short(text)} is no number that can be reached") from None
 
 
 def _float(text: str) -> float:
@@ -172,7 +203,7 @@ def _nonsense(said: str, count: int) -> RequestError:
     ]
     near = [match for word in unknown for match in _near(word, [*_KEYS, *WORDS], 1)]
     return RequestError(
-        f"line {count}: {said!r} is not a fault",
+        f"line {count}: {short(said)!r} is not a fault",
         expected=EXAMPLES,
         cause=f"perhaps {' and '.join(f'`{word}`' for word in near)} was meant" if near else "",
     )
@@ -181,9 +212,14 @@ def _nonsense(said: str, count: int) -> RequestError:
 def _unknown(word: str, said: str, count: int) -> RequestError:
     near = _near(word, WORDS, 3)
     return RequestError(
-        f"line {count}: {said!r} is not a fault: there is no {word!r}",
+        f"line {count}: {short(said)!r} is not a fault: there is no {short(word)!r}",
         expected=f"perhaps {' or '.join(near)}" if near else f"one of {', '.join(WORDS)}",
     )
+
+
+def short(text: str) -> str:
+    """As much of it as a reader needs to find it."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 
 
 def _near(word: str, known: Iterable[str], most: int) -> list[str]:

@@ -40,7 +40,15 @@ from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.overload import Recovery, recover_overload
 from motorbus.families.feetech.driver.rates import set_baud
 from motorbus.families.feetech.driver.recovery import recover
-from motorbus.families.feetech.driver.registers import action, action_all, read, read_raw, reg_write, write
+from motorbus.families.feetech.driver.registers import (
+    action,
+    action_all,
+    read,
+    read_raw,
+    reg_write,
+    rewrite,
+    write,
+)
 from motorbus.families.feetech.driver.renaming import set_id
 from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
@@ -122,6 +130,7 @@ __all__ = [
     "reg_write_all",
     "scan",
     "second_id",
+    "rewrite",
     "set_baud",
     "set_current",
     "set_duty",

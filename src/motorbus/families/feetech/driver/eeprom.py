@@ -11,6 +11,8 @@ afterwards. So one that waits is replaced by one that moves nothing: torque off.
 An open lock makes every later write permanent without anybody noticing, so whatever happens in between (an error,
 Ctrl-C, a cancelled task) the last thing this sequence says is "lock". The lock decides whether a write survives,
 not whether it is taken; and flash takes time, so these exchanges may take Timeout.STORE.
+
+Cells wear, so what they hold already is not written again (`store`).
 Source: STS3215 memory table V3.6; measured on hardware by feetech-cli (what the lock does) and by public recovery
 tools (an acknowledgement may take more than 21 ms).
 """
@@ -18,9 +20,9 @@ tools (an acknowledgement may take more than 21 ms).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Table
+from motorbus.core.entry import Entry, Storage, Table
 from motorbus.core.goal import Later
 from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
 from motorbus.errors import OutcomeUnknown
@@ -46,18 +48,76 @@ _OPEN: Final = b"\0"
 _IDLE: Final = b"\0"
 
 
-def store(node: Node, table: Table, blocks: Sequence[Block]) -> Operation[None]:
-    """Write these blocks of EEPROM registers for good, with nobody else on the bus meanwhile."""
+class Change(NamedTuple):
+    """Adjoining EEPROM registers that do not hold yet what they shall, and what they hold."""
 
+    block: Block
+    before: bytes
+
+
+def store(node: Node, table: Table, blocks: Sequence[Block], *, always: bool = False) -> Operation[bool]:
+    """Make these EEPROM registers hold this for good, with nobody else on the bus meanwhile; gives whether it wrote.
+
+    They are read first, and only those are written that hold something else; when none does, there is no unlock and no
+    torque off either, and the lock is merely seen closed (and closed, if others have left it open).
+
+    What reads back need not be what is kept: a write with the lock closed is obeyed and gone at power-off, and no
+    register tells the two apart. So what this node wrote in a sequence that did not come to its end is written whatever
+    it reads; what other programs wrote behind a closed lock cannot be known, and `always` is for whoever suspects that.
+    """
+    return (yield from Alone(_stored_unlike(node, table, blocks, always)))
+
+
+def _stored_unlike(node: Node, table: Table, blocks: Sequence[Block], always: bool) -> Operation[bool]:
     lock = table["lock"].address
+    changes: list[Change] = []
+    for block in blocks:
+        changes += yield from _unlike(node, table, block, always)
+    if not changes:
+        if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) == _OPEN:
+            yield from _locked(node, lock, (), ())
+        return False
+    begun: list[Change] = []
 
     def write() -> Operation[None]:
-        for block in blocks:
-            if moves(table, block):
+        for change in changes:
+            if moves(table, change.block):
                 yield from still_open(node, lock)
-            yield from stored(node, block._replace(effect=Effect.PERSISTENT))  # it is limp: nothing can move
+            begun.append(change)
+            yield from stored(
+                node, change.block._replace(effect=Effect.PERSISTENT)
+            )  # it is limp: nothing can move
 
-    yield from unlocked(node, table, write)
+    yield from _guarded(node, table, write, begun)
+    return True
+
+
+def _unlike(node: Node, table: Table, block: Block, always: bool) -> Operation[list[Change]]:
+    """The runs of whole registers in this block that are to be written; RAM, which wears nothing, as it is given."""
+    rows = sorted(rows_in(table, block), key=lambda row: row.address)
+    if not any(row.storage is Storage.EEPROM for row in rows):
+        return [Change(block, b"")]
+    found = yield from read_block(node, block.address, len(block.data), bytes, timeout=Timeout.STORE)
+    if always:
+        return [Change(block, found)]
+    runs: list[range] = []
+    for row in rows:
+        at = range(row.address - block.address, row.address - block.address + row.size)
+        cells = slice(at.start, at.stop)
+        if block.data[cells] == found[cells] and node.unsure.isdisjoint(
+            range(row.address, row.address + row.size)
+        ):
+            continue
+        if runs and runs[-1].stop == at.start:
+            at = range(runs.pop().start, at.stop)
+        runs.append(at)
+    return [
+        Change(
+            block._replace(address=block.address + at.start, data=block.data[at.start : at.stop]),
+            found[at.start : at.stop],
+        )
+        for at in runs
+    ]
 
 
 def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> Operation[T]:
@@ -65,27 +125,35 @@ def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> Oper
 
     Its settings are forgotten before anybody else has the bus again, so what others made by them meanwhile is refused.
     """
+    return (yield from Alone(_guarded(node, table, work, ())))
+
+
+def _guarded(
+    node: Node, table: Table, work: Callable[[], Operation[T]], begun: Sequence[Change]
+) -> Operation[T]:
     lock, pending = table["lock"].address, table["reg_write_pending"].address
-    return (yield from Alone(_alone(node, lock, pending, work)))
-
-
-def _alone(node: Node, lock: int, pending: int, work: Callable[[], Operation[T]]) -> Operation[T]:
     trouble: list[BaseException] = []
+    doubted, node.unsure = node.unsure, set()
     try:
-        return (
-            yield from afterwards(
-                _opened(node, lock, pending, work, trouble), lambda: _locked(node, lock, trouble)
-            )
+        done = yield from afterwards(
+            _opened(node, lock, pending, work, trouble), lambda: _locked(node, lock, trouble, begun)
         )
+        doubted, node.unsure = doubted - node.unsure, set()
+        return done
     finally:
+        node.unsure |= doubted
         node.forget_settings()
+
+
+def rows_in(table: Table, block: Block) -> list[Entry]:
+    """The rows that begin in this block."""
+    end = block.address + len(block.data)
+    return [row for row in table.values() if block.address <= row.address < end]
 
 
 def moves(table: Table, block: Block) -> bool:
     """Whether one of the registers of this block would move a servo that has torque, which goes back inside limits."""
-    end = block.address + len(block.data)
-    rows = [row for row in table.values() if block.address <= row.address < end]
-    return any(row.effect is Effect.MOTION or row.name in _LIMITS for row in rows)
+    return any(row.effect is Effect.MOTION or row.name in _LIMITS for row in rows_in(table, block))
 
 
 def _opened(
@@ -131,6 +199,9 @@ def still_open(node: Node, lock: int) -> Operation[None]:
 
 def stored(node: Node, block: Block) -> Operation[None]:
     """Write one block while the lock is open (see `unlocked`), and read it back."""
+    node.unsure.update(
+        range(block.address, block.address + len(block.data))
+    )  # until the lock was seen to the end
     yield from _put(node, block)
     if block.address <= _STATUS_RETURN_LEVEL < block.address + len(block.data):
         node.forget_settings()  # from now on it may acknowledge differently
@@ -141,11 +212,14 @@ def _put(node: Node, block: Block) -> Operation[None]:
     yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
-def _locked(node: Node, lock: int, trouble: Sequence[BaseException]) -> Operation[None]:
+def _locked(
+    node: Node, lock: int, trouble: Sequence[BaseException], begun: Sequence[Change]
+) -> Operation[None]:
     """Close the lock and see that it is closed. When something has gone wrong already, that is what is raised, and
-    a lock that cannot be closed is told with it; whoever may have restarted with torque on is let go before."""
-    if trouble:
-        yield from outcome(disable_torque(node))
+    a lock that cannot be closed is told with it; whoever may have restarted with torque on is let go before, and what
+    it took behind a lock that closed by itself is taken back."""
+    if trouble and (yield from outcome(disable_torque(node))) is None and begun:
+        yield from outcome(_taken_back(node, lock, begun))
     for _ in range(_ATTEMPTS):
         failure = yield from outcome(_closed(node, lock))
         if failure is None:
@@ -157,6 +231,15 @@ def _locked(node: Node, lock: int, trouble: Sequence[BaseException]) -> Operatio
         f"the EEPROM lock of node {node.node} may still be open, which makes later writes permanent: "
         f"write(lock=1) closes it ({failure.summary})"
     )
+
+
+def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> Operation[None]:
+    """Where the lock has closed by itself, registers that hold for now what they do not keep become what they were:
+    or whoever applies the same again, another program as well, would find it there and write nothing."""
+    if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) == _OPEN:
+        return
+    for change in reversed([one for one in begun if one.before]):
+        yield from _put(node, change.block._replace(data=change.before, effect=Effect.PERSISTENT))
 
 
 def _closed(node: Node, lock: int) -> Operation[None]:

@@ -20,6 +20,7 @@ from motorbus.families.feetech.driver.identity import prepare, writable
 from motorbus.families.feetech.driver.motion import ordered
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.rest import at_rest, unknown_mode, unpublished_duty
+from motorbus.families.feetech.driver.torque import disable_torque
 from motorbus.families.feetech.table import Mode
 
 
@@ -36,7 +37,8 @@ def mode(node: Node) -> Operation[Mode]:
 
 
 def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> Operation[None]:
-    """Put the servo into a mode, for good; it is limp afterwards, and `enable_torque` begins at rest.
+    """Put the servo into a mode, for good; it is limp afterwards, and `enable_torque` begins at rest. The mode that it
+    has already is not written again.
 
     Every map has position and PWM mode; STS and SMBL have velocity and step mode too, SMCL velocity mode, HLS velocity
     and current mode. On SCS PWM mode is both limits 0, and position mode needs `limits` in rad, unless it was this
@@ -56,7 +58,8 @@ def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None
         if node.control.modes
         else _by_limits(node, table, wanted, limits)
     )
-    yield from eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks))
+    if not (yield from eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks))):
+        yield from disable_torque(node)
     yield from prepare(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
         yield from ordered(node, table, at_rest(node, table, wanted))

@@ -101,7 +101,8 @@ class Node:
     `pending` the goals that wait in it for an ACTION, None when none from here do. `bound` is the raw bound of the
     current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
     those (rad) that were given up to make a motor of it, where limits decide about that. `questions` are packets that
-    were made to read it, with the reply due, by address and count.
+    were made to read it, with the reply due, by address and count. `unsure` are the EEPROM cells that were written and
+    may not be kept: what came in between may have closed the lock, behind which a write is obeyed and soon gone.
     """
 
     def __init__(self, node: int) -> None:
@@ -114,6 +115,7 @@ class Node:
         self.pending: Pending | None = None
         self.bound: int | None = None
         self.former_limits: tuple[float, float] | None = None
+        self.unsure: set[int] = set()
         self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Due, ...]]]] = {}
 
     @property

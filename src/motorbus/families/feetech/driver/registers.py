@@ -112,20 +112,37 @@ def _end(row: Entry) -> int:
 def write(node: Node, /, **values: Value) -> Operation[None]:
     """Write registers by name, in API units; all are checked before the first is sent.
 
-    Registers in EEPROM go through the guarded sequence: unlock, torque off (the servo goes limp and stays so),
-    write, read back, lock. What changes the meaning of a goal (`control_loop` of HLS) lets it go limp as well. Raises
-    RequestError for what cannot or must not be written so, and for goals together with EEPROM; DeviceError when the
-    register map is not known, VerificationFailed when EEPROM reads back different.
+    Registers in EEPROM are read first, and what differs goes through the guarded sequence: unlock, torque off (the
+    servo goes limp and stays so), write, read back, lock. When all of them hold that already, none is written and it
+    keeps its torque, unless registers that act on the torque are named with them. That others wrote them behind a
+    closed lock, so that they are gone at power-off, cannot be seen: `rewrite` is for that. What changes the meaning of
+    a goal (`control_loop` of HLS) lets it go limp as well. Raises RequestError for what cannot or must not be written
+    so, and for goals together with EEPROM; DeviceError when the register map is not known, VerificationFailed when
+    EEPROM reads back different.
     """
+    yield from _written(node, values, always=False)
+
+
+def rewrite(node: Node, /, **values: Value) -> Operation[None]:
+    """As `write`, and registers in EEPROM are written for good whatever they read: one more write to each cell.
+
+    For settings that another program may have made with the lock closed: they read as set, and are gone at power-off.
+    """
+    yield from _written(node, values, always=True)
+
+
+def _written(node: Node, values: Mapping[str, Value], *, always: bool) -> Operation[None]:
     check_values(values)
     table = yield from writable(node)
     orders = orders_of(node, table, values)
     _refuse_goals_among_settings(node, orders)
     kept = list(blocks(node, [order for order in orders if order.row.storage is Storage.EEPROM]))
-    if kept:
-        yield from eeprom.store(node, table, _kept(node, table, orders, kept))
     live = [order for order in orders if order.row.storage is not Storage.EEPROM]
-    if any(limps(order.row) for order in live):
+    limp = any(limps(order.row) for order in live)
+    if kept:
+        wrote = yield from eeprom.store(node, table, _kept(node, table, orders, kept), always=always)
+        limp |= not wrote and any(order.row.effect is Effect.TORQUE for order in live)
+    if limp:
         yield from disable_torque(node)
         yield from _confirmed_limp(node, [order for order in live if limps(order.row)])
     made = None if kept else node.settings

@@ -40,6 +40,7 @@ class ServoVerbs(Node):
     read = verb(registers.read)
     read_raw = verb(registers.read_raw)
     write = verb(registers.write)
+    rewrite = verb(registers.rewrite)
     reg_write = verb(registers.reg_write)
     action = verb(registers.action)
     position = verb(feedback.position)
