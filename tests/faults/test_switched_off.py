@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.conftest import Figures
+from tests.conftest import Figures, Rounds
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -23,7 +23,9 @@ OTHERS = ("tests/families/stepper/test_faults.py", "tests/families/stepper/test_
 
 @pytest.mark.faultless("this is where it is judged")
 @pytest.mark.timeout(600)
-def test_no_test_of_a_fault_passes_without_its_fault(tmp_path: Path, figures: Figures) -> None:
+def test_no_test_of_a_fault_passes_without_its_fault(
+    tmp_path: Path, rounds: Rounds, figures: Figures
+) -> None:
     report = tmp_path / "report.xml"
     flags = ("--faults-off", "-q", "-m", "not faultless", "-p", "no:cacheprovider", f"--junit-xml={report}")
     done = subprocess.run(
@@ -40,4 +42,10 @@ def test_no_test_of_a_fault_passes_without_its_fault(tmp_path: Path, figures: Fi
     ]
     assert passed == []
     assert len(cases) > 50
-    figures("tests of faults that pass with their fault switched off", promise=7, tests=len(cases), passed=0)
+    assert rounds(len(cases)) <= len(cases)  # asks how often, and so is among the long runs too
+    figures(
+        "tests of faults that pass with their fault switched off",
+        promise=7,
+        tests=len(cases),
+        passed=len(passed),
+    )

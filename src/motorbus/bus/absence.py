@@ -8,11 +8,12 @@ nothing older is believed, for whatever is behind it may have started anew (deci
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motorbus.bus import verdict
 from motorbus.bus.pace import Pace
-from motorbus.errors import LinkError, LinkLost
+from motorbus.bus.ticket import Retune, Ticket
+from motorbus.errors import LinkError, LinkLost, MotorbusError
 from motorbus.link.base import Renewable
 
 if TYPE_CHECKING:
@@ -23,12 +24,17 @@ class Absence:
     """What the turns of a bus know of a link that is opened anew when it was lost.
 
     `renewal` is that link, None where a loss is the end; `gone` is why it has to be opened anew, None while it is
-    there; `losses` counts how often it was lost; `anew` are told, with the lock held, that it is there again.
+    there; `losses` counts how often it was lost; `anew` are told, with the lock held, that it is there again. `untuned`:
+    its rate was changed while it was gone, as a scan does that ends at the rate at which it began.
     """
 
+    rate: int
+    listening: bool
+    listen_only: bool
     renewal: Renewable | None = None
     gone: LinkLost | None = None
     losses = 0
+    untuned = False
     anew: tuple[Callable[[], None], ...] = ()
 
     def _was_gone(self, error: LinkError) -> bool:
@@ -38,6 +44,16 @@ class Absence:
             self.gone = verdict.sought(error)
             self.losses += not before
         return before
+
+    def _fate(self, ticket: Ticket, away: bool, error: LinkError) -> tuple[Any, LinkError | None]:
+        """What becomes of a ticket that waits when the link is lost, or is `away`: all but a change of rate fail."""
+        if not (away and isinstance(ticket, Retune)):
+            return None, error
+        before, tune = self.rate, ticket.tune
+        if tune.rate:
+            self.rate, self.listening = tune.rate, tune.listen_only or self.listen_only
+            self.untuned = True
+        return before, None
 
 
 def back(turns: Turns) -> bool:
@@ -85,3 +101,16 @@ def _renewed(turns: Turns, link: Renewable) -> None:
     turns.gone = None
     for tell in turns.anew:
         tell()
+    if turns.untuned:
+        _tune(turns, link)
+
+
+def _tune(turns: Turns, link: Renewable) -> None:
+    """It was opened as it was when it was lost; here it is set to what was asked for since."""
+    turns.untuned = False
+    try:
+        link.tune(turns.rate, turns.listening)
+    except MotorbusError as error:
+        turns.rate = link.rate
+        if isinstance(error, LinkError):
+            turns.lost(error)

@@ -11,7 +11,7 @@ from typing import Any
 from motorbus.bus.absence import back, rest
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import Turns
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import LinkError, LinkLost, MotorbusError
 from motorbus.link.base import Link
 
 IDLE = 0.25  # s; the longest wait when nothing is awaited from the wire
@@ -97,10 +97,16 @@ def flush(link: Link, turns: Turns) -> float:
 
 def retune(link: Link, turns: Turns, ticket: Retune) -> None:
     """Change the rate, or begin or cease to listen only; a link that cannot is no reason to give up anything else."""
+    if turns.gone is not None:
+        turns.untuned = True
+        turns.retuned(ticket)
+        return
     try:
         link.tune(ticket.tune.rate, ticket.tune.listen_only or turns.listen_only)
     except MotorbusError as error:
         turns.retuned(ticket, error)
+        if isinstance(error, LinkLost):
+            turns.lost(error)
     else:
         turns.retuned(ticket)
 

@@ -397,4 +397,4 @@ class Turns(Absence, Air):
         self._flying.clear()
         self._claims.waiting.clear()
         for ticket in waiting:
-            self._settle(ticket, error=error)
+            self._settle(ticket, *self._fate(ticket, was_gone, error))

@@ -152,7 +152,7 @@ def outlived(exchange: Exchange[Any] | None = None) -> LinkLost:
     """The error for an order of what began before the link was lost."""
     return LinkLost(
         "the port was gone since this was begun, so it moves nothing any more",
-        sent=None if exchange is None else exchange.request,
+        sent=b"" if exchange is None else exchange.request,
         cause="what was to be done may no longer be right: nobody knows what happened meanwhile",
         advice="begin it anew if it is still wanted; nothing of this was sent",
     )

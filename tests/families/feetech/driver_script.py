@@ -136,6 +136,7 @@ class Played:
             self.events.append(step.event)
         elif isinstance(step, Pause):
             self.now += step.seconds
+            return self.now
         else:
             raise AssertionError(f"unexpected step {step!r}")
         return None

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.goal import torque_on
-from motorbus.core.operation import Effect, Operation, outcome
+from motorbus.core.operation import Effect, Operation, Pause, outcome
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -61,6 +61,13 @@ class Promise(Enum):
 
 
 ON: Final = Block(TORQUE_ENABLE, b"\1", Effect.TORQUE)
+OLD: Final = 0.1
+"""s from the reading of a position to the goal that is made of it. Nothing but the host lies between: milliseconds, a
+few of ten on a machine that is busy. Within it a servo at 50 turns/min, as fast as an STS3215 is without load, comes
+half a radian far; within the half second that the safety of motion bears, two and a half."""
+SLEPT: Final = 0.5
+"""s for question, reply, order and acknowledgement together. More than any line takes that is not retried, remote ones
+included; what takes longer may be a host that slept before the reply was read, or before the order left."""
 _TRIES: Final = 3
 _AT_REST: Final = {
     Mode.VELOCITY: Promise.ZERO_VELOCITY_ACCEPTED,
@@ -136,14 +143,27 @@ def stop(node: Node) -> Operation[Promise]:
 
 
 def _stay(node: Node, table: Table) -> Operation[Promise]:
-    """Goal := here, unless that could set a limp servo into motion."""
-    here = yield from outcome(held(node, table))
-    doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
-    if doubtful and (yield from is_limp(node)):
-        return Promise.LIMP
-    if isinstance(here, MotorbusError):
-        raise here
-    yield from ordered(node, table, here)
+    """Goal := here, unless that could set a limp servo into motion.
+
+    A host that sleeps between the reading and the goal would send it back to where it was. So a reading that is too old
+    is taken anew before it is sent, and what turns out to have slept on its way is said again from where it is then;
+    three times at most, for a stop is sent whatever happens.
+    """
+    for again in reversed(range(_TRIES)):
+        asked = yield from Pause(0.0)
+        here = yield from outcome(held(node, table))
+        told = node.at
+        doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
+        if doubtful and (yield from is_limp(node)):
+            return Promise.LIMP
+        if isinstance(here, MotorbusError):
+            raise here
+        waited = (yield from Pause(0.0)) - told
+        if again and (waited > OLD or told - asked > SLEPT):
+            continue
+        yield from ordered(node, table, here)
+        if (yield from Pause(0.0)) - asked <= SLEPT:
+            break
     yield from not_turns_away(node, table, here)
     return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
 
