@@ -9,7 +9,7 @@
     python -m scripts.mutants --write | --check      the page of what is kept: make it, or see that it is current
 
 The exit code is 1 when a fault survives that mutants.toml has no reason for, when fewer than 95 % of a module are
-noticed, or when a reason is for none. A new import for every fault (`--anew`) is slower and must give the same.
+noticed, or when a reason is for none. `--anew` imports the module anew for every fault, which is slower.
 """
 
 from __future__ import annotations

@@ -24,6 +24,8 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     file.write_text("seed 3\nexchange 1: explode\n")
     with pytest.raises(RequestError, match="^line 2: "):
         script_of(str(file))
+    file.write_bytes(b"\xef\xbb\xbfexchange 1: drop\r\n")  # as some editors write it
+    assert script_of(str(file)) == parse("exchange 1: drop")
     long = "; ".join(f"exchange {number}: drop" for number in range(1000))
     assert len(script_of(long)) == 1000
     with pytest.raises(RequestError, match="neither a file nor a script"):

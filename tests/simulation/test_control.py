@@ -227,6 +227,7 @@ def test_an_endless_line_is_hung_up_on(path: Path) -> None:
     with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
         client.sendall(b"x" * (LONGEST_LINE + 1))
         pumped(control)
+        assert client.recv(200) == b"error: an order has at most 65536 bytes\n"
         assert len(control.descriptors()) == 1
 
 

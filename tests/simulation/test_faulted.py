@@ -223,3 +223,20 @@ def test_a_terminal_without_a_name_cannot_be_pulled() -> None:
         assert "nobody would find" in CanClient(terminal, SlcanAdapter()).fixed
         with pytest.raises(RequestError, match=r"(?s)no port.*symbolic link"):
             Hall(terminal).faulted.set("exchange 1: unplug 1")
+
+
+def test_how_to_have_it_again_is_that_of_the_latest_script() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        hall.faulted.set("exchange 1: duplicate")
+        with reached(hall, listener) as client:
+            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
+        hall.faulted.set("seed 5; 100%: duplicate")
+        assert hall.faulted.replay() == "faults: 1 happened"
+        assert hall.faulted.remarks(0.0) + hall.faulted.rest() == ["… and 1 more faults"]
+        with reached(hall, listener) as client:
+            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
+        assert hall.faulted.replay() == (
+            "faults: 2 happened, 1 of them by the latest script, by the seed 5; the same again:"
+            " --faults 'seed 5; 100%: duplicate'"
+        )

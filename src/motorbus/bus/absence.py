@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from motorbus.bus import verdict
+from motorbus.bus.known import Known
 from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Retune, Ticket
 from motorbus.errors import LinkError, LinkLost, MotorbusError
@@ -24,11 +25,12 @@ class Absence:
     """What the turns of a bus know of a link that is opened anew when it was lost.
 
     `renewal` is that link, None where a loss is the end; `gone` is why it has to be opened anew, None while it is
-    there; `losses` counts how often it was lost; `anew` are told, with the lock held, that it is there again. `untuned`:
-    its rate was changed while it was gone, as a scan does that ends at the rate at which it began.
+    there; `losses` counts how often it was lost; `anew` are told, with the lock held, that it is there again.
+    `untuned`: its rate was changed while it was gone, as a scan does that ends at the rate at which it began.
     """
 
     rate: int
+    known: Known
     listening: bool
     listen_only: bool
     renewal: Renewable | None = None
@@ -43,6 +45,7 @@ class Absence:
         if self.renewal is not None and isinstance(error, LinkLost):
             self.gone = verdict.sought(error)
             self.losses += not before
+            self.known.forget()  # a stop must not hold anybody where it was before
         return before
 
     def _fate(self, ticket: Ticket, away: bool, error: LinkError) -> tuple[Any, LinkError | None]:

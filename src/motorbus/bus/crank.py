@@ -84,6 +84,8 @@ def flush(link: Link, turns: Turns) -> float:
         for chore in tuple(turns.chores):
             chore()
     now = link.now()
+    if turns.gone is not None:  # or is there, and whoever opened it has not yet said what is forgotten
+        return now
     if turns.waiting:
         drain(link, turns, now)
     while (out := turns.send(now)) is not None:

@@ -195,10 +195,10 @@ class Run(Generic[T]):
         if self.now() >= self.deadline:
             ticket.finish(error=verdict.cancelled())
             return
-        if self.losses != self.turns.losses and isinstance(ticket, Flight) and moves(ticket.exchange):
-            ticket.finish(error=verdict.outlived(ticket.exchange))
-            return
-        with self.turns.lock:
+        with self.turns.lock:  # or another thread may lose the port, and find it, between these lines
+            if self.losses != self.turns.losses and isinstance(ticket, Flight) and moves(ticket.exchange):
+                ticket.finish(error=verdict.outlived(ticket.exchange))
+                return
             self.turns.submit(ticket, self.now())
 
     def _notify(self, branch: Branch, event: object) -> None:

@@ -29,9 +29,11 @@ class Watch:
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Watch the link on this loop; does nothing when it is watched, or is gone and not there again."""
         losses = self.turns.losses
-        if (self._loop is loop and self._losses == losses) or not back(self.turns):
+        if self._loop is loop and self._losses == losses:
             return
-        self.close()  # the loop before this one is gone, or the port
+        self.close()  # the loop before this one is gone, or the port: its number may soon be that of another file
+        if not back(self.turns):
+            return
         self._loop, self._losses = loop, losses
         self._watched = descriptor = self.link.fileno()
         if descriptor is not None:
@@ -42,8 +44,7 @@ class Watch:
 
     def crank(self) -> None:
         """Everything that can be done without waiting; then be back when something is due."""
-        if self.turns.gone is not None and not back(self.turns):
-            self.close()
+        if self.turns.gone is not None and not self._found_again():
             with self.turns.lock:
                 self.turns.expire(self.link.now())
             return
@@ -56,6 +57,15 @@ class Watch:
         due = self.turns.due()
         if self._loop is not None and due < inf:
             self._timer = self._loop.call_later(max(0.0, due - self.link.now()), self.crank)
+
+    def _found_again(self) -> bool:
+        loop = self._loop
+        self.close()  # while the number is still ours
+        if not back(self.turns):
+            return False
+        if loop is not None:
+            self.start(loop)
+        return True
 
     def _read(self, losses: int) -> None:
         while self._watches(losses) and take_in(self.link, self.turns, self.link.now() + LOOK):

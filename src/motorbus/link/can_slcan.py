@@ -23,7 +23,7 @@ from motorbus.link.can_port import Descriptor, Port, SerialObject
 from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.can_wire import TextWire, build, quietly
 from motorbus.link.identity import PSEUDO_TERMINALS
-from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
+from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY, give_up_soon
 
 LISTENING: Final = 0.015
 """s in which an adapter that answers at all has begun to."""
@@ -180,6 +180,9 @@ def open_slcan(config: CanConfig, back_end: Any) -> tuple[SlcanWire, float, tupl
     settings = {"sleep_after_open": 0, **config.settings, "timeout": 0}
     settings.pop("timing", None)
     bus = build(Unspoken, config.channel, settings)
+    connection = getattr(bus.serialPortOrig, "_socket", None)
+    if isinstance(connection, socket.socket):
+        give_up_soon(connection)
     latency, warnings, listening = timing(str(config.channel), settings)
     port = (
         Descriptor(bus.fileno())

@@ -18,7 +18,7 @@ from motorbus.link.can_config import CanConfig
 from motorbus.link.can_port import Descriptor, Port, SocketObject
 from motorbus.link.can_text import SocketcandReader, socketcand_element
 from motorbus.link.can_wire import TextWire, build, quietly
-from motorbus.link.tcp import CONNECT_TIME, LOOPBACK_LATENCY, NETWORK_LATENCY
+from motorbus.link.tcp import CONNECT_TIME, LOOPBACK_LATENCY, NETWORK_LATENCY, give_up_soon
 
 GREETING: Final = b"< hi >"
 ANSWER_TIME: Final = 2.0
@@ -45,6 +45,7 @@ def open_socketcand(config: CanConfig, back_end: Any) -> tuple[TextWire, float]:
 
     bus = build(Patient, config.channel, settings)
     connection: socket.socket = getattr(bus, _SOCKET)
+    give_up_soon(connection)
     near = connection.getpeername()[0].startswith("127.")
     port: Port = SocketObject(connection) if os.name == "nt" else Descriptor(connection.fileno())
     wire = TextWire(

@@ -28,7 +28,7 @@ from motorbus.link.identity import PSEUDO_TERMINALS
 from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, forbidden, full, lost, not_found, wrong_rate
 from motorbus.link.speed import line_speed
-from motorbus.link.tcp import CONNECT_TIME, split_address
+from motorbus.link.tcp import CONNECT_TIME, give_up_soon, split_address
 from motorbus.link.waiting import wait_readable
 
 if TYPE_CHECKING:
@@ -322,6 +322,7 @@ def _send_at_once(serial: BaseSerial) -> None:
     connection = getattr(serial, "_socket", None)
     if connection is not None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        give_up_soon(connection)
 
 
 # -- rates ------------------------------------------------------------------------------------------------------

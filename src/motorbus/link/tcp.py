@@ -19,6 +19,8 @@ from motorbus.link.waiting import wait_readable
 
 CHUNK = 4096
 CONNECT_TIME = 5.0  # s; a host of a local network that has not answered by then is not there
+UNHEARD: Final = 1.0
+"""s; a connection whose bytes nobody has acknowledged by then is given up, and they are not sent any more."""
 LOOPBACK_LATENCY: Final = 0.002  # s; two processes of one machine have to be scheduled
 NETWORK_LATENCY: Final = 0.005  # s; one Wi-Fi hop each way, and the bridge's own turn
 
@@ -128,8 +130,20 @@ def _connected(url: str, host: str, port: int, patience: float) -> socket.socket
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    give_up_soon(connection)
     connection.setblocking(False)
     return connection
+
+
+def give_up_soon(connection: socket.socket) -> None:
+    """Have the system drop what it cannot deliver, with the connection.
+
+    By itself it tries for a quarter of an hour: an order would be obeyed when the network is there again. Only Linux
+    can be told so (tcp(7), TCP_USER_TIMEOUT).
+    """
+    option = getattr(socket, "TCP_USER_TIMEOUT", None)
+    if option is not None:
+        connection.setsockopt(socket.IPPROTO_TCP, option, int(UNHEARD * 1000))
 
 
 def _is_loopback(connection: socket.socket) -> bool:

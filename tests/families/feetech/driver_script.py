@@ -31,6 +31,8 @@ T = TypeVar("T")
 PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 ALL = 254
+EEPROM_END = 40
+"""Registers below this one are EEPROM in every map."""
 
 Back: TypeAlias = bytes | Sequence[bytes] | BaseException | None
 
@@ -62,6 +64,19 @@ def reads(id: int, address: int, *data: int, error: int = 0) -> Line:
 def writes(id: int, address: int, *data: int, error: int = 0) -> Line:
     """WRITE, acknowledged."""
     return Line(packet(id, WRITE, address, *data), packet(id, error))
+
+
+def before(*lines: Line) -> tuple[Line, ...]:
+    """The look at the EEPROM cells that these lines write one after the other: each holds something else as yet.
+
+    What they say of other registers (lock, torque switch) is not looked at.
+    """
+    looks = []
+    for line in lines:
+        _, _, id, _, code, address, *rest = line.sent
+        if code == WRITE and address < EEPROM_END:
+            looks.append(reads(id, address, *(byte ^ 1 for byte in rest[:-1])))
+    return tuple(looks)
 
 
 def unheard(line: Line) -> Line:

@@ -11,7 +11,7 @@ from motorbus.core.operation import Effect
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.feetech.driver import Node, Servo, mode, set_mode
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
-from tests.families.feetech.driver_script import Line, play, reads, watch, writes
+from tests.families.feetech.driver_script import Line, before, play, reads, watch, writes
 from tests.families.feetech.maps import HEADS, eeprom, met
 
 ZERO_VELOCITY = "its goal velocity is 0: set_velocity() gives one"
@@ -24,6 +24,7 @@ def guarded(name: str, address: int, *data: int) -> list[Line]:
     """Unlock, torque off, see that it has not restarted, write, read back, the same once more, lock, see it locked."""
     lock = LOCK_AT[name]
     return [
+        *before(writes(3, address, *data)),
         *(writes(3, lock, 0), writes(3, 40, 0), reads(3, 64, 0), reads(3, lock, 0)),
         *(writes(3, address, *data), reads(3, address, *data)),
         *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
@@ -125,7 +126,13 @@ def test_pwm_of_hls_and_limits_of_others_and_words_that_are_no_modes_are_refused
 def test_a_current_that_was_a_goal_is_no_bound_of_the_next_mode() -> None:
     play(
         set_mode(met("hls", at_33=2), Mode.POSITION),
-        *(asked("hls", at_33=2), writes(3, 55, 0), writes(3, 40, 0), reads(3, 64, 0)),
+        *(
+            asked("hls", at_33=2),
+            *before(writes(3, 33, 0)),
+            writes(3, 55, 0),
+            writes(3, 40, 0),
+            reads(3, 64, 0),
+        ),
         # The supply may go behind any line: 0 is always noticed.
         *(reads(3, 55, 0), writes(3, 44, 0, 0), reads(3, 44, 0, 0)),
         *(reads(3, 55, 0), writes(3, 33, 0), reads(3, 33, 0)),

@@ -92,7 +92,16 @@ class Spoiling(Tampering):
 def test_readings_that_differ_are_read_again_until_each_byte_is_agreed_upon(spoilt: dict[int, int]) -> None:
     with bench(line=Spoiling(spoilt)) as there:
         assert there.device.dump(1) == DUMP_A
-        assert len(there.sent()) == 3
+        assert len(there.sent()) == 4
+
+
+@pytest.mark.parametrize("spoilt", [{1: 40, 3: 40}, {2: 40, 3: 40}, {1: 40, 4: 40}])
+def test_once_two_readings_have_differed_two_that_are_changed_alike_are_not_believed(
+    spoilt: dict[int, int],
+) -> None:
+    with bench(line=Spoiling(spoilt)) as there:
+        assert there.device.dump(1) == DUMP_A
+        assert len(there.sent()) == 5
 
 
 def test_what_is_changed_alike_each_time_cannot_be_told_and_is_not_claimed_to_be() -> None:
@@ -127,7 +136,9 @@ def test_an_image_of_another_project_is_no_value() -> None:
         ([b"ab"], b""),
         ([b"ab", b"ab"], b"ab"),
         ([b"ab", b"ax"], b""),
-        ([b"ab", b"ax", b"yb"], b"ab"),
+        ([b"ab", b"ax", b"yb"], b""),
+        ([b"ab", b"ax", b"ab"], b""),
+        ([b"ab", b"ax", b"yb", b"ab"], b"ab"),
         ([b"a", b"b", b"a", b"b"], b""),
         ([b"a", b"b", b"a", b"b", b"a"], b"a"),
     ],

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.operation import CanFrame, Data
-from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
+from motorbus.errors import Interrupted, LimitExceeded, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.readings import patience
@@ -323,6 +323,26 @@ def test_no_goal_of_before_is_given_when_a_port_that_was_gone_is_there_again() -
             assert state.position["c1"] == pytest.approx(0.7, abs=0.02), "the other bus goes on"
             loop.goal["a1"] = 2.0
             assert cycles(loop, 150).position["a1"] == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_loop_is_told_of_a_loss_that_somebody_else_saw_and_gives_no_goal_of_before() -> None:
+    with machine(arm="1-2", can="0x21", exit="leave") as (made, sims), Robot.of(made) as robot:
+        link: Any = robot.buses["arm"].link
+        with robot.loop(RATE, axes=["a1"]) as loop:
+            loop.goal["a1"] = 2.0
+            cycles(loop, 10)
+            link.unplug()
+            with pytest.raises(LinkLost):
+                robot["a2"].position()
+            link.plug()
+            robot["a2"].position()
+            sims["arm"].line = Heard()
+            with pytest.raises(LinkLost, match="since this was begun"):
+                next(loop)
+            cycles(loop, 10)
+            assert not ordered(sims["arm"].line)
+            loop.goal["a1"] = 1.0
+            assert cycles(loop, 150).position["a1"] == pytest.approx(1.0, abs=0.02)
 
 
 def ordered(line: Any) -> list[bytes]:

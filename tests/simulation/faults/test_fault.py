@@ -43,6 +43,9 @@ from motorbus.simulation.faults.fault import number
         {"action": "split", "seconds": -1.0},
         {"action": "torn-eeprom"},
         {"action": "delay", "seconds": 1.0, "adapter": True},
+        {"action": "reorder", "seconds": 1.0, "adapter": True},
+        {"action": "reorder", "seconds": 1.0, "byte": 2},
+        {"action": "reorder", "seconds": 1.0, "exchange": None, "percent": 1.0, "per_byte": True},
     ],
 )
 def test_what_is_impossible_is_refused(wrong: dict[str, Any]) -> None:

@@ -34,3 +34,8 @@ def test_equal_faults_have_chances_of_their_own() -> None:
     fault = Fault(action="drop", percent=1.0)
     assert chance(fault, 1, 0).random() != chance(fault, 1, 1).random()
     assert chance(fault, 1).random() == chance(fault, 1).random()
+
+
+@pytest.mark.parametrize("percent", [5e-324, 1e-322, 1e-306, 1e-290])
+def test_a_chance_too_small_for_a_number_is_never(percent: float) -> None:
+    assert struck(percent, [10**9] * 3) == []

@@ -157,3 +157,25 @@ def test_a_script_is_text_faults_or_itself() -> None:
     assert script_of("exchange 1 byte 2: drop") == script_of([fault]) == script_of(Script((fault,)))
     assert list(script_of([fault])) == [fault]
     assert len(script_of([fault])) == 1
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"exchange {'9' * 5000}: drop",
+        f"exchange 1 byte {'9' * 5000}: drop",
+        f"seed {'9' * 5000}",
+        f"exchange 1: echo {'9' * 5000}",
+        f"exchange 1: power-cycle 0x{'f' * 5000}",
+        f"exchange 1: brown-out 1 0x{'f' * 5000}",
+        f"exchange 1: {'x' * 5000}",
+        "x" * 5000,
+        "exchange 1: corrupt -1",
+        "exchange 1: insert -1",
+        "exchange 1: flip -1",
+    ],
+)
+def test_numbers_beyond_all_measure_are_refused_in_few_words(line: str) -> None:
+    with pytest.raises(RequestError, match="^line 2: ") as caught:
+        parse(f"seed\t1\n{line}" if not line.startswith("seed") else f"\n{line}")
+    assert len(str(caught.value)) < 700

@@ -1,8 +1,9 @@
 """What a controller tells: its projects, and the level of an input. Nothing here writes.
 
-A dump has 226 bytes and no checksum. So it is read until two readings are the same, or until of at most five each
-byte has been the same in two, and more often than any other: of a line that changes one byte in a hundred thousand
-that lets one dump in some hundred millions pass wrong. What is beyond that is said to be a bad line, and no value.
+A dump has 226 bytes and no checksum. So it is read twice, and believed when both are the same. Two that differ show a
+line that changes bytes, and from then on each byte must have been the same in three readings, of at most five: of a
+line that changes one byte in a hundred that lets one dump in a million pass wrong, of one that changes one in a hundred
+thousand one in ten thousand millions. What is beyond that is said to be a bad line, and no value.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from motorbus.families.stepper.table import INPUTS, STEPS, row_value
 
 READINGS: Final = 5
 """How often a dump is read at most until it is believed."""
+_ALIKE: Final = 3
+"""Of so many readings each byte is the same, once two have differed: more than half of them all."""
 
 
 def dump_once(node: Node, project: int, timeout: Timeout | None = None) -> Exchange[bytes]:
@@ -63,7 +66,7 @@ def agreed(node: Node, project: int, seen: Sequence[bytes]) -> bytes:
     if not found:
         raise FramingError(
             f"project {project} came differently each of {READINGS} times it was read",
-            expected="two readings that agree",
+            expected="two readings that agree, or three that agree on each byte",
             cause="the line changes bytes, and a dump has no checksum",
             advice="see to the cable and its ground; nothing was written",
             node=node.node,
@@ -73,11 +76,14 @@ def agreed(node: Node, project: int, seen: Sequence[bytes]) -> bytes:
 
 
 def vote(readings: Sequence[bytes]) -> bytes:
-    """What of these dumps holds, byte by byte: twice the same, and more often than anything else; b"" if not all do."""
+    """What of these dumps holds: two that are the same; of more, byte by byte, what three say. b"" if not all do."""
+    if len(readings) < 2:
+        return b""
+    due = min(len(readings), _ALIKE)
     found = bytearray()
     for column in zip(*readings, strict=True):
-        (value, times), *others = Counter(column).most_common(2)
-        if times < 2 or (others and others[0][1] == times):
+        ((value, times),) = Counter(column).most_common(1)
+        if times < due:
             return b""
         found.append(value)
     return bytes(found)
