@@ -42,12 +42,11 @@ def test_a_rate_that_is_set_again_while_it_is_gone_is_the_rate_when_it_is_back()
 
 def test_a_port_that_is_lost_while_its_rate_is_changed_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     bus, _ = memory_bus()
-    link = pulled(bus, AWAY)
 
     def torn(rate: int, listen_only: bool = False) -> None:
         raise LinkLost("it went away")
 
-    monkeypatch.setattr(link, "tune", torn)
+    monkeypatch.setattr(bus.link, "tune", torn)
     with pytest.raises(LinkLost):
         bus.run(iter(Tune(500_000)))
     assert bus.turns.gone is not None

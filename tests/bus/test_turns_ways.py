@@ -180,7 +180,7 @@ def test_without_a_gate_what_waits_goes_and_what_moves_does_not() -> None:
 def test_what_an_order_refuses_by_itself_no_gate_is_asked() -> None:
     heard: list[object] = []
     script = Script(admit=heard.append)
-    refused = Exchange(
+    refused: Exchange[Any] = Exchange(
         b"\x01",
         (Due(1, 1, 6),),
         effect=Effect.MOTION,
@@ -209,7 +209,12 @@ def test_half_a_packet_of_the_old_rate_does_not_swallow_a_reply_of_the_new_one()
 
 def test_who_has_heard_enough_is_asked_no_more() -> None:
     script, asked = Script(), []
-    listener = Listener(Listen(lambda notice: bool(asked.append(notice)), 1.0), None, None)
+
+    def hears(notice: Notice) -> bool:
+        asked.append(notice)
+        return True
+
+    listener = Listener(Listen(hears, 1.0), None, None)
     script.turns.submit(listener, script.now)
     listener.finish()
     script.turns._take(Notice(1, "x", b""), script.now)

@@ -5,10 +5,14 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
+import time
+from typing import Any
 
 import pytest
 
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.turns import Turns
+from motorbus.bus.watch import Watch
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.feetech import FAMILY
 from motorbus.link.tcp import TcpLink
@@ -98,3 +102,43 @@ def test_a_bus_that_is_closed_says_so_and_one_loop_may_follow_another() -> None:
     asyncio.run(bus.close())
     with pytest.raises(LinkLost):
         asyncio.run(ask(bus))
+
+
+@pytest.mark.parametrize("seen_by", ["the loop", "another thread"])
+def test_a_descriptor_is_let_go_before_its_number_is_another_files(seen_by: str) -> None:
+    class Pulled:
+        """A link that was lost; when it is opened anew its old descriptor is closed."""
+
+        def __init__(self) -> None:
+            self.ends = socket.socketpair()
+            self.watched: list[bool] = []
+
+        def now(self) -> float:
+            return time.monotonic()
+
+        def fileno(self) -> int:
+            return self.ends[0].fileno()
+
+        def read(self, until: float) -> list[bytes]:
+            return []
+
+        def renew(self, losses: int) -> None:
+            self.watched.append(asyncio.get_running_loop().remove_reader(self.fileno()))
+            raise LinkLost("it is not there")
+
+    async def main() -> None:
+        link: Any = Pulled()
+        turns = Turns(FAMILY, rate=1_000_000)
+        turns.renewal = link
+        watch = Watch(link, turns)
+        watch.start(asyncio.get_running_loop())
+        turns.lost(LinkLost("it was pulled"))
+        if seen_by == "the loop":
+            watch.crank()
+        watch.start(asyncio.get_running_loop())
+        assert link.watched
+        assert not any(link.watched)
+        for end in link.ends:
+            end.close()
+
+    asyncio.run(main())

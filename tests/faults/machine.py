@@ -20,7 +20,7 @@ Left out, because docs/explanation/taint.md says that no host can know better on
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from contextlib import suppress
 from heapq import heappush
 from math import inf
@@ -82,12 +82,24 @@ class Line(FaultyLine):
         return max(way.floor for way in self._ways.values())
 
 
+class Heeded(MemoryLink):
+    """A link that notes what is written to it, in `said`, until somebody clears that."""
+
+    def __init__(self, *args: Any, **how: Any) -> None:
+        super().__init__(*args, **how)
+        self.said: list[Data] = []
+
+    def write(self, data: Data) -> None:
+        super().write(data)
+        self.said.append(data)
+
+
 class Rig:
     """A bus of one family under fire. `verbs` are what is called, `faults` what strikes, each by its name.
 
     A fault is a text of a script without its exchange, where `{byte}`, `{bits}`, `{late}` and `{node}` are by lot; what
-    stands behind a semicolon happens in the exchange after it. `just` is how late a reply comes when it comes at about
-    the moment at which it is given up (s).
+    stands behind a semicolon happens in the exchange after it, behind a bar in the same one. `just` is how late a reply
+    comes when it comes at about the moment at which it is given up (s).
     """
 
     just: ClassVar[tuple[float, float]]
@@ -95,13 +107,21 @@ class Rig:
     faults: ClassVar[Mapping[str, str]]
     costs: ClassVar[Mapping[str, int]]
     """How many exchanges a verb makes at most, where that is more than `USUAL`."""
+    reads: ClassVar[Collection[str]]
+    """Verbs that order nothing: whatever order is sent while they are called is of before."""
+    plain: ClassVar[tuple[str, ...]]
+    """Verbs in the middle of which the adapter is pulled."""
+    pulling: ClassVar[tuple[float, float]] = (-5, -2)
+    """How long after the beginning of a call, as a power of ten of a second."""
+    once: ClassVar[Collection[Hashable]] = ()
+    """Orders that do something each time they are carried out, so none is said twice in a call."""
 
     def __init__(self, family: Family, simulator: Simulator, rate: int, **how: Any) -> None:
         self.simulator: Any = simulator
         self.history = History(simulator, keep=KEPT)
         self.world = World(self.history)
         self.line = Line((), self.world, most=1000)
-        self.link = MemoryLink(self.world, rate=rate, line=self.line, **how)
+        self.link = Heeded(self.world, rate=rate, line=self.line, **how)
         self.bus = Bus(self.link, family.configured(), admit=Gate(), report=lambda event: None)
         self.family = self.bus.family
         self.oracle = Oracle(self.link, self.history, lambda: self.world._ahead)
@@ -110,6 +130,7 @@ class Rig:
         self.untouched = 0
         self.quarantine = 0
         self.pulls = self.strangers = 0
+        self.may: Callable[[Hashable, Data], bool] | None = None
         self.slow = self.longest()
         self.bound = USUAL * self.slow
 
@@ -135,8 +156,11 @@ class Rig:
         calls = self.verbs | {"unplug": self.pulled, "foreign": self.overheard}
         self.bound = self.costs.get(name, USUAL) * self.slow
         self.stir(Random(~lot))
+        self.link.said.clear()
+        self.may = None
         window = calls[name](Random(lot))
         self.calls[name] += 1
+        self.heed(name)
         self.quarantine = max(0, self.quarantine - 1)
         if touched or self.line.count > fired or self.troubled or name in OTHER:
             return
@@ -145,6 +169,20 @@ class Rig:
             raise FalseWord(f"{name}: no fault has touched it, and it failed") from window.error
         if self.again > again:
             raise FalseWord(f"{name}: no fault has touched it, and it was said twice")
+
+    def order(self, said: Data) -> Hashable | None:
+        """What this orders, None when it changes nothing."""
+        raise NotImplementedError
+
+    def heed(self, name: str) -> None:
+        """Judge what this call has sent: no order but its own, and none twice of which each counts."""
+        orders = [(order, said) for said in self.link.said if (order := self.order(said)) is not None]
+        for order, said in orders:
+            if name in self.reads or (self.may is not None and not self.may(order, said)):
+                raise FalseWord(f"{name}: {order} was sent, which is an order of before: {said!r}")
+        for order, often in Counter(order for order, _ in orders).items():
+            if order in self.once and often > 1:
+                raise FalseWord(f"{name}: {order} was sent {often} times, and each counts")
 
     def strike(self, name: str, lot: int) -> None:
         """Let this fault happen in one of the next exchanges; not right behind another one."""
@@ -161,7 +199,8 @@ class Rig:
         }
         exchange = self.line.exchange + random.randrange(1, 4)
         for one in self.faults[name].format(**place).split(";"):
-            self.line.add(f"exchange {exchange} {one}")
+            for part in one.split("|"):
+                self.line.add(f"exchange {exchange} {part}")
             exchange += 1
         if "copied" in name:
             self.quarantine = 3
@@ -181,10 +220,10 @@ class Rig:
         self.quarantine = 0
 
     def pulled(self, random: Random) -> Window:
-        """The adapter is pulled in the middle of the plainest call, and put back."""
-        self.link.unplug(self.link.now() + 10 ** random.uniform(-5, -2))
+        """The adapter is pulled in the middle of a plain call, and put back."""
+        self.link.unplug(self.link.now() + 10 ** random.uniform(*self.pulling))
         try:
-            window = self.probe()
+            window = self.verbs[random.choice(self.plain)](random)
             self.link.advance(0.02)
         finally:
             self.link.plug()
@@ -193,11 +232,14 @@ class Rig:
 
     def overheard(self, random: Random) -> Window:
         """Somebody else's packet comes in the middle of the plainest call."""
-        moment = self.link.now() + 10 ** random.uniform(-4, -2)
-        self.link._serial += 1
-        heappush(self.link._under_way, (moment, self.link._serial, Side.HOST, self.foreign(random)))
-        self.strangers += 1
+        self.intrude(10 ** random.uniform(-4, -2), self.foreign(random))
         return self.probe()
+
+    def intrude(self, later: float, data: Data) -> None:
+        """Somebody else says this, so much later (s)."""
+        self.link._serial += 1
+        heappush(self.link._under_way, (self.link.now() + later, self.link._serial, Side.HOST, data))
+        self.strangers += 1
 
     def stir(self, random: Random) -> None:
         """Let what is measured be another value than at the call before, or an old one would pass for a new one."""

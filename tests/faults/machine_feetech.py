@@ -57,6 +57,9 @@ class FeetechRig(Rig):
     costs = COSTS
     faults = FAULTS
     just = (0.0215, 0.0217)
+    reads = ("ping", "read", "telemetry", "sync read", "at once", "foreign", *MEASURED)
+    plain = ("position", "write", "move", "load")
+    once = ("REG_WRITE", "ACTION")
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator(IDS), 1_000_000, pace=True)
@@ -71,6 +74,7 @@ class FeetechRig(Rig):
             "telemetry": self.telemetry,
             "write": self.write,
             "write a setting": self.set,
+            "hand over": self.hand_over,
             "torque": self.torque,
             "move": self.move,
             "stop": self.stop,
@@ -80,6 +84,11 @@ class FeetechRig(Rig):
 
     def slowest(self) -> Exchange[Any]:
         return read_block(Servo(self.bus, 1), 0, 90, bytes)
+
+    def order(self, said: Data) -> str | None:
+        assert isinstance(said, bytes)
+        name = wire.Instruction(said[4]).name
+        return None if name in ("PING", "READ", "SYNC_READ") else name
 
     def one(self, random: Random) -> Servo:
         """One of them."""
@@ -173,6 +182,17 @@ class FeetechRig(Rig):
         )
         raw, value = self.value(servo, name, low, high)
         return self.writing(servo, name, raw, lambda: servo.write(**{name: value}))
+
+    def hand_over(self, random: Random) -> Window:
+        """A REG WRITE and its ACTION: neither may be said twice."""
+        servo = self.one(random)
+        raw, value = self.value(servo, "torque_limit", LEAST, 990)
+
+        def both() -> None:
+            servo.reg_write(torque_limit=value)
+            servo.action()
+
+        return self.writing(servo, "torque_limit", raw, both)
 
     def torque(self, random: Random) -> Window:
         servo, on = self.one(random), random.random() < 0.5

@@ -9,10 +9,15 @@ from collections.abc import Callable
 from random import Random
 from typing import Any, Final
 
-from motorbus.core.operation import Data, Exchange, Operation, Together, outcome
+from motorbus.core.operation import CanFrame, Data, Exchange, Operation, Together, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
-from motorbus.families.kst.wire import encode_download_reply, encode_report, encode_upload_reply
+from motorbus.families.kst.wire import (
+    decode_request,
+    encode_download_reply,
+    encode_report,
+    encode_upload_reply,
+)
 from tests.faults.machine import Rig, machine
 from tests.faults.oracle import FalseWord, Window
 
@@ -49,6 +54,8 @@ class KstRig(Rig):
     costs = COSTS
     faults = FAULTS
     just = (0.0499, 0.0505)
+    reads = ("ping", "position", "read", "telemetry", "at once", "foreign")
+    plain = ("position", "move")  # one that is storing something answers nothing for a while
 
     def __init__(self) -> None:
         family = FAMILY.configured(profile=PROFILE)
@@ -73,6 +80,11 @@ class KstRig(Rig):
 
     def slowest(self) -> Exchange[Any]:
         return self.family.probe(IDS[0], 0)
+
+    def order(self, said: Data) -> str | None:
+        assert isinstance(said, CanFrame)
+        request = decode_request(said)
+        return None if request is None or request.kind != "download" else "download"
 
     def stir(self, random: Random) -> None:
         for servo in self.simulator.servos:

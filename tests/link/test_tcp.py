@@ -11,7 +11,7 @@ import pytest
 
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.base import Link
-from motorbus.link.tcp import LOOPBACK_LATENCY, TcpLink, split_address
+from motorbus.link.tcp import LOOPBACK_LATENCY, UNHEARD, TcpLink, split_address
 
 PING = bytes.fromhex("ff ff 01 02 01 fb")
 
@@ -55,6 +55,9 @@ def test_what_it_says_of_itself(pair: tuple[TcpLink, socket.socket]) -> None:
     assert (link.paced, link.virtual, link.simulated, link.latency) == (False, False, False, LOOPBACK_LATENCY)
     assert link.fileno() == pair[0]._socket.fileno()
     assert pair[0]._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # else an order would be obeyed when the network is there again
+        dropped = pair[0]._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+        assert dropped == UNHEARD * 1000
 
 
 def test_nothing_by_the_deadline_is_nothing(pair: tuple[TcpLink, socket.socket]) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
+from motorbus.link.base import PerfectLine
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import MOST_CLIENTS, CanClient, Door, SerialClient
@@ -205,3 +206,18 @@ def test_closing_twice() -> None:
     door.close()
     assert connection.recv(1) == b""
     connection.close()
+
+
+@pytest.mark.parametrize("after", [None, PerfectLine()])
+def test_half_a_command_outlives_what_lay_between(after: PerfectLine | None) -> None:
+    desk = Desk()
+    client = opened(desk)
+    client.heed(PerfectLine())
+    desk.said = b"t1232"
+    assert client.read(0.0) == []
+    client.heed(after)
+    desk.said = b"0102\r"
+    assert client.read(0.0) == [FRAME]
+    client.heed(None)
+    desk.said = b"t12320102\r"
+    assert client.read(0.0) == [FRAME]

@@ -154,7 +154,7 @@ class Turns(Absence, Air):
                 out = self._try(ticket, queue, now)
                 if out is not None:
                     return out
-                if len(self._flying) >= self.window or self._awaits_silence(ticket):
+                if self._awaits_silence(ticket):
                     return None
         return None
 
@@ -252,7 +252,7 @@ class Turns(Absence, Air):
 
     def _doubtful(self, flight: Flight) -> list[int]:
         exchange = flight.exchange
-        if exchange.replies is ANY or exchange.rank is Rank.STOP or flight.parent is not None:
+        if exchange.replies is ANY or exchange.rank is Rank.STOP:
             return []
         if exchange.timeout is Timeout.SCAN and flight.spoiled != "echo":
             return []
@@ -328,7 +328,7 @@ class Turns(Absence, Air):
 
     def _probe_failed(self, probe: Flight, parent: Flight, kind: str, now: float) -> None:
         parent.tries += 1
-        node = probe.exchange.replies[0].node  # type: ignore[index]  # a probe has exactly one reply
+        ((node, _, _),) = probe.exchange.replies  # type: ignore[misc]  # a probe has exactly one reply
         if kind != "silence" and parent.tries <= RETRIES:
             return
         self.trust.stayed_silent(node, now, self._quiet)

@@ -18,18 +18,18 @@ LONGEST: Final = 256
 
 
 class Text:
-    """What becomes of the text of one host and its adapter."""
+    """What becomes of the text of one host and its adapter. `half` is what has come of a command so far."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: Line, half: bytes = b"") -> None:
         self._line = line
-        self._half = b""
+        self.half = half
 
     def said(self, data: bytes, at: float) -> bytes:
         """What reaches the adapter of this; half a command waits for its other half."""
-        lines = _LINES.findall(self._half + data)
-        self._half = b""
+        lines = _LINES.findall(self.half + data)
+        self.half = b""
         if lines and not lines[-1].endswith(_ENDS) and len(lines[-1]) < LONGEST:
-            self._half = lines.pop()
+            self.half = lines.pop()
         return b"".join(self._carried(Side.HOST, line, at) for line in lines)
 
     def answered(self, data: bytes, at: float) -> bytes:

@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
-from motorbus.link.base import Adapter, Line
+from motorbus.link.base import Adapter, Line, PerfectLine
 from motorbus.simulation.adapter_text import Text
 from motorbus.simulation.listener import TcpClient, TcpPort
 
@@ -157,6 +157,8 @@ class CanClient(Participant):
         _pullable(self._endpoint).plug()
         self.adapter = deepcopy(self._as_new)
         self._rate, self._stuck = None, False
+        if self._text:
+            self._text.half = b""
         self._out = bytearray(self.adapter.greet())
 
     def fileno(self) -> int:
@@ -178,7 +180,8 @@ class CanClient(Participant):
 
     def heed(self, line: Line | None) -> None:
         """What lies between adapter and host from now on; None: nothing."""
-        self._text = None if line is None else Text(line)
+        half = self._text.half if self._text else b""
+        self._text = None if line is None and not half else Text(line or PerfectLine(), half)
 
     def tell(self, data: Data, at: float) -> None:
         if not isinstance(data, CanFrame):

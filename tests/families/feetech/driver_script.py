@@ -66,17 +66,17 @@ def writes(id: int, address: int, *data: int, error: int = 0) -> Line:
     return Line(packet(id, WRITE, address, *data), packet(id, error))
 
 
-def before(*lines: Line) -> tuple[Line, ...]:
+def looks(*lines: Line) -> tuple[Line, ...]:
     """The look at the EEPROM cells that these lines write one after the other: each holds something else as yet.
 
     What they say of other registers (lock, torque switch) is not looked at.
     """
-    looks = []
+    found = []
     for line in lines:
         _, _, id, _, code, address, *rest = line.sent
         if code == WRITE and address < EEPROM_END:
-            looks.append(reads(id, address, *(byte ^ 1 for byte in rest[:-1])))
-    return tuple(looks)
+            found.append(reads(id, address, *(byte ^ 1 for byte in rest[:-1])))
+    return tuple(found)
 
 
 def unheard(line: Line) -> Line:

@@ -15,7 +15,7 @@ from tests.families.feetech.driver_script import (
     REG_WRITE,
     Line,
     Played,
-    before,
+    looks,
     packet,
     play,
     prepared,
@@ -33,7 +33,7 @@ STILL_OPEN = reads(3, 55, 0)
 WRITES = (writes(3, 20, 5, 33), reads(3, 20, 5, 33))
 GIVEN_UP = (OFF, LOCK, LOCKED)
 BEGUN = (OFF, STILL_OPEN, LOCK, LOCKED)
-LOOK = before(WRITES[0])
+LOOK = looks(WRITES[0])
 WHOLE = (*LOOK, UNLOCK, OFF, IDLE, *WRITES, STILL_OPEN, LOCK, LOCKED)
 
 
@@ -59,7 +59,7 @@ def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
 def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
     play(
         write(prepared(), position_p=33, max_temperature=65, torque_limit=0.5),
-        *before(writes(3, 13, 65), writes(3, 21, 33)),
+        *looks(writes(3, 13, 65), writes(3, 21, 33)),
         *(UNLOCK, OFF, IDLE, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
         *(STILL_OPEN, LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
     )
@@ -69,7 +69,7 @@ def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
     played = watch(
         write(prepared(), operating_mode=1),
         *(
-            *before(writes(3, 33, 1)),
+            *looks(writes(3, 33, 1)),
             UNLOCK,
             OFF,
             IDLE,
@@ -97,7 +97,7 @@ def test_settings_are_read_again_afterwards() -> None:
     play(
         write(node, operating_mode=1),
         *(
-            *before(writes(3, 33, 1)),
+            *looks(writes(3, 33, 1)),
             UNLOCK,
             OFF,
             IDLE,
@@ -201,7 +201,7 @@ def test_a_lock_that_cannot_be_closed_is_told_with_the_error() -> None:
 def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
     play(
         write(prepared(at_8=0), led_mask=5),
-        *(*before(writes(3, 20, 5)), unheard(UNLOCK), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
+        *(*looks(writes(3, 20, 5)), unheard(UNLOCK), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
         *(unheard(writes(3, 20, 5)), reads(3, 20, 5), reads(3, 20, 5)),
         *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
@@ -211,7 +211,7 @@ def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
     play(
         write(prepared(), status_return_level=0),
         *(
-            *before(writes(3, 8, 0)),
+            *looks(writes(3, 8, 0)),
             UNLOCK,
             OFF,
             IDLE,

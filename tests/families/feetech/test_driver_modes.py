@@ -11,7 +11,7 @@ from motorbus.core.operation import Effect
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.feetech.driver import Node, Servo, mode, set_mode
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
-from tests.families.feetech.driver_script import Line, before, play, reads, watch, writes
+from tests.families.feetech.driver_script import Line, looks, play, reads, watch, writes
 from tests.families.feetech.maps import HEADS, eeprom, met
 
 ZERO_VELOCITY = "its goal velocity is 0: set_velocity() gives one"
@@ -24,7 +24,7 @@ def guarded(name: str, address: int, *data: int) -> list[Line]:
     """Unlock, torque off, see that it has not restarted, write, read back, the same once more, lock, see it locked."""
     lock = LOCK_AT[name]
     return [
-        *before(writes(3, address, *data)),
+        *looks(writes(3, address, *data)),
         *(writes(3, lock, 0), writes(3, 40, 0), reads(3, 64, 0), reads(3, lock, 0)),
         *(writes(3, address, *data), reads(3, address, *data)),
         *(reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1)),
@@ -128,7 +128,7 @@ def test_a_current_that_was_a_goal_is_no_bound_of_the_next_mode() -> None:
         set_mode(met("hls", at_33=2), Mode.POSITION),
         *(
             asked("hls", at_33=2),
-            *before(writes(3, 33, 0)),
+            *looks(writes(3, 33, 0)),
             writes(3, 55, 0),
             writes(3, 40, 0),
             reads(3, 64, 0),

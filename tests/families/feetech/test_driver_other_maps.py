@@ -14,7 +14,7 @@ from motorbus.errors import DeviceError, LimitExceeded, MotionError, RequestErro
 from motorbus.families.feetech import driver
 from motorbus.families.feetech.driver import Node, Promise
 from motorbus.families.feetech.table import TABLES
-from tests.families.feetech.driver_script import Line, before, play, reads, watch, writes
+from tests.families.feetech.driver_script import Line, looks, play, reads, watch, writes
 from tests.families.feetech.maps import eeprom, met, prepares_as
 
 OTHERS = [name for name in TABLES if name != "sts"]
@@ -157,7 +157,7 @@ def test_a_goal_by_name_has_the_byte_order_of_its_map(name: str, address: int, g
 def test_eeprom_is_unlocked_where_its_map_has_the_lock(name: str, lock: int) -> None:
     play(
         driver.write(met(name), led_mask=1),
-        *before(writes(3, 20, 1)),
+        *looks(writes(3, 20, 1)),
         writes(3, lock, 0),
         *(writes(3, 40, 0), reads(3, 64, 0)),
         *(writes(3, 20, 1), reads(3, 20, 1)),

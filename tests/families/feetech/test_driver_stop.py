@@ -11,6 +11,7 @@ from motorbus.core.operation import Pause, Rank
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech import Servo
 from motorbus.families.feetech.driver import Node, Promise, move, stop
+from motorbus.families.feetech.driver.motion import OLD, SLEPT
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
 from tests.families.feetech.driver_script import (
     Line,
@@ -192,3 +193,84 @@ def test_another_object_has_changed_the_mode_since(name: str, before: Mode, now:
             servo.stop()
             later(servo, 1.0)
             assert not real.motion.moving(servo.bus.link.now())
+
+
+# -- a host that sleeps between the reading and the goal -----------------------------------------------------
+
+
+class Sleepy(Played):
+    """A host that sleeps for so many seconds when exchange number `at` is over, before it does the next thing."""
+
+    def __init__(self, script: list[Line], at: int, seconds: float) -> None:
+        super().__init__(script)
+        self.at, self.seconds, self.slept = at, seconds, 0
+
+    def _exchange(self, exchange: Any) -> Any:
+        told = super()._exchange(exchange)
+        if len(self.exchanges) == self.at + 1:
+            self.now += self.seconds
+            self.slept += 1
+        return told
+
+
+def test_a_reading_that_the_host_slept_over_is_taken_anew_before_it_becomes_a_goal() -> None:
+    hold = writes(3, 42, *low_high(900))
+    for seconds, script in (
+        (OLD + 0.01, [prepares(), stands(700), stands(900), hold]),
+        (OLD - 0.01, [prepares(), stands(900), hold]),
+    ):
+        host = Sleepy(script, 1, seconds)
+        assert host.run(stop(Node(3))) is Promise.HOLD_ACCEPTED
+        assert (host.script, host.slept) == ([], 1)
+
+
+def test_a_goal_that_may_have_left_after_a_sleep_is_said_again_from_where_it_is_then() -> None:
+    said = [prepares(), stands(700), writes(3, 42, *low_high(700))]
+    again = [stands(900), writes(3, 42, *low_high(900))]
+    host = Sleepy(said + again, 2, SLEPT)
+    assert host.run(stop(Node(3))) is Promise.HOLD_ACCEPTED
+    assert (host.script, host.slept) == ([], 1)
+
+
+def test_a_stop_is_sent_however_old_its_readings_are() -> None:
+    class Slow(Sleepy):
+        def _exchange(self, exchange: Any) -> Any:
+            self.at = len(self.exchanges)
+            return super()._exchange(exchange)
+
+    host = Slow([prepares(), stands(700), stands(800), stands(900), writes(3, 42, *low_high(900))], 0, 1.0)
+    assert host.run(stop(Node(3))) is Promise.HOLD_ACCEPTED
+    assert host.script == []
+    assert host.slept == 5
+
+
+@pytest.mark.parametrize("where", ["before the reply is read", "before the goal leaves"])
+def test_a_servo_is_not_sent_back_to_where_it_was_before_the_host_slept(where: str) -> None:
+    """It turns on for two seconds meanwhile; without a second look it would come all the way back."""
+    with simulated("sts") as (real, servo):
+        servo.enable_torque()
+        servo.move(0.5)
+        servo.move(5.5, velocity=1.0, wait=False)
+        servo.bus.run(iter(Pause(1.0)))
+        line: Any = servo.bus.link
+        write = line.write
+        slept: list[float] = []
+
+        def wrote(data: bytes) -> None:
+            asks, orders = data[4:6] == b"\x02\x38", data[4:6] == b"\x03\x2a"
+            if not slept and where == "before the goal leaves" and orders:
+                slept.append(real.motion.position(real._now()))
+                line.advance(2.0)
+            write(data)
+            if not slept and where == "before the reply is read" and asks:
+                slept.append(real.motion.position(real._now()))
+                line.advance(2.0)
+
+        line.write = wrote
+        assert servo.stop() is Promise.HOLD_ACCEPTED
+        line.write = write
+        servo.bus.run(iter(Pause(2.0)))
+        assert len(slept) == 1
+        assert real.motion.position(real._now()) - slept[0] > 1000, (
+            "counts; it was on its way for two seconds"
+        )

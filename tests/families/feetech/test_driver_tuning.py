@@ -19,7 +19,7 @@ from motorbus.families.feetech.driver import (
     torque_limit,
 )
 from motorbus.families.feetech.table import TABLES
-from tests.families.feetech.driver_script import before, play, reads, watch, writes
+from tests.families.feetech.driver_script import looks, play, reads, watch, writes
 from tests.families.feetech.maps import met, prepares_as, simulated
 
 IDLE = reads(3, 64, 0)
@@ -27,7 +27,7 @@ OFF = writes(3, 40, 0)
 
 
 def guarded(*lines: Any, lock: int = 55) -> tuple[Any, ...]:
-    opened = (*before(*lines), writes(3, lock, 0), OFF, IDLE)
+    opened = (*looks(*lines), writes(3, lock, 0), OFF, IDLE)
     return (*opened, *lines, reads(3, lock, 0), writes(3, lock, 1), reads(3, lock, 1))
 
 

@@ -44,6 +44,7 @@ def test_the_mid_point_is_set_and_saved(profile: str, value: str) -> None:
     assert (
         play(
             driver.set_mid_point(node(profile)),
+            ("605#4002600000000000", "4b02600064000000"),
             (f"605#22093000{value}000000", "6009300000000000"),
             SAVE,
             ("605#4002600000000000", "4b02600000000000"),
@@ -71,8 +72,9 @@ def test_what_gives_positions_another_meaning_is_seen_by_gate_and_stop(verb: str
         here = there.sim().raw_position
         assert there.sent()[0] == "605#4002600000000000", "what was read before is no place to hold at"
         assert there.sim().memory["goal_position"] == here
+        there.sim().raw_position = 300
         with pytest.raises(Interrupted):
-            servo.set_mid_point() if verb == "set_mid_point" else servo.set_reversed(True)
+            servo.set_mid_point() if verb == "set_mid_point" else servo.set_reversed(False)
         with pytest.raises(Interrupted):
             servo.set_travel_limits(-0.5, 0.5)
         assert [frame for frame in there.sent() if "#22" in frame] == []
@@ -94,6 +96,7 @@ def test_a_servo_that_sets_off_with_another_zero_is_stopped(name: str) -> None:
 
 def test_a_mid_point_is_never_set_twice() -> None:
     with bench(profile="kst-ext", line=Deafening()) as there:
+        there.sim().raw_position = 600
         with pytest.raises(OutcomeUnknown):
             there.servo().set_mid_point()
         assert [frame for frame in there.sent() if "#2209" in frame] == ["605#2209300000000000"]
@@ -128,7 +131,7 @@ def test_only_the_one_known_bit_is_changed() -> None:
     told, turned = "4f0f300091000000", "4f0f3000b1000000"
     play(
         driver.set_reversed(node("kst-ext"), True),
-        (BITS, told),
+        *[(BITS, told), (BITS, told)],
         ("605#220F3000B1000000", "600f300000000000"),
         *[(BITS, turned), (BITS, turned), SAVE, (BITS, turned)],
     )

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import radians
+from typing import Any
+
 import pytest
 
 from motorbus.core.operation import ANY, Effect, Timeout
 from motorbus.errors import DeviceError, OutcomeUnknown, VerificationFailed
 from motorbus.families.kst import FAMILY, driver
+from motorbus.families.kst.driver.exchanges import order
 from motorbus.families.kst.driver.keeping import keep, save_exchange
 from tests.families.kst.bench import abort, bench, node, play
 
@@ -53,11 +58,11 @@ def test_a_write_that_fails_is_tried_three_times() -> None:
     ack = "600a300000000000"
     play(
         keep(one, [(row, -500)]),
-        *[(LIMIT, ack), (READ, OTHER)] * 2,
+        *[(READ, OTHER), *[(LIMIT, ack), (READ, OTHER)] * 2],
         *[(LIMIT, ack), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, TOLD)],
     )
     with pytest.raises(VerificationFailed, match="reads back -1000, not -500") as raised:
-        play(keep(one, [(row, -500)]), *[(LIMIT, ack), (READ, OTHER)] * 3)
+        play(keep(one, [(row, -500)]), (READ, OTHER), *[(LIMIT, ack), (READ, OTHER)] * 3)
     assert raised.value.received == bytes.fromhex("18fc")
 
 
@@ -66,6 +71,7 @@ def test_a_write_that_left_and_cannot_be_read_back_is_of_unknown_outcome() -> No
     with pytest.raises(OutcomeUnknown, match="whether the write of negative_limit took effect is not known"):
         play(
             keep(one, [(one.table["negative_limit"], -500)]),
+            (READ, OTHER),
             (LIMIT, "600a300000000000"),
             (READ, None),
         )
@@ -76,12 +82,65 @@ def test_what_the_save_undid_is_told() -> None:
     with pytest.raises(VerificationFailed):
         play(
             keep(one, [(one.table["negative_limit"], -500)]),
-            *[(LIMIT, "600a300000000000"), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, OTHER)],
+            *[
+                (READ, OTHER),
+                (LIMIT, "600a300000000000"),
+                (READ, TOLD),
+                (READ, TOLD),
+                (SAVE, None),
+                (READ, OTHER),
+            ],
         )
 
 
 def test_a_slow_make_is_waited_for() -> None:
     with bench(profile="xqpower") as there:
+        there.sim().raw_position = 600
         begun = there.link.now()
         there.servo().set_mid_point()
         assert there.link.now() - begun >= 0.5
+
+
+APPLIED: dict[str, Callable[[Any], object]] = {
+    "limits": lambda servo: servo.set_travel_limits(-0.5, 0.25),
+    "limits by name": lambda servo: servo.write(negative_limit=-0.5, positive_limit=0.75),
+    "reverse bit": lambda servo: servo.set_reversed(True),
+    "mid point": lambda servo: servo.set_mid_point(),
+}
+
+
+@pytest.mark.parametrize("what", APPLIED)
+def test_d9_the_same_configuration_again_is_neither_written_nor_saved(what: str) -> None:
+    with bench(profile="kst-ext") as there:
+        there.sim().raw_position = 600
+        APPLIED[what](there.servo())
+        assert there.sent().count(SAVE) == 1
+        APPLIED[what](there.servo())
+        assert [frame for frame in there.sent() if frame[:6] == "605#22"] == []
+
+
+def test_d9_what_this_node_wrote_and_did_not_save_is_written_and_saved_whatever_it_reads() -> None:
+    one = node("kst-ext")
+    row = one.table["negative_limit"]
+    with pytest.raises(OutcomeUnknown):
+        play(keep(one, [(row, -500)]), (READ, OTHER), (LIMIT, "600a300000000000"), (READ, None))
+    assert one.unsaved == {"negative_limit"}
+    play(
+        keep(one, [(row, -500)]),
+        *[(LIMIT, "600a300000000000"), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, TOLD)],
+    )
+    play(keep(one, [(row, -500)]), (READ, TOLD))
+
+
+def test_d9_what_others_did_not_save_cannot_be_seen_and_a_save_keeps_it() -> None:
+    with bench(profile="kst-ext") as there:
+        servo, stranger = there.servo(), there.servo()
+        limit = servo.table["negative_limit"]
+        for saves in (False, True):
+            there.run(order(stranger, limit, -500))
+            servo.write(negative_limit=radians(-50))
+            if saves:
+                servo.save()
+            there.sim().power_cycle()
+            kept = there.sim().memory["negative_limit"]
+            assert (kept == -500) is saves, "which no host can know: it reads the same"

@@ -72,6 +72,6 @@ def test_limits_by_name_are_kept_and_read_back() -> None:
         servo.write(negative_limit=-0.5, positive_limit=0.75)
         frames = there.sent()
         assert frames.count("605#2210100173617665") == 1
-        assert [frames.count(f"605#40{index}300000000000") for index in ("0A", "0B")] == [3, 3]
+        assert [frames.count(f"605#40{index}300000000000") for index in ("0A", "0B")] == [4, 3]
         there.sim().power_cycle()
         assert servo.travel_limits() == pytest.approx((-0.5, 0.75), abs=0.001)

@@ -303,3 +303,13 @@ def test_a_lease_has_the_time_of_the_robot() -> None:
     assert line.gate.loss() is None
     line.now = 101.0
     assert line.gate.loss() is not None
+
+
+def test_a_gate_that_was_told_of_no_clock_takes_whatever_was_seen_for_old() -> None:
+    gate, guard = Gate(), Guard("elbow", Bounds())
+    gate.guards[1] = guard
+    assert guard.track is not None
+    guard.track.take(0.0, 1e9)
+    with pytest.raises(Refused, match="inf s ago") as caught:
+        gate(motion(place(0.1)))
+    assert caught.value.reason == "stale"

@@ -105,7 +105,7 @@ def test_a_limit_admits_itself_and_the_noise_of_a_conversion_and_nothing_beyond(
     value: float, low: float | None, high: float | None, fine: bool
 ) -> None:
     assert pytest.approx(1e-9) == ROUNDING
-    order = Exchange(b"\x01", effect=Effect.MOTION, goals=(place(value, 1, low, high),))
+    order: Exchange[Answer] = Exchange(b"\x01", effect=Effect.MOTION, goals=(place(value, 1, low, high),))
     for gate in (Gate(), known(bounds=Bounds()).gate):
         if gate.guards and not abs(value) < 1.0:
             continue  # a guard has its own word on those
@@ -155,9 +155,12 @@ def test_what_is_known_of_one_is_not_of_another_that_was_not_heard() -> None:
 
 def test_an_answer_that_tells_of_many_is_read_once() -> None:
     line, read = Line(1, 2, 3), []
-    exchange: Exchange[Any] = Exchange(
-        b"?", tells_position=lambda answer: (read.append(answer), dict.fromkeys((1, 2, 3), 0.0))[1]
-    )
+
+    def where(answer: Answer) -> dict[int, float]:
+        read.append(answer)
+        return dict.fromkeys((1, 2, 3), 0.0)
+
+    exchange: Exchange[Any] = Exchange(b"?", tells_position=where)
     for _ in range(2):
         line.now += 0.1
         line.seen.update(dict.fromkeys((1, 2, 3), (exchange, Answer((), (), line.now))))

@@ -65,7 +65,7 @@ class Canary:
 
     def is_armed(self, stops: int) -> bool:
         """Whether it was given torque, and no stop has left for it since."""
-        return self._stops is not None and self._stops == stops
+        return self._stops == stops
 
     def take(self, health: Health, *, armed: bool, led: bool) -> str:
         """Judge how a device fares: "" or the reason of a fault. Each sample once.
@@ -91,9 +91,8 @@ class Canary:
 
 def looked_at(axis: AxisVerbs, health: Health, *, led: bool = False) -> Faulted | None:
     """Judge a sample of an axis; when that shows a fault the axis is at fault from here on, and this is the error."""
-    armed = holds(axis)
-    reason = axis.canary.take(health, armed=armed, led=led)
-    if not reason or not (armed or axis.engaged or axis.under_way):
+    reason = axis.canary.take(health, armed=holds(axis), led=led)
+    if not reason or not (axis.engaged or axis.under_way):
         return None
     error = _faulted(axis, health, reason)
     fault(axis, error.summary.partition(": ")[2])

@@ -28,14 +28,12 @@ if TYPE_CHECKING:
 
 def fence(body: Body) -> None:
     """Set a guard over every axis of this machine, by what is known of it by now; endless motion is to be attended."""
-    for name, bus in body.buses.items():
+    for name, bus in body.buses.items():  # axes of the file that were not opened are there all the same
+        enclose(bus, {one: spec for one, spec in body.machine.axes.items() if spec.bus == name})
         if isinstance(bus.admit, Gate):
-            _watched(bus, bus.admit)
             bus.admit.attended, bus.admit.origin = True, body.origins[name]
             here = [axis for axis in body.axes.values() if axis.spec.bus == name]
             bus.turns.anew += tuple(partial(unknown, axis) for axis in here)
-    for name, bus in body.buses.items():  # those of the file that were not opened are there all the same
-        enclose(bus, {one: spec for one, spec in body.machine.axes.items() if spec.bus == name})
     for axis in body.axes.values():
         gate = body.buses[axis.spec.bus].admit
         if isinstance(gate, Gate):
@@ -68,10 +66,11 @@ def _watched(bus: BusFace, gate: Gate) -> None:
 def follow(bus: BusFace, gate: Gate, event: Readdressed) -> None:
     """A device is about to answer to another id: its guard holds, and its fault counts, under that one as well.
 
-    An id that the machine file has bounds for keeps those. Where nobody knows which device it is, it may be any.
+    An id that the machine file has bounds for keeps those. Where nobody knows which device it is, it may be any: the
+    first bounds it, and any fault counts.
     """
     known = [node for node in gate.guards if event.node in (None, node)]
-    for node in known[:1]:
+    for node in known:
         if event.new not in gate.guards:
             gate.guards[event.new] = _moved(bus, gate.guards[node], event.new)
         if node in gate.faults:
@@ -93,9 +92,9 @@ def _asking(bus: BusFace, node: int) -> Callable[[], Runnable[Any]] | None:
 
 def guard(axis: AxisVerbs) -> Guard:
     """The guard over one axis."""
-    position = axis.able.get("position")
-    if position is None and axis.reckoning is not None:
+    if axis.reckoning is not None:
         return _reckoned(axis, axis.reckoning)
+    position = axis.able.get("position")
     ask = None if position is None else partial(position, axis.device)
     return _guard(axis.name, axis.spec, ask, partial(_ordered, axis))
 

@@ -100,7 +100,7 @@ class Watch:
         ):  # others set it up anew, and it is not known well enough for the moment
             self._passed(node, now, 0.0)
             return None
-        if self._air(wanted) > slack and now < self._last[node] + OVERDUE * HEALTH:
+        if self._air(wanted) > slack and now < self._last.get(node, -inf) + OVERDUE * HEALTH:
             return None
         return wanted
 

@@ -162,9 +162,9 @@ def _stay(node: Node, table: Table) -> Operation[Promise]:
         if again and (waited > OLD or told - asked > SLEPT):
             continue
         yield from ordered(node, table, here)
-        if (yield from Pause(0.0)) - asked <= SLEPT:
+        if not again or (yield from Pause(0.0)) - asked <= SLEPT:
+            yield from not_turns_away(node, table, here)
             break
-    yield from not_turns_away(node, table, here)
     return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
 
 

@@ -46,6 +46,9 @@ def stop_reports(node: Node) -> Operation[None]:
 def set_mid_point(node: Node) -> Operation[float]:
     """Make the present position the zero, and save; returns the position (rad) that it tells afterwards, about 0.
 
+    A servo that tells 0 already is left as it is, for flash wears, unless this node has set its mid point and not come
+    to the save. Whether somebody else's zero was saved nobody can tell: save() keeps it.
+
     No source tells what becomes of the old target, which now lies elsewhere: keep clear, and order a target next. It
     is refused while a stop is latched, and never repeated in silence: OutcomeUnknown says that it may have been heard.
     """
@@ -55,10 +58,15 @@ def set_mid_point(node: Node) -> Operation[float]:
 
 
 def _mid_point(node: Node, row: Entry) -> Operation[float]:
+    present = node.table["present_position"]
+    if row.name not in node.unsaved and not (yield from upload_row(node, present, int, tells_position=True)):
+        return 0.0
     node.limits = None
+    node.unsaved.add(row.name)
     yield from order(node, row, node.profile.mid_point_value, rank=Rank.CONFIGURATION)
     yield from save(node)
     yield from settled(node)
+    node.unsaved.discard(row.name)
     return (yield from position_exchange(node))
 
 
@@ -72,6 +80,8 @@ def travel_limits(node: Node) -> Operation[tuple[float, float]]:
 
 def set_travel_limits(node: Node, low: float, high: float) -> Operation[None]:
     """Keep it between `low` (at most 0) and `high` (at least 0), rad; read back, saved, and read back again.
+
+    Limits that it has already are neither written nor saved again (see `keep` for what that cannot know).
 
     While the sense of rotation is reversed, a change of one limit changes the other too: VerificationFailed tells so
     unless they are symmetric; set_reversed(False) first, as a public flight-controller driver does. Raises

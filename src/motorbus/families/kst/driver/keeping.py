@@ -62,6 +62,10 @@ def save_exchange(node: Node) -> Exchange[None]:
 def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
     """Write these rows, read back, save, read back again; nobody else is on the bus meanwhile.
 
+    They are read first. When all of them hold this already, nothing is written and nothing saved, for flash wears;
+    unless this node has written one of them and has not come to its save. What others wrote and did not save reads just
+    the same, and so does what a save that got lost has left: `save()` keeps it, and only a restart shows what is kept.
+
     Raises VerificationFailed when a row reads back different after three tries, or after the save.
     """
     node.limits = None
@@ -72,12 +76,25 @@ def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
 
 
 def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+    names = {row.name for row, _ in orders}
+    if names.isdisjoint(node.unsaved) and (yield from _alike(node, orders)):
+        return
+    node.unsaved |= names
     for row, raw in orders:
         yield from verified(node, row, raw)
     yield from checked(node, orders)  # together, for one may have changed another
     yield from save(node)
     yield from settled(node)
     yield from checked(node, orders)
+    node.unsaved -= names
+
+
+def _alike(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[bool]:
+    """Whether all of these rows can be read, and hold this."""
+    for row, raw in orders:
+        if not row.readable or (yield from upload_row(node, row, int)) != raw:
+            return False
+    return True
 
 
 def settled(node: Node) -> Operation[None]:

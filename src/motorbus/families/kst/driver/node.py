@@ -20,7 +20,7 @@ class Node:
     """One servo by its id, 1 to 127, and what is known of it.
 
     `at` is the arrival of its last answer on the link's clock (s); `limits` its travel limits in rad as last read,
-    None when not read yet.
+    None when not read yet. `unsaved` names the rows that were written here and are not known to have been saved.
     """
 
     def __init__(self, node: int, dialect: Dialect = PLAIN) -> None:
@@ -28,6 +28,7 @@ class Node:
         self.dialect: Final = dialect
         self.limits: tuple[float, float] | None = None
         self.at = -inf
+        self.unsaved: set[str] = set()
 
     @property
     def profile(self) -> Profile:
