@@ -113,6 +113,8 @@ class Rig:
     """Verbs in the middle of which the adapter is pulled."""
     pulling: ClassVar[tuple[float, float]] = (-5, -2)
     """How long after the beginning of a call, as a power of ten of a second."""
+    stores: ClassVar[str]
+    """A verb that writes what is kept without supply."""
     once: ClassVar[Collection[Hashable]] = ()
     """Orders that do something each time they are carried out, so none is said twice in a call."""
 
@@ -256,8 +258,8 @@ class Rig:
         )
 
     def spend(self) -> None:
-        """Make an exchange that may fail."""
-        self.probe()
+        """Make an exchange that may fail; what waits for something to be stored gets that."""
+        self.verbs[self.stores](Random(self.line.exchange)) if self.world.armed else self.probe()
 
     def probe(self) -> Window:
         """The plainest call there is, of everybody in turn, judged."""

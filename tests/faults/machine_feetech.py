@@ -47,6 +47,7 @@ FAULTS: Final = {
     "request short": "byte {byte} to device: truncate",
     "power cycle": ": power-cycle {node}",
     "brown-out": "byte {byte}: brown-out {near} {node}",
+    "torn eeprom": ": torn-eeprom {node}",
     "clock step": ": clock-step 3600",
 }
 
@@ -56,6 +57,7 @@ class FeetechRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    stores = "write a setting"
     just = (0.0215, 0.0217)
     reads = ("ping", "read", "telemetry", "sync read", "at once", "foreign", *MEASURED)
     plain = ("position", "write", "move", "load")

@@ -44,6 +44,7 @@ FAULTS: Final = {
     "request copied": "to device: duplicate",
     "power cycle": ": power-cycle {node}",
     "brown-out": ": brown-out {near} {node}",
+    "torn eeprom": ": torn-eeprom {node}",
     "clock step": ": clock-step 3600",
 }
 
@@ -53,6 +54,7 @@ class KstRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    stores = "write"
     just = (0.0499, 0.0505)
     reads = ("ping", "position", "read", "telemetry", "at once", "foreign")
     plain = ("position", "move")  # one that is storing something answers nothing for a while

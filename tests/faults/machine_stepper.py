@@ -62,6 +62,7 @@ FAULTS: Final = {
     "request short": "byte {byte} to device: truncate",
     "power cycle": ": power-cycle {node}",
     "brown-out": "byte {byte}: brown-out {near} {node}",
+    "torn eeprom": ": torn-eeprom {node}",
     "clock step": ": clock-step 3600",
 }
 
@@ -71,14 +72,15 @@ class StepperRig(Rig):
 
     costs = COSTS
     faults = FAULTS
+    stores = "write"
     just = (0.165, 0.23)
     reads = ("ping", "read a project", "inputs")
     plain = ("inputs", "set an output", "set a delay", "select", "stop")
     pulling = (-4, -0.8)
     once = (*JOGS, "run_once", "start_project")
 
-    def __init__(self) -> None:
-        super().__init__(FAMILY, FAMILY.simulator((1,), turnaround=0.03), 9600, pace=True)
+    def __init__(self, pace: bool = True) -> None:
+        super().__init__(FAMILY, FAMILY.simulator((1,), turnaround=0.03), 9600, pace=pace)
         self.controller = Controller(self.bus)
         self.there = self.simulator.nodes[1]
         self.obeyed: deque[tuple[float, str, dict[str, int]]] = deque(maxlen=1000)

@@ -18,7 +18,9 @@ from motorbus.link import reconnect
 from motorbus.link.lock import PortLock
 from motorbus.link.pty import PtyMaster
 from motorbus.link.reconnect import FIRST, LONGEST, Reconnecting, knock, reconnecting
+from motorbus.link.serial import AGREEING
 from motorbus.link.url import open_link
+from tests.link.rfc2217 import Server
 from tests.link.usb import usb_port
 
 RATE = 1_000_000
@@ -286,6 +288,17 @@ def test_l12_a_server_is_found_at_its_address() -> None:
         assert far.recv(100) == b"question"
         far.close()
         link.close()
+
+
+def test_a_server_that_is_mute_when_it_is_back_holds_nobody_up_for_long() -> None:
+    server = Server()
+    link, (_, port) = opened(server.url), server.listener.getsockname()
+    server.close()
+    with pytest.raises(LinkLost):
+        link.read(link.now() + 30)
+    with socket.create_server(("127.0.0.1", port)), pytest.raises(LinkLost, match=f"within {AGREEING:g} s"):
+        link.renew(1)
+    link.close()
 
 
 def test_a_server_that_ends_is_known_before_a_library_waits_for_it() -> None:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 CHUNK = 4096
 TOLERANCE = 0.025  # of the rate; beyond it the stop bit of a byte is missed
 ASK_AGAIN = 0.001  # s between two looks at a port that has no descriptor
+AGREEING = 0.5  # s for a server that is looked for anew to agree on its options: a few ways there and back
 REMOTE_LATENCY = 0.020  # s for an RFC 2217 server: the network, and whatever adapter is at its other end
 MEMORY_DEVICES = 1  # Linux Documentation/admin-guide/devices.txt
 GONE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
@@ -173,13 +174,16 @@ class SerialLink:
 class PolledLink:
     """A port without a descriptor to wait for: a COM port of Windows, or a server that speaks RFC 2217.
 
-    It is looked at once a millisecond while somebody waits. Arguments and errors as for `SerialLink`.
+    It is looked at once a millisecond while somebody waits. Arguments and errors as for `SerialLink`; a server may take
+    so many s of `patience`.
     """
 
     virtual = False
     simulated = False
 
-    def __init__(self, port: str, *, rate: int, kept: PortLock | None = None) -> None:
+    def __init__(
+        self, port: str, *, rate: int, kept: PortLock | None = None, patience: float = CONNECT_TIME
+    ) -> None:
         remote = "://" in port
         if remote:
             split_address(port)
@@ -192,7 +196,7 @@ class PolledLink:
         self._closed = False
         self.lock = taken(port, kept)
         try:
-            self._serial = _opened(port, port, rate)
+            self._serial = _opened(port, port, rate, patience)
         except BaseException:
             self.lock.release()
             raise
@@ -250,10 +254,16 @@ class PolledLink:
             raise lost(self.name, "it is closed")
 
 
-def open_serial(port: str, *, rate: int, kept: PortLock | None = None) -> SerialLink | PolledLink:
-    """Open a device, a COM port or an rfc2217:// URL. Errors as for `SerialLink`."""
+def open_serial(
+    port: str, *, rate: int, kept: PortLock | None = None, patience: float | None = None
+) -> SerialLink | PolledLink:
+    """Open a device, a COM port or an rfc2217:// URL. Errors as for `SerialLink`.
+
+    A server that is waited for with `patience` (s) gets a while to agree on its options all the same.
+    """
     if "://" in port or os.name == "nt":
-        return PolledLink(port, rate=rate, kept=kept)
+        allowed = CONNECT_TIME if patience is None else max(patience, AGREEING)
+        return PolledLink(port, rate=rate, kept=kept, patience=allowed)
     return SerialLink(port, rate=rate, kept=kept)
 
 
@@ -267,14 +277,16 @@ def could_be_a_port(device: str) -> bool:
     return stat.S_ISCHR(about.st_mode) and not is_memory
 
 
-def _opened(port: str, target: str, rate: int) -> BaseSerial:
+def _opened(port: str, target: str, rate: int, patience: float = CONNECT_TIME) -> BaseSerial:
     import serialx
 
     try:
-        serial = serialx.serial_for_url(target, baudrate=rate, connect_timeout=CONNECT_TIME)
+        serial = serialx.serial_for_url(target, baudrate=rate, connect_timeout=patience)
         serial.open()
     except OSError as error:
-        (_refuse_remote if "://" in port else _refuse)(port, target, error)
+        if "://" in port:
+            _refuse_remote(port, patience, error)
+        _refuse(port, target, error)
     except serialx.UnsupportedSetting as error:
         raise wrong_rate(port, rate, error) from error
     except (serialx.SerialException, ValueError) as error:
@@ -295,11 +307,11 @@ def _refuse(port: str, device: str, error: OSError) -> NoReturn:
     raise LinkError(f"{port} cannot be opened: {error.strerror or error}") from error
 
 
-def _refuse_remote(port: str, _: str, error: OSError) -> NoReturn:
+def _refuse_remote(port: str, patience: float, error: OSError) -> NoReturn:
     """Say why a server cannot be used."""
     if isinstance(error, TimeoutError):
         raise LinkError(
-            f"{port}: no RFC 2217 answer within {CONNECT_TIME:g} s",
+            f"{port}: no RFC 2217 answer within {patience:g} s",
             cause="the host is off, or it passes bytes on without that protocol",
             advice="try socket:// in place of rfc2217://",
         ) from error

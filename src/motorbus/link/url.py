@@ -26,7 +26,7 @@ def open_link(
     `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
     wants: bytes or frames; `options` are for the CAN adapter. Raises RequestError for what is no port,
     PortNotFound, PortBusy (naming its owner) or LinkError. `kept` is a lock that we have already, maybe of this port;
-    `patience` how long (s) the host of a socket is waited for.
+    `patience` how long (s) a host of the network is waited for.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
     if scheme == "can" and kind == "frames" and "\0" not in port:
@@ -42,7 +42,7 @@ def open_link(
         return TcpLink(port, rate=rate, kept=kept, **more)
     from motorbus.link.serial import open_serial
 
-    return open_serial(port, rate=rate, kept=kept)
+    return open_serial(port, rate=rate, kept=kept, patience=patience)
 
 
 def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:

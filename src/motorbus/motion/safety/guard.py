@@ -158,7 +158,7 @@ class Guard:
         """It was ordered this: whoever has set the guard is to know. What only bounds a movement moves nothing."""
         stays = goal.stays is not None
         if goal.quantity == "relative" or stays:
-            self.adds(0.0 if stays else goal.value, ends=stays)
+            self.adds(goal.value, ends=stays)
         if goal.stays is Stays.ON:
             self.ordered(False)
         elif not stays and (goal.quantity in PLACES or (goal.quantity in ENDLESS and goal.value)):
