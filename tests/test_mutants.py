@@ -138,6 +138,12 @@ def test_the_page_is_made_of_what_is_kept() -> None:
     assert set(told) <= set(known)
 
 
+def test_every_reason_is_of_a_fault_that_there_is() -> None:
+    """Else the line was changed since, and what was said of it is of nothing."""
+    for subject in subjects().values():
+        assert subject.reasons.keys() <= {one.name for one in faults(subject, Wish())}
+
+
 def test_every_survivor_has_its_reason() -> None:
     known = subjects()
     assert [

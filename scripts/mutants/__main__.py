@@ -2,8 +2,8 @@
 
     python -m scripts.mutants                        every module
     python -m scripts.mutants kst-wire journal       some
-    python -m scripts.mutants safety --only fence.py  only faults with this text in their name
-    python -m scripts.mutants safety --sample 0.1    a tenth of the faults, always the same one
+    python -m scripts.mutants safety-gate --only fence.py   only faults with this text in their name
+    python -m scripts.mutants kst-wire --tables 0.1  of the faults in tables a tenth, always the same one
     python -m scripts.mutants kst-wire --json x.json, then --again x.json   what survived, once more
     python -m scripts.mutants --keep                 all, and docs/reference/mutants.* made of it
     python -m scripts.mutants --write | --check      the page of what is kept: make it, or see that it is current
@@ -34,16 +34,14 @@ def main() -> int:
     known = subjects()
     if told.write or told.check:
         status = pages.kept({PAGE: page(known, kept())})
-        return status or int(any(_say(known[name], one) for name, one in kept().items()))
+        wrong = [line for name, one in kept().items() for line in _say(known[name], one)]
+        return status or int(bool(wrong))
     failed, found = False, {}
     for name in told.modules or known:
         found[name] = verdicts = _tried(known[name], told)
         result = outcome(verdicts, len(faults(known[name], Wish())))
-        whole = told.sample == 1 and not told.only
-        failed |= bool(
-            _say(known[name], result if whole else {**result, "noticed": result["faults"]}, whole=whole)
-        )
-        if told.keep and whole:
+        failed |= bool(_say(known[name], result, whole=not told.only))
+        if told.keep and not told.only:
             keep(name, result)
     if told.json:
         Path(told.json).write_text(json.dumps(found, indent=1, ensure_ascii=False), encoding="utf-8")
@@ -61,7 +59,13 @@ def _tried(subject: Subject, told: argparse.Namespace) -> list[Verdict]:
 
     print(subject.name, file=sys.stderr)
     wish = Wish(
-        told.sample, told.only, told.anew, told.tables, told.swapped, told.jobs, _known(subject, told), tell
+        only=told.only,
+        anew=told.anew,
+        tables=told.tables,
+        swapped=told.swapped,
+        at_once=told.jobs,
+        known=_known(subject, told),
+        tell=tell,
     )
     verdicts = trial(subject, wish)
     os.close(voice)
@@ -92,7 +96,6 @@ def _asked() -> argparse.Namespace:
         prog="python -m scripts.mutants", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument("modules", nargs="*", help="names of scripts/mutants.toml; all when left out")
-    parser.add_argument("--sample", type=float, default=1.0, help="share of the faults that is tried, 0 to 1")
     parser.add_argument("--only", default="", help="a text that the name of a fault must have")
     parser.add_argument(
         "--tables", type=float, default=1.0, help="share of what happens at import, which is slow"

@@ -31,7 +31,6 @@ LEFT_ALONE = (
     "returns",
     "decorator_list",
     "bases",
-    "keywords_of_class",
     "format_spec",
     "type_params",
 )

@@ -7,13 +7,12 @@ import random
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from scripts.mutants.changes import Mutant, mutants
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DATA = ROOT / "scripts" / "mutants.toml"
-T = TypeVar("T")
 
 
 class Subject(NamedTuple):
@@ -55,7 +54,7 @@ class Verdict(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """How much is tried and how: a part of it by chance (0 to 1), names with a text in them, all imported anew.
+    """How much is tried and how: only names with a text in them, or all with the module imported anew.
 
     `tables` is the share (0 to 1) that is tried, by chance, of what a module does while it is imported: its tables,
     constants and defaults, each of which takes a process that imports everything anew.
@@ -63,7 +62,6 @@ class Wish(NamedTuple):
     `known` are tests that have noticed faults in an earlier run, by the faults; these are not tried again.
     """
 
-    sample: float = 1.0
     only: str = ""
     anew: bool = False
     tables: float = 1.0
@@ -99,16 +97,12 @@ def _found(name: str, patterns: object) -> tuple[str, ...]:
 
 
 def faults(subject: Subject, wish: Wish) -> list[Fault]:
-    """All that are to be tried; a sample is the same one as long as the files stay as they are."""
+    """All that are to be tried; a share of them is the same one as long as the files stay as they are."""
     found = []
     for file in subject.files:
         tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
         found += [Fault(file, tree, one) for one in mutants(tree)]
     found = [one for one in found if wish.only in one.name]
     at_import = [one.name for one in found if not one.mutant.swapped]
-    tables = set(_sample(at_import, wish.tables))
-    return _sample([one for one in found if one.mutant.swapped or one.name in tables], wish.sample)
-
-
-def _sample(of: list[T], share: float) -> list[T]:
-    return random.Random(1).sample(of, round(len(of) * share)) if share < 1 else of
+    tables = set(random.Random(1).sample(at_import, round(len(at_import) * wish.tables)))
+    return [one for one in found if one.mutant.swapped or one.name in tables]

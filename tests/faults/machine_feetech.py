@@ -180,7 +180,7 @@ class FeetechRig(Rig):
     def set(self, random: Random) -> Window:
         servo, (name, low, high) = (
             self.one(random),
-            random.choice([("max_temperature", 50, 100), ("position_p", 20, 250), ("min_voltage", 20, 40)]),
+            random.choice([("max_temperature", 50, 100), ("position_p", 20, 250)]),
         )
         raw, value = self.value(servo, name, low, high)
         return self.writing(servo, name, raw, lambda: servo.write(**{name: value}))

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from random import Random
+from types import MappingProxyType
 from typing import Any, Final
 
 from motorbus.core.operation import Data, Effect, Exchange
@@ -73,6 +74,9 @@ class StepperRig(Rig):
     costs = COSTS
     faults = FAULTS
     stores = "write"
+    suits = MappingProxyType(
+        {"echo, and unheard": "stop", "the last try late, and the next unheard": "set an output"}
+    )
     just = (0.165, 0.23)
     reads = ("ping", "read a project", "inputs")
     plain = ("inputs", "set an output", "set a delay", "select", "stop")

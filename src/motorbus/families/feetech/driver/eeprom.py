@@ -84,9 +84,8 @@ def _stored_unlike(node: Node, table: Table, blocks: Sequence[Block], always: bo
             if moves(table, change.block):
                 yield from still_open(node, lock)
             begun.append(change)
-            yield from stored(
-                node, change.block._replace(effect=Effect.PERSISTENT)
-            )  # it is limp: nothing can move
+            block = change.block._replace(effect=Effect.PERSISTENT)  # it is limp: nothing can move
+            yield from stored(node, block)
 
     yield from _guarded(node, table, write, begun)
     return True
@@ -104,9 +103,8 @@ def _unlike(node: Node, table: Table, block: Block, always: bool) -> Operation[l
     for row in rows:
         at = range(row.address - block.address, row.address - block.address + row.size)
         cells = slice(at.start, at.stop)
-        if block.data[cells] == found[cells] and node.unsure.isdisjoint(
-            range(row.address, row.address + row.size)
-        ):
+        sure = node.unsure.isdisjoint(range(row.address, row.address + row.size))
+        if sure and block.data[cells] == found[cells]:
             continue
         if runs and runs[-1].stop == at.start:
             at = range(runs.pop().start, at.stop)

@@ -1,9 +1,9 @@
 """How strong, how stiff and how careful a servo is: torque limit, gains of its loops, protection; as verbs.
 
 Which registers a servo has for this is a question of its map, and asking for what it lacks is refused by name. What
-lies in EEPROM goes through the guarded sequence, after which the servo is limp; what lies in RAM acts at once and is
-gone after power-off. Registers 34 and 35 are gains of the current loop on HLS and protection on STS: here they are
-found by what they are, never by where they are.
+lies in EEPROM goes through the guarded sequence, after which the servo is limp, unless it holds that already (`write`);
+what lies in RAM acts at once and is gone after power-off. Registers 34 and 35 are gains of the current loop on HLS and
+protection on STS: here they are found by what they are, never by where they are.
 Source: FD 1.9.8.5; STS3215 memory table V3.6; HLS memory table; SCS memory table 1902.
 """
 
@@ -176,9 +176,9 @@ def set_gains(
 ) -> Operation[None]:
     """Set gains by the names that `Gains` has, as set_gains(p=32, d=32); None leaves one as it is.
 
-    What lies in EEPROM is written for good by the guarded sequence, after which the servo is limp; the `live_…` ones
-    act at once until power-off. Raises RequestError, with nothing sent, for a gain that this servo lacks (and names
-    those it has) or out of range.
+    What lies in EEPROM is written for good by the guarded sequence, after which the servo is limp, unless it has these
+    gains already (see `write`); the `live_…` ones act at once until power-off. Raises RequestError, with nothing sent,
+    for a gain that this servo lacks (and names those it has) or out of range.
     """
     position, live = {"p": p, "i": i, "d": d}, {"live_p": live_p, "live_i": live_i, "live_d": live_d}
     velocity = {"velocity_p": velocity_p, "velocity_i": velocity_i}
@@ -221,8 +221,9 @@ def set_protection(
     """Set parts of the protection by the names that `Protection` has; None leaves one as it is.
 
     set_protection(torque=0.2, threshold=0.8, time=2.0, unload=("temperature", "overload")). All of it lies in EEPROM:
-    the servo goes limp and stays so. Raises RequestError, with nothing sent, for a part that this servo lacks (and
-    names those it has), out of range, for an alarm that it does not know, or for voltages that leave none between.
+    the servo goes limp and stays so, unless it has all of that already (see `write`). Raises RequestError, with nothing
+    sent, for a part that this servo lacks (and names those it has), out of range, for an alarm that it does not know,
+    or for voltages that leave none between.
     """
     overload = {"torque": torque, "threshold": threshold, "time": time}
     too_much = {"current": current, "current_time": current_time, "max_temperature": max_temperature}

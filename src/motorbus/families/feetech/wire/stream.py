@@ -82,7 +82,7 @@ class Stream(Generic[P]):
             if start + size > end and more:
                 position = start
                 break
-            position = start + 1
+            position = start + 1 if size else _behind(data, start)
             if not size or start + size > end:
                 continue
             if is_sound(packet := data[start : start + size]):
@@ -170,6 +170,13 @@ class StatusReceiver:
     def flush(self) -> list[Event]:
         """Nothing more comes: give what can be made of the rest."""
         return self._stream.flush()
+
+
+def _behind(data: bytes, start: int) -> int:
+    """Where to look on behind a header whose id is none: of many FF in a row only the last two can begin a packet."""
+    if data[start + 2] != HEADER[0]:
+        return start + 1
+    return len(data) - len(data[start:].lstrip(HEADER)) - len(HEADER)
 
 
 def _status(data: bytes) -> Packet:
