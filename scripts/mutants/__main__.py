@@ -2,7 +2,7 @@
 
     python -m scripts.mutants                        every module
     python -m scripts.mutants kst-wire journal       some
-    python -m scripts.mutants safety-gate --only fence.py   only faults with this text in their name
+    python -m scripts.mutants stop --only stop.py    only faults with this text in their name
     python -m scripts.mutants kst-wire --tables 0.1  of the faults in tables a tenth, always the same one
     python -m scripts.mutants kst-wire --json x.json, then --again x.json   what survived, once more
     python -m scripts.mutants --keep                 all, and docs/reference/mutants.* made of it

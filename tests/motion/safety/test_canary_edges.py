@@ -66,6 +66,21 @@ def test_only_what_was_seen_while_it_is_led_can_be_lost_while_it_is_led() -> Non
     assert bird.take(fares(blank=True), armed=True, led=True) == RESTART
 
 
+@pytest.mark.parametrize(
+    ("alarm", "reason"),
+    [
+        ("sensor", LET_GO),
+        ("temperature", LET_GO),
+        ("current", LET_GO),
+        ("overload", LET_GO),
+        ("voltage", RESTART),
+        ("angle", RESTART),
+    ],
+)
+def test_alarms_for_which_a_device_protects_itself_say_that_it_let_go(alarm: str, reason: str) -> None:
+    assert Canary().take(fares(torque=False, blank=True, alarm=(alarm,)), armed=True, led=True) == reason
+
+
 def test_one_that_was_disarmed_has_nothing_to_lose() -> None:
     bird = Canary()
     bird.prepare(0)
