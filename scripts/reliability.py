@@ -100,16 +100,22 @@ def _table(runs: Iterable[dict[str, Any]]) -> Iterator[str]:
 
 
 def together(runs: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row for many of a kind: those of one test whose names are the same up to the first comma.
+    """One row for many of a kind: those of one test that strike toward one side and begin alike up to a comma.
 
     Counts are added up, and of what begins with `longest` or `most` the largest is kept. Each by itself stands in the
     file of figures.
     """
     groups: dict[object, list[dict[str, Any]]] = {}
     for run in runs:
-        kind = run["what"].partition(",")[0], run["family"], run["test"].partition("[")[0], *run["figures"]
+        kind = _kind(run["what"]), run["family"], run["test"].partition("[")[0], *run["figures"]
         groups.setdefault(kind, []).append(run)
     return [row for group in groups.values() for row in (_summed(group) if len(group) >= MANY else group)]
+
+
+def _kind(what: str) -> str:
+    """What stands before the first comma, and toward whom the faults go."""
+    first, *others = what.split(", ")
+    return ", ".join([first, *(other for other in others if other.startswith("toward "))])
 
 
 def _summed(group: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -120,7 +126,7 @@ def _summed(group: list[dict[str, Any]]) -> list[dict[str, Any]]:
         if any(isinstance(value, str) for value in values) or name == "seed":
             continue
         figures[name] = max(values) if name.startswith(("longest", "most")) else sum(values)
-    what, test = last["what"].partition(",")[0], last["test"].partition("[")[0]
+    what, test = _kind(last["what"]), last["test"].partition("[")[0]
     return [{**last, "what": what, "test": test, "figures": figures}]
 
 

@@ -1,6 +1,6 @@
 """What `python -m scripts.mutants` does: which faults it knows, that it notices what tests notice, that its page is so.
 
-The trial itself is long and stands in `make soak`; here one small file of the project is tried with a few faults.
+The trial itself is long (`python -m scripts.mutants --keep`); here one small file is tried with a few faults.
 """
 
 from __future__ import annotations

@@ -58,11 +58,16 @@ def test_a_newer_run_takes_the_place_of_an_older_one(apart: Path, monkeypatch: p
 def test_many_of_a_kind_are_one_row(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number, kind in enumerate(("ping", "read", "write", "action")):
         soaked.record(
-            f"L1 faults, {kind}", family="kst", test=f"t.py::x[{kind}]", faults=10, wrong=0, longest_s=number
+            f"L1 faults, {kind}, toward us",
+            family="kst",
+            test=f"t.py::x[{kind}]",
+            faults=10,
+            wrong=0,
+            longest_s=number,
         )
     soaked.record("L1 faults, else", family="kst", test="u.py::y", faults=7, wrong=0, longest_s=9)
     page = written(monkeypatch, "--take")
-    assert "| L1 faults | kst | kinds 4, faults 40, wrong 0, longest s 3 | `t.py::x` 2" in page
+    assert "| L1 faults, toward us | kst | kinds 4, faults 40, wrong 0, longest s 3 | `t.py::x` 2" in page
     assert "| L1 faults, else | kst | faults 7, wrong 0, longest s 9 | `u.py::y` 2" in page
 
 

@@ -51,6 +51,7 @@ class Ledger:
             self.good += 1
         except AssertionError:
             self.wrong += 1
+            assert held or self.line.count > faults, "it was wrong, and nothing had struck it"
         except MotorbusError:
             self.failed += 1
             assert held or self.line.count > faults, "it failed, and nothing had struck it"

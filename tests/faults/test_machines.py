@@ -7,19 +7,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import settings
 from hypothesis.stateful import run_state_machine_as_test
 
+from motorbus.errors import MotorbusError
 from tests.conftest import Figures
-from tests.faults.machine import Machine, Rig, walk
+from tests.faults.machine import Machine, walk
 from tests.faults.machine_feetech import FeetechRig, FeetechSteps
 from tests.faults.machine_kst import KstRig, KstSteps
 from tests.faults.machine_stepper import StepperRig, StepperSteps
 
 MACHINES = {"feetech": FeetechSteps, "kst": KstSteps, "stepper": StepperSteps}
-RIGS: dict[str, Callable[[], Rig]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
+RIGS: dict[str, Callable[[], Any]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
 SHORT = settings(max_examples=12, stateful_step_count=30)
 FEW = 1_500
 """Exchanges of a walk in which faults of nearly every kind strike."""
@@ -58,6 +62,37 @@ def test_a_long_walk_among_faults(family: str, rounds: Callable[[int], int], fig
         processor_s=round(time.process_time() - began),
         **{f"failed_{says.value.replace(' ', '_')}": count for says, count in rig.oracle.failed.items()},
     )
+
+
+def test_a_walk_among_faults_where_a_line_takes_no_time() -> None:
+    """What comes sooner than bits can travel is no sign there, so an echo must be told from an answer by itself."""
+    rig = StepperRig(pace=False)
+    walk(rig, 7, FEW, often=0.1)
+    assert rig.line.count > FEW / 50
+    assert rig.oracle.judged > FEW / 20
+
+
+@pytest.mark.parametrize("family", ["feetech", "kst"])
+def test_two_devices_with_one_id_take_nothing_from_the_others(family: str) -> None:
+    """What the two say together is nobody's word; every other device is as right as before, among their answers."""
+    rig = RIGS[family]()
+    doubled, random = min(rig.history.nodes), Random(7)
+    rig.line.add(f"exchange {rig.line.exchange + 1}: duplicate-id {doubled}")
+    rig.spend()
+    assert rig.line.counts["duplicate-id"] == 1
+    others = {node: servo for node, servo in rig.servos.items() if node != doubled}
+    for _ in range(60):
+        rig.stir(random)
+        with suppress(MotorbusError):
+            rig.servos[doubled].position()
+        node = random.choice([*others])
+        with rig.oracle.call(rig.bound) as window:
+            value = others[node].position()
+        assert window.error is None
+        rig.oracle.told(
+            window, node, "present_position", others[node].raw(others[node].table["present_position"], value)
+        )
+    rig.sound()
 
 
 @pytest.mark.parametrize("family", RIGS)

@@ -12,7 +12,7 @@ from motorbus.core.operation import Operation
 from motorbus.errors import DeviceError, Faulted, MotorbusError, NoReply, Refused
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.safety import canary
-from motorbus.motion.safety.canary import HEALTH, LET_GO, RESTART, UNTRUSTED, Canary, FaultNoted
+from motorbus.motion.safety.canary import LET_GO, RESTART, UNTRUSTED, Canary, FaultNoted
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
 from tests.motion.safety.alone import Alone, fares
@@ -107,6 +107,14 @@ def test_a_restart_is_a_fault_of_who_has_torque_or_is_under_way_from_here(
     assert canary.why(axis) == ("arm#1 has restarted" if error else "")
 
 
+@pytest.mark.parametrize("led", [True, False, None])
+def test_others_may_tell_one_how_fast_to_be_unless_it_is_led(led: bool | None) -> None:
+    axis = given(Alone())
+    how = {} if led is None else {"led": led}
+    assert canary.looked_at(axis, fares(), **how) is None
+    assert (canary.looked_at(axis, fares(blank=True), **how) is not None) is bool(led)
+
+
 def test_who_was_let_go_from_here_or_stopped_holds_no_more() -> None:
     here = Alone()
     axis = given(here)
@@ -125,7 +133,7 @@ def test_who_was_let_go_from_here_or_stopped_holds_no_more() -> None:
 def test_who_has_torque_is_asked_again_a_quarter_of_a_second_after_the_last_look() -> None:
     here = Alone()
     axis = given(here)
-    for now, asked in ((10.0, 1), (10.0 + HEALTH - 1e-6, 1), (10.0 + HEALTH, 2)):
+    for now, asked in ((10.0, 1), (10.249, 1), (10.25, 2)):
         here.now = now
         here.run(canary.looked_after(axis, now))
         assert len(here.asked) == asked
@@ -310,6 +318,7 @@ def test_the_error_says_what_was_found_and_what_may_be_behind_it(
     error = canary.looked_at(axis, found)
     assert error is not None
     assert (error.summary, error.reason, error.node) == (f"n1 is at fault: {said}", reason, 1)
+    assert reason in ("let go", "restart")  # what programs look for
     assert canary.why(axis) == said
     assert error.cause.startswith(cause)
     assert "clear_fault('n1')" in error.advice

@@ -9,12 +9,12 @@ import pytest
 
 from motorbus.core.family import Health, State
 from motorbus.core.operation import Exchange, Operation, Pause, outcome
-from motorbus.errors import DeviceError, Faulted, NoReply, Overloaded
+from motorbus.errors import DeviceError, Faulted, MotorbusError, NoReply, Overloaded, WireError
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import HEALTH, FaultNoted
 from motorbus.motion.safety.strain import HOT, SECONDS
-from motorbus.motion.safety.watch import OVERDUE, SHARE, Watch
+from motorbus.motion.safety.watch import SHARE, Watch
 from tests.motion.safety.alone import AIR, Alone, fares
 
 SOON = 1e-6
@@ -136,7 +136,7 @@ def test_when_it_was_asked_before_it_was_dismissed_counts_no_more() -> None:
 def test_one_is_due_a_quarter_of_a_second_after_it_was_asked_and_not_a_moment_sooner() -> None:
     here = Alone()
     watch = begun(here, here.axis())
-    assert [next_of(watch, 10.0 + HEALTH - SOON), next_of(watch, 10.0 + HEALTH)] == [None, 1]
+    assert [next_of(watch, 10.25 - SOON), next_of(watch, 10.25)] == [None, 1]
 
 
 def test_the_one_that_was_asked_longest_ago_is_next() -> None:
@@ -150,8 +150,8 @@ def test_the_one_that_was_asked_longest_ago_is_next() -> None:
     assert set(order) == {1, 2, 3}
 
 
-def test_an_answer_takes_what_it_takes_of_the_wire_and_a_lost_one_a_whole_turn() -> None:
-    for answer, rest in ((fares(), AIR / SHARE), (NoReply("silent"), HEALTH)):
+def test_an_answer_costs_ten_times_what_it_takes_of_the_wire_and_a_lost_one_a_whole_turn() -> None:
+    for answer, rest in ((fares(), 0.01), (NoReply("silent"), 0.25)):
         here = Alone()
         watch = begun(here, here.axis(1), here.axis(2))
         watch.take(1, answer, {}, 20.0)
@@ -161,8 +161,8 @@ def test_an_answer_takes_what_it_takes_of_the_wire_and_a_lost_one_a_whole_turn()
 def test_it_waits_for_room_until_it_is_overdue() -> None:
     here = Alone()
     watch = begun(here, here.axis())
-    late = 10.0 + OVERDUE * HEALTH
-    assert next_of(watch, 11.0 - SOON, AIR - SOON) is None
+    late = 11.0  # which is four times as late
+    assert next_of(watch, late - SOON, AIR - SOON) is None
     assert next_of(watch, 10.0 + HEALTH, AIR) == 1  # there is just room
     assert next_of(watch, 10.0 + HEALTH, 2 * AIR) == 1
     assert [next_of(watch, late - SOON, 0.0), next_of(watch, late, 0.0)] == [None, 1]
@@ -262,9 +262,11 @@ def test_what_it_was_told_to_keep_is_missed_while_it_is_led() -> None:
         told(watch, 1, 11.0, blank=True)
 
 
-@pytest.mark.parametrize(("lost", "again"), [(NoReply("silent"), 1), (DeviceError("it has none"), None)])
+@pytest.mark.parametrize(
+    ("lost", "again"), [(NoReply("silent"), 1), (WireError("garbled"), 1), (DeviceError("it has none"), None)]
+)
 def test_who_cannot_tell_is_asked_no_more_and_an_answer_that_is_lost_changes_nothing(
-    lost: NoReply, again: int | None
+    lost: MotorbusError, again: int | None
 ) -> None:
     here = Alone()
     here.answers[1] = lost
