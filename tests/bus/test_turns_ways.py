@@ -258,3 +258,23 @@ def test_what_a_lost_link_still_owes_is_known_when_it_comes_late() -> None:
         assert script.turns.trust.of(node).quiet_until > script.now
         script.feed(reply(node))
     assert script.turns.statistics.other == {"late": 2}
+
+
+def test_whoever_gives_the_bus_back_hands_it_to_the_next_at_once() -> None:
+    script = Script()
+    first, second = claimed(script, "a"), claimed(script, "b")
+    script.turns.release(first)
+    assert second.done
+
+
+def test_of_a_lost_link_nobody_gets_later_what_he_waited_for() -> None:
+    script = Script()
+    first, second = claimed(script, "a"), claimed(script, "b")
+    handed = script.submit(Exchange(wire.action()), "a")
+    assert script.turns.send(script.now) == wire.action()
+    script.turns.lost(LinkLost("gone"))
+    for ended in (second, handed):
+        assert isinstance(ended.error, LinkLost)
+    assert not script.turns.leaving
+    script.turns.release(first)
+    assert script.turns.idle

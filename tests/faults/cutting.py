@@ -24,6 +24,16 @@ PACKAGE = Path(motorbus.__file__).parent
 FLOORS = ("bus", "core", "families", "link", "motion")
 WORLD = str(PACKAGE / "link" / "memory.py")
 NEVER = 1 << 60
+LEFT = (
+    "the lock",
+    "a holder",
+    "a claim",
+    "something queued",
+    "a timer",
+    "a stop under way",
+    "somebody who pumps",
+)
+"""What may be left on a bus of a call that is over."""
 UNSENT = re.compile("nothing was sent(?! to stop)")
 
 _ours: dict[str, bool] = {}
@@ -140,16 +150,21 @@ def told(error: BaseException | None) -> str:
 def left_behind(there: Scene) -> list[str]:
     """What of a call that is over is still on the bus."""
     turns = there.bus.turns
-    found = {
-        "the lock": turns.lock._is_owned(),
-        "a holder": bool(turns._claims.held),
-        "a claim": bool(turns._claims.waiting),
-        "something queued": turns.waiting,
-        "a timer": bool(turns._timers),
-        "a stop under way": turns.stopping,
-        "somebody who pumps": getattr(getattr(there.bus, "relay", None), "pumper", None) is not None,
-    }
-    return [what for what, is_there in found.items() if is_there]
+    found = (
+        turns.lock._is_owned(),
+        turns._claims.held,
+        turns._claims.waiting,
+        turns.waiting,
+        turns._timers,
+        turns.stopping,
+        getattr(getattr(there.bus, "relay", None), "pumper", None) is not None,
+    )
+    return [what for what, is_there in zip(LEFT, found, strict=True) if is_there]
+
+
+def stuck(faults: list[str]) -> int:
+    """How many of what is wrong is something that was left behind."""
+    return sum(fault.startswith(LEFT) for fault in faults)
 
 
 def reads_right(there: Scene, read: Callable[[], Any]) -> tuple[bool, list[str]]:

@@ -316,6 +316,8 @@ class Machine(RuleBasedStateMachine):
     """The steps of one family; `make` builds its rig."""
 
     make: ClassVar[Callable[[], Rig]]
+    fired: ClassVar[int] = 0
+    """How many faults have struck in all runs of it."""
 
     @initialize()
     def begin(self) -> None:
@@ -325,6 +327,7 @@ class Machine(RuleBasedStateMachine):
         rig = getattr(self, "rig", None)
         if rig is not None:
             note(rig.told())
+            type(self).fired += rig.line.count
             rig.rest()
 
 
@@ -354,11 +357,11 @@ def machine(make: Callable[[], Rig], verbs: list[str], faults: list[str]) -> typ
 
 
 def walk(rig: Rig, seed: int, exchanges: int, often: float = 0.02) -> None:
-    """Steps by chance until so many exchanges have been made; `often` is the share of steps that are faults."""
+    """Steps by chance, until there are so many exchanges or calls; `often` is the share of steps that are faults."""
     random = Random(seed)
     verbs, faults = [*rig.verbs, *OTHER], [*rig.faults]
     step = verbs[0], 0
-    while rig.line.exchange < exchanges:
+    while rig.line.exchange < exchanges and rig.calls.total() < exchanges:
         if random.random() < often:
             fault = random.choice(faults)
             rig.strike(fault, random.randrange(LOTS))

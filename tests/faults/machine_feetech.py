@@ -194,7 +194,13 @@ class FeetechRig(Rig):
             servo.reg_write(torque_limit=value)
             servo.action()
 
-        return self.writing(servo, "torque_limit", raw, both)
+        with self.oracle.call(self.bound) as window:
+            both()
+        if 1000 in self.history.held(servo.node, "torque_limit", window.since, window.until):
+            self.oracle.forget(servo.node, "torque_limit")  # without supply it forgets what waits
+        else:
+            self.oracle.wrote(window, servo.node, "torque_limit", raw)
+        return window
 
     def torque(self, random: Random) -> Window:
         servo, on = self.one(random), random.random() < 0.5

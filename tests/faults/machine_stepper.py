@@ -32,7 +32,7 @@ SWEEP: Final = with_steps(
 OWN: Final = (1, 2, 4)
 """The projects that are selected and edited."""
 JOGS: Final = ("jog_forward", "jog_reverse")
-COSTS: Final = {"write": 120, "read a project": 6, "select": 9, "jog": 40, "start": 40, "stop": 20}
+COSTS: Final = {"write": 120, "read a project": 6, "select": 9, "jog": 29, "start": 29, "stop": 20}
 """Exchanges that a verb makes at most, with all that it makes sure of."""
 FAULTS: Final = {
     "reply lost": ": drop",
@@ -75,7 +75,12 @@ class StepperRig(Rig):
     faults = FAULTS
     stores = "write"
     suits = MappingProxyType(
-        {"echo, and unheard": "stop", "the last try late, and the next unheard": "set an output"}
+        {
+            "echo, and unheard": "stop",
+            "reply lost": "jog",
+            "request late": "jog",
+            "the last try late, and the next unheard": "set an output",
+        }
     )
     just = (0.165, 0.23)
     reads = ("ping", "read a project", "inputs")
@@ -141,7 +146,9 @@ class StepperRig(Rig):
         self.intrude(random.uniform(0.021, 0.04), random.choice([wire.NOTICE, wire.encode_reply(other)]))
         if not self.line.due and not self.quarantine:
             self.line.add(f"exchange {self.line.exchange + 1} to device: drop")
-        return self.switched(port)
+        window = self.switched(port)
+        self.link.advance(0.05)  # later it might be the very answer that is due then
+        return window
 
     # -- judging ------------------------------------------------------------------------------------------------------
 
@@ -267,7 +274,10 @@ class StepperRig(Rig):
             getattr(self.controller, name)(0.02)
         self.obeys(window, name)
         began = self.history.applied(1, "phase", window.since, window.until).count(phase(Phase.JOG))
-        if began > 1 or (window.error is None and not began):
+        free = {phase(one) for one in (Phase.IDLE, Phase.JOG, Phase.RAMPDOWN)}  # no button has begun anything
+        idle = self.history.held(1, "phase", window.since, window.since) == {phase(Phase.IDLE)}
+        heeds = idle and self.history.held(1, "phase", window.since, window.until) <= free
+        if began > 1 or (window.error is None and heeds and not began):
             raise FalseWord(f"{name}: it began {began} times")
         return window
 

@@ -28,6 +28,7 @@ from motorbus.simulation.mount import Mount
 from tests.bus.responder import Responder, position
 from tests.bus.script import admit_all
 from tests.faults.cutting import left_behind
+from tests.faults.off import are_off
 from tests.faults.scenes import IDS, Scene
 from tests.faults.test_interrupts import stopped
 from tests.simulation.served import served
@@ -45,7 +46,7 @@ class Refusing:
         link.write = self
 
     def __call__(self, data: Data) -> None:
-        if self.blocked:
+        if self.blocked and not are_off():
             self.fired += 1
             raise full("memory", 0, 8)
         self._write(data)
@@ -128,7 +129,7 @@ def window() -> Iterator[tuple[Link, socket.socket]]:
 def fill(link: Link) -> int:
     """Write until it takes no more; how much it took."""
     taken = 0
-    while taken < 1 << 24:
+    while taken < 1 << 24 and not are_off():
         try:
             link.write(bytes(64))
         except LinkError:

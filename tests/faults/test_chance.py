@@ -156,7 +156,7 @@ def test_l3_l4_confirmed_nothing_is_wrong(row: str, what: str, rounds: Rounds, f
 @pytest.mark.parametrize("family", ["feetech", "kst"])
 def test_l7_late_replies_give_no_stale_value(family: str, rounds: Rounds, figures: Figures) -> None:
     """1 % late by up to half a second, and all behind it held up; every read has another right answer."""
-    total = rounds(1_000_000, 4_000)
+    total = rounds(1_000_000, 2_000)
     rig: Rig | KstRig = Rig(ids=(1,)) if family == "feetech" else KstRig()
     ledger = Ledger(rig, "seed 7; 1% of packets to host: delay 0.001-0.5")
     for _ in range(total):

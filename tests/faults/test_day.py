@@ -51,6 +51,7 @@ def test_d9_a_day_writes_nothing_to_eeprom(family: str, rounds: Rounds, figures:
     )
 
 
+@pytest.mark.faultless("it is about the counter")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_d9_the_counter_counts(family: str) -> None:
     """What must be 0 all day is not 0 when something is changed for good."""

@@ -21,12 +21,13 @@ from motorbus.simulation.mount import Mount
 from tests.bus.responder import Responder, position
 from tests.bus.script import admit_all
 from tests.conftest import Figures, Rounds
-from tests.faults.cutting import NEVER, UNSENT, Outcome, afterwards, cut, left_behind, places, told
+from tests.faults.cutting import NEVER, UNSENT, Outcome, afterwards, cut, left_behind, places, stuck, told
 from tests.faults.scenes import IDS, KINDS, Scene, off
 from tests.simulation.served import served
 
 ERRORS = (KeyboardInterrupt, MemoryError)
 VISITS = 3
+UNSENT_STOP = ("it ended with", "it was latched, and something moves", "the stop did not go out")
 
 
 def carried_out(
@@ -54,17 +55,21 @@ def faults(kind: str, at: int, error: type[BaseException]) -> list[str]:
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", KINDS)
 def test_l17_an_interrupt_at_any_line_of_a_transaction(kind: str, rounds: Rounds, figures: Figures) -> None:
-    cuts, lines = 0, set()
+    cuts, lines, wrong = 0, set(), list[str]()
     for error in ERRORS:
         there, whole, _ = carried_out(kind, NEVER, error)
         assert whole.error is None
         assert KINDS[kind].done(there, whole.value), "when it is not cut it is done"
         for at in places(whole.walked, VISITS, rounds(NEVER, 9)):
-            assert faults(kind, at, error) == [], (error.__name__, at)
+            wrong += faults(kind, at, error)
             cuts += 1
         lines |= set(whole.walked)
-    family = KINDS[kind].family
-    figures(f"L17 interrupts: {kind}", family=family, lines=len(lines), cuts=cuts, stuck=0, wrong=0)
+    family, left = KINDS[kind].family, stuck(wrong)
+    figures(
+        f"L17 interrupts: {kind}", family=family, lines=len(lines), cuts=cuts, stuck=left, wrong=len(wrong)
+    )
+    assert wrong == []
+    assert cuts
 
 
 def stopped(there: Scene) -> None:
@@ -104,24 +109,29 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
     family: str, rounds: Rounds, figures: Figures
 ) -> None:
     """Once it has begun it goes out, is repeated until everyone has acknowledged, and only then is anything raised."""
-    cuts, lines = 0, set()
+    cuts, lines, wrong = 0, set(), list[str]()
     for error in ERRORS:
         there = Scene(family)
         stopped(there)
         whole = cut(there.bus.estop, NEVER, error)
         assert set(whole.value.acknowledged) == set(there.ids)
         for at in places(whole.walked, VISITS, rounds(NEVER, 9)):
-            assert stop_faults(family, at, error) == [], (error.__name__, at)
+            wrong += stop_faults(family, at, error)
             cuts += 1
         lines |= set(whole.walked)
-    figures("L17 interrupts: emergency stop", family=family, lines=len(lines), cuts=cuts, unsent=0)
+    unsent = sum(fault.startswith(UNSENT_STOP) for fault in wrong)
+    figures("L17 interrupts: emergency stop", family=family, lines=len(lines), cuts=cuts, unsent=unsent)
+    assert wrong == []
+    assert cuts
 
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", ["feetech guarded write", "kst run", "stepper home"])
 def test_l17_a_second_interrupt_at_any_line_of_the_clean_up(kind: str, rounds: Rounds) -> None:
     _, whole, _ = carried_out(kind)
-    for number, at in enumerate(places(whole.walked, 2, rounds(NEVER, 9))):
+    chosen = places(whole.walked, 2, rounds(NEVER, 9))
+    assert chosen
+    for number, at in enumerate(chosen):
         there, came, _ = carried_out(kind, at, KeyboardInterrupt, later=1 + number * 37 % 400)
         assert isinstance(came.error, KeyboardInterrupt), came.where
         assert afterwards(there, there.bus.run) == [], (at, came.where)

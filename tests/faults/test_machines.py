@@ -32,7 +32,9 @@ FEW = 1_500
 @pytest.mark.parametrize("family", MACHINES)
 def test_whatever_is_called_and_whatever_strikes(family: str) -> None:
     machine: type[Machine] = MACHINES[family]
+    before = machine.fired
     run_state_machine_as_test(machine, settings=SHORT)
+    assert machine.fired > before
 
 
 @pytest.mark.timeout(3600)

@@ -20,7 +20,7 @@ from tests.faults.slcan_rig import VALUE, SlcanRig, another_frame, value_changed
 
 NAMES = ("ping", "read 2 bytes", "refused read", "write 1 byte that is kept", "save that is acknowledged")
 ONE_EXCHANGE = (*NAMES, "read 1 byte", "read 4 bytes", "refused write", "write 1 byte", "save")
-TELLING = tuple(b"08Fft\r\x00")
+TELLING = tuple(b"8ft\r\x00")
 ANSWER = 2
 """Characters of what an adapter answers to a frame that it is to send, z and CR, before the line of the reply."""
 
