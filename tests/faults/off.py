@@ -33,14 +33,20 @@ def are_off() -> bool:
     return faults_are_off
 
 
+def shared(node: int) -> tuple[int, ...]:
+    """The ids of two devices that have one; of one alone while faults are off."""
+    return (node,) if faults_are_off else (node, node)
+
+
 class Carried:
-    """A line of a test that is there, is told nothing, and does nothing."""
+    """A line of a test that is there, is told nothing, and does nothing; one that asks by itself is put in."""
 
     def __get__(self, owner: Any, kind: type | None = None) -> Any:
-        return WIRE
+        return vars(owner).get("line", WIRE) if owner is not None else self
 
     def __set__(self, owner: Any, line: object) -> None:
-        """It is not put in."""
+        if getattr(line, "asks_by_itself", False):
+            vars(owner)["line"] = line
 
 
 def switch_off(patch: pytest.MonkeyPatch) -> None:

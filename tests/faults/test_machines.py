@@ -24,8 +24,8 @@ from tests.faults.machine_stepper import StepperRig, StepperSteps
 
 MACHINES = {"feetech": FeetechSteps, "kst": KstSteps, "stepper": StepperSteps}
 RIGS: dict[str, Callable[[], Any]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
-SHORT = settings(max_examples=12, stateful_step_count=30)
-FEW = 1_500
+SHORT = settings(max_examples=10, stateful_step_count=30)
+FEW = 1_200
 """Exchanges of a walk in which faults of nearly every kind strike."""
 
 
@@ -69,7 +69,7 @@ def test_a_long_walk_among_faults(family: str, rounds: Callable[[int], int], fig
 def test_a_walk_among_faults_where_a_line_takes_no_time() -> None:
     """What comes sooner than bits can travel is no sign there, so an echo must be told from an answer by itself."""
     rig = StepperRig(pace=False)
-    walk(rig, 7, FEW, often=0.1)
+    walk(rig, 7, FEW // 2, often=0.2)
     assert rig.line.count > FEW / 50
     assert rig.oracle.judged > FEW / 20
 
@@ -112,6 +112,7 @@ def test_every_fault_of_a_machine_fires(family: str) -> None:
         rig.rest()
 
 
+@pytest.mark.faultless("the judge is tried by what it is told")
 def test_a_value_that_is_old_is_found_out() -> None:
     """The judge itself: what the servo held before the call, and holds no more, is no answer."""
     rig = FeetechRig()

@@ -18,6 +18,7 @@ from tests.conftest import Figures, Rounds
 from tests.families.stepper.fault_rig import Rig
 from tests.families.stepper.mischief import Mischief
 from tests.families.stepper.test_faults import Ledger
+from tests.faults.off import are_off
 
 SHARE = 0.01
 CALLS = {"L3": 580_000, "L7": 700_000}
@@ -37,7 +38,7 @@ class Spoilt(Mischief):
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         assert isinstance(data, bytes)
-        if sender is Side.DEVICE:
+        if sender is Side.DEVICE and not are_off():
             before = data
             while self._left < len(data):
                 data = self._struck(data, self._left, self.random.randrange(1, 256))

@@ -207,6 +207,7 @@ def test_a_channel_that_was_not_said_is_the_back_ends_own() -> None:
     quietly(lambda: os.stat("/no/such/file"))
 
 
+@pytest.mark.faultless("the error is what it is told")
 @pytest.mark.parametrize("error", [OSError(errno.ENETDOWN, "Network is down"), can.CanOperationError("gone")])
 def test_d13_an_adapter_that_is_down_is_a_lost_link(error: Exception) -> None:
     wire = bus_wire(Bus(error=error))
@@ -216,6 +217,7 @@ def test_d13_an_adapter_that_is_down_is_a_lost_link(error: Exception) -> None:
         wire.write(PING)
 
 
+@pytest.mark.faultless("the error is what it is told")
 def test_d13_bus_off_is_a_lost_link_and_no_other_error_is() -> None:
     for bits in (0x88, 0x04, 0x100):
         refuse_bus_off("can0", [CanFrame(ERROR_FLAG | bits, bytes(8)), PING])

@@ -34,6 +34,7 @@ def known(**about: Any) -> Identity:
     return identity_of("/dev/ttyACM0", lister({**NUMBERED, **about}))
 
 
+@pytest.mark.faultless("what the system tells is made up here, and nothing is open")
 def test_l12_the_same_serial_number_is_found_under_another_name() -> None:
     there = lister(
         {"resolved_device": "/dev/ttyACM1"}, {"resolved_device": "/dev/ttyACM0", "serial_number": "B"}
@@ -41,6 +42,7 @@ def test_l12_the_same_serial_number_is_found_under_another_name() -> None:
     assert found_again("bus", known(), there) == "/dev/ttyACM1"
 
 
+@pytest.mark.faultless("what the system tells is made up here, and nothing is open")
 def test_l12_another_adapter_at_its_place_is_refused() -> None:
     with pytest.raises(
         LinkLost, match="another in its place: the adapter 1a86:55d3 with the serial number B"
@@ -65,6 +67,7 @@ def test_while_it_is_away_there_is_no_such_port() -> None:
         found_again("bus", known(), lister())
 
 
+@pytest.mark.faultless("what the system tells is made up here, and nothing is open")
 def test_l12_without_a_serial_number_its_place_on_the_usb_counts(tmp_path: Path) -> None:
     plugged(tmp_path, "ttyUSB0", "1-1.2:1.0")
     nameless = {"vid": 0x1A86, "pid": 0x7523, "serial_number": None}

@@ -21,6 +21,7 @@ from motorbus.families.feetech.simulator import FeetechBus, Servo, simulate
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
+from tests.faults.off import are_off
 
 OLD, NEW, STRANGER = 3, 7, 9
 """Ids: of the servo that changes, what it shall become, and of another one that nobody may touch."""
@@ -45,12 +46,12 @@ NEVER = Cut(host=False)
 
 class Doomed(MemoryLink):
     """A link whose host dies as the cut says; `sent` are the sizes of all that left, `commits` the moments of all that
-    was stored, for enumerating."""
+    was stored, for enumerating; `struck` is whether it has happened."""
 
     def __init__(self, world: World, cut: Cut, rate: int) -> None:
         self.world = world
         self.cut = cut
-        self.dead = False
+        self.dead = self.struck = False
         self.sent: list[int] = []
         self.left = 0
         self.commits: set[float] = set()
@@ -97,6 +98,9 @@ class Doomed(MemoryLink):
 
     def strike(self) -> None:
         """Now it happens."""
+        if are_off():
+            return
+        self.struck = True
         self.dead = self.cut.host
         if self.cut.supply:
             self.world.servo.power_cycle()

@@ -17,6 +17,7 @@ from motorbus.link.base import Side
 from motorbus.link.memory import NoisyLine
 from motorbus.simulation.named import Simulation
 from tests.families.feetech.driver_script import Line, play, reads, watch
+from tests.faults.off import shared
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 LATE = 254
@@ -29,7 +30,7 @@ def asked(simulation: Simulation, polls: int = POLLS) -> Suspicion:
 
 
 def twins(model: str = "", **options: Any) -> Simulation:
-    return motorbus.simulate("feetech", ids=(3, 3), model=model, **options)
+    return motorbus.simulate("feetech", ids=shared(3), model=model, **options)
 
 
 def twice(line: Line) -> Line:
@@ -70,6 +71,7 @@ def test_two_that_answer_one_after_the_other_are_heard() -> None:
 def test_d1_two_that_are_equal_in_everything_look_like_one() -> None:
     """As the docs say: not even 1000 questions tell, and connecting one at a time is the only proof."""
     with twins() as simulation:
+        assert len(simulation.simulator.servos) == 2  # type: ignore[attr-defined]
         seen = asked(simulation, 1000)
     assert not seen.suspected
     assert seen.polls == 1000
@@ -159,7 +161,7 @@ def one_pair(random: Random, model: str) -> Simulation:
     jitter = random.uniform(0.00001, 0.0006) if differ != "payload" else 0.0
     simulation = twins(model, reply_jitter=jitter, seed=random.randrange(1 << 30))
     if differ != "timing":
-        second = simulation.simulator.servos[1]  # type: ignore[attr-defined]
+        second = simulation.simulator.servos[-1]  # type: ignore[attr-defined]
         quantity = random.choice(("position", "temperature", "voltage"))
         if quantity == "position":
             second.raw_position = second.raw_position + random.choice((-40, -1, 1, 40))

@@ -18,6 +18,7 @@ from motorbus.core.operation import INTENT
 from motorbus.errors import NoReply, RequestError
 from tests.conftest import Figures
 from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, World, cuts
+from tests.faults.off import are_off
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 TORN = ("old", "new", "erased")
@@ -69,23 +70,26 @@ def ended(world: World) -> list[str]:
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("model", MODELS)
 def test_d10_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds, figures: Figures) -> None:
-    counted = 0
-    kinds = list(product(TORN, SETTINGS))
+    counted = struck = 0
+    kinds = list(product(TORN, SETTINGS))[: 1 if are_off() else None]
     for shift, (torn, settings) in enumerate(kinds):
         options = {"model": model, "torn": torn, **settings}
         found = list(cuts(partial(World, verb, options), changing))
         for cut in found if is_thorough(rounds) else some(found, max(1, FEW // len(kinds)), 7 * shift):
             world = World(verb, options)
             world.run(world.change, cut)
+            struck += world.link.struck
             assert ended(world) == [], f"{options} {cut}"
             counted += 1
-    figures(f"D10 {verb} of {model}, cut once", family="feetech", promise=4, cuts=counted, lost=0)
+    assert struck > 0.8 * counted > 0, "but for those at records that are never written"
+    what = f"D10 {verb} of {model}, cut once"
+    figures(what, family="feetech", promise=4, cuts=counted, struck=struck, lost=0)
 
 
 def wrecks(verb: str, options: dict[str, Any]) -> list[Cut]:
     """One first cut for each different state that any first cut leaves behind with the journal open."""
     found: dict[object, Cut] = {}
-    for cut in cuts(partial(World, verb, options), changing):
+    for cut in islice(cuts(partial(World, verb, options), changing), 3 if are_off() else None):
         world = World(verb, options)
         world.run(world.change, cut)
         if world.journal.unfinished() is not None:

@@ -37,6 +37,7 @@ from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from tests.families.player import played
+from tests.faults.off import are_off
 
 T = TypeVar("T")
 
@@ -56,6 +57,8 @@ class Bench:
         **options: Any,
     ) -> None:
         self.family: Kst = FAMILY.configured(profile=profile, **(settings or {}))
+        if are_off():
+            options.pop("duplicate", None)
         simulator = FAMILY.simulator(tuple(ids), profile=profile, **options)
         assert isinstance(simulator, KstBus)
         self.simulator = simulator

@@ -109,10 +109,12 @@ def test_d11_power_that_goes_during_the_save_is_told_and_never_called_saved(
         servo, link = there.simulator.servos[0], there.link
         assert isinstance(link, Timed)
         link.then = servo.plug
+        gone: list[bool] = []
 
         def on(event: object) -> None:
             if isinstance(event, PowerCycleNeeded):  # this flash is slower than anybody knew
                 servo.unplug()
+                gone.append(not servo.plugged)
                 link.when = link.now() + 1.0
             assert not isinstance(event, Progress) or event.done <= 2, "it was called saved"
 
@@ -121,6 +123,7 @@ def test_d11_power_that_goes_during_the_save_is_told_and_never_called_saved(
             there.servo().provision(**wanted)
         assert "call provision again" in raised.value.advice
         assert (servo.node, servo.bit_rate) == (5, 500_000)
+        assert any(gone)
 
 
 def test_an_id_that_is_forgotten_by_a_short_power_cycle_is_noticed() -> None:
@@ -140,7 +143,7 @@ def test_an_id_that_is_taken_is_refused_before_anything_is_written() -> None:
 @pytest.mark.parametrize("delay", [0.0, 0.0003])
 def test_d2_two_servos_with_one_id_are_refused_before_anything_is_written(delay: float) -> None:
     with bench(ids=(5,), duplicate="5", duplicate_delay=delay) as there:
-        there.simulator.servos[1].raw_position = 7
+        there.simulator.servos[-1].raw_position = 7
         with pytest.raises(RequestError, match=r"two servos answer as 0x05 \(5\)"):
             there.servo().provision(new_id=9)
         assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}

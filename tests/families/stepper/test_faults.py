@@ -13,6 +13,7 @@ from motorbus.errors import OutcomeUnknown
 from motorbus.families.stepper.table import ORDERS
 from tests.families.stepper.fault_rig import KEPT, MOTIONS, FalseWord, Rig
 from tests.families.stepper.mischief import EVERYTHING, NOTICES, REPLIES, REQUESTS, Mischief
+from tests.faults.off import are_off
 
 
 class Ledger:
@@ -59,7 +60,7 @@ def test_everything_at_once_tells_nothing_false_and_nothing_hangs(
     line = Mischief(11, share, *EVERYTHING, copy_after=None if pace else 0.0)
     ledger = Ledger(Rig(line, 12, pace=pace), line)
     ledger.rig.open()
-    total = max(rounds(100_000), ENOUGH)
+    total = max(rounds(100_000), 0 if are_off() else ENOUGH)
     for _ in range(total):
         ledger.call()
     print(ledger.told(f"{share:.0%} of all that is said" + (", at 9600 baud" if pace else ", without pace")))
@@ -109,4 +110,5 @@ def test_a_copy_that_something_hands_over_later_is_the_known_limit(rounds: Calla
     print(
         f"\n{total} outputs, {line.fired['twice']} copies held back by 6 ms, {false} false acknowledgements"
     )
+    assert line.fired["twice"] > total / 500
     assert false <= line.fired["twice"], "a copy is believed once and never shifts what is behind it"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
+from typing import NamedTuple
 
 import pytest
 
@@ -16,7 +17,8 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import EDITS, ORDERS
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.simulation.faults import Fault, FaultyLine
-from tests.families.stepper.fault_rig import KEPT, MOTIONS, STOPS, Rig
+from tests.conftest import Figures
+from tests.families.stepper.fault_rig import KEPT, MOTIONS, STOPS, FalseWord, Rig
 from tests.families.stepper.mischief import BYTE
 
 EDGES = (0x00, 0x01, 0x02, 0x03, 0x08, 0x0D, 0x3E, 0x5E, 0x80, 0xAA, 0xDD, 0xEE, 0xFF)
@@ -72,29 +74,42 @@ def every_fault(length: int, values: Iterable[int], places: range | None = None)
         yield from (Fault(1, byte, "insert", value=value) for value in values)
 
 
-def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> tuple[int, int]:
-    """Every fault in turn; how many, and how many calls succeeded in spite of theirs."""
+class Tally(NamedTuple):
+    """How many faults there were, how many calls succeeded in spite of theirs, and what they told that is not so."""
+
+    total: int
+    succeeded: int
+    false: list[str]
+
+
+def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tally:
+    """Every fault in turn, each of which must happen; what is asked next must be right at its first try."""
     rig = Rig(PerfectLine(), 1, pace=False)
     rig.open()
     total = succeeded = 0
+    false: list[str] = []
     for fault in faults:
         total += 1
         line = FaultyLine([fault])
         rig.link.line = Bytewise(line) if bytewise else line
-        succeeded += ask(rig, name)
+        try:
+            succeeded += ask(rig, name)
+        except FalseWord as told:
+            false.append(f"{fault}: {told}")
         assert len(line.fired) == 1, f"{fault} did not happen"
         rig.link.line = PerfectLine()
         again = rig.tried_again
         assert rig.stop_by("stop_project") if name in MOTIONS else rig.output()
         assert rig.input()
         assert rig.tried_again == again, f"{fault}: not right at the first try"
-    return total, succeeded
+    return Tally(total, succeeded, false)
 
 
 @pytest.mark.parametrize("bytewise", [False, True])
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "read_project"])
 def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> None:
-    total, succeeded = suffer(name, every_fault(length_of(name), EDGES), bytewise=bytewise)
+    total, succeeded, false = suffer(name, every_fault(length_of(name), EDGES), bytewise=bytewise)
+    assert false == []
     assert total == 6 * (2 + len(EDGES) - 1) + 7 * len(EDGES)
     if ORDERS[name].repeatable and name not in STOPS:
         assert succeeded >= total - (name in UNNAMED), "what may be said again gets over any single fault"
@@ -106,7 +121,8 @@ def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> No
     ("name", "bytewise"), [("read_input", False), ("stop_motor", True), ("set_step_delay", False)]
 )
 def test_every_single_byte_fault(name: str, bytewise: bool) -> None:
-    total, _ = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
+    total, _, false = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
+    assert false == []
     assert total == 6 * (2 + 255) + 7 * 256
 
 
@@ -114,33 +130,35 @@ def test_every_single_byte_fault(name: str, bytewise: bool) -> None:
 def test_single_byte_faults_of_a_dump(bytewise: bool) -> None:
     places = chain(range(30), range(30, 227, 13 if bytewise else 5), range(222, 227))
     faults = (fault for at in places for fault in every_fault(226, (0x01, 0xEE, 0xFF), range(at, at + 1)))
-    total, succeeded = suffer("read_project", faults, bytewise=bytewise)
+    total, succeeded, false = suffer("read_project", faults, bytewise=bytewise)
+    assert false == []
     assert succeeded == total > 300
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("bytewise", [False, True])
-def test_every_single_byte_fault_of_every_command(bytewise: bool) -> None:
-    total = succeeded = 0
-    for name in COMMANDS:
-        if name != "read_project":
-            more, good = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
-            total, succeeded = total + more, succeeded + good
+def test_every_single_byte_fault_of_every_command(bytewise: bool, figures: Figures) -> None:
+    names = [name for name in COMMANDS if name != "read_project"]
+    tallies = [suffer(name, every_fault(6, range(256)), bytewise=bytewise) for name in names]
+    false = [told for tally in tallies for told in tally.false]
+    total, succeeded = sum(tally.total for tally in tallies), sum(tally.succeeded for tally in tallies)
     how = "byte by byte" if bytewise else "in one piece"
-    print(f"\n26 commands, {how}: {total} single-byte faults, 0 false, {succeeded / total:.2%} succeeded")
+    what = f"L1 L2 single byte faults in replies to {len(names)} commands, {how}"
+    figures(what, family="stepper", promise=1, faults=total, wrong=len(false), succeeded=succeeded)
+    assert false == []
     assert total == 26 * (6 * 257 + 7 * 256)
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("part", range(4))
-def test_every_single_byte_fault_of_a_dump(part: int) -> None:
+def test_every_single_byte_fault_of_a_dump(part: int, figures: Figures) -> None:
     places = range(part * 57, min(227, (part + 1) * 57))
-    total, succeeded = suffer("read_project", every_fault(226, range(256), places))
-    print(
-        f"\ndump, bytes {places[0]} to {places[-1]}: {total} single-byte faults, 0 false, {succeeded} succeeded"
-    )
+    total, succeeded, false = suffer("read_project", every_fault(226, range(256), places))
+    what = f"L1 L2 single byte faults in a dump, bytes {places[0]} to {places[-1]}"
+    figures(what, family="stepper", promise=1, faults=total, wrong=len(false), succeeded=succeeded)
+    assert false == []
     assert succeeded == total
 
 
