@@ -85,7 +85,7 @@ def test_l17_a_task_that_is_cancelled_at_any_await(kind: str, rounds: Rounds, fi
     step = 1 if rounds(7, 1) == 7 else 7  # every one in the long runs
     count = 0
     while cancelled:
-        awaits += step
+        awaits += step if awaits else 1
         with looped(kind) as (there, loop):
             KINDS[kind].prepare(there)
             ended = loop.run_until_complete(cancelled_after(there, kind, awaits))

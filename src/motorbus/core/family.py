@@ -231,8 +231,8 @@ class SimulatedNode(Protocol):
     What only some have: `set_input(number, active)`. `log`, their latest `Remark`s in order. `notice()`, which lets the
     device say what it says unasked although nothing has caused it. `switch(**changes)`, which changes switches while it
     runs, as far as that makes sense, and gives all such switches as they are then; for an impossible name or value it
-    raises RequestError and has changed nothing. `midway()`, when (s) the step by which it stores something is half done,
-    infinity while it stores nothing: a power cut at that moment tears what is stored.
+    raises RequestError and has changed nothing. `midway()`, when (s) the step by which it stores something is half
+    done, infinity while it stores nothing: a power cut at that moment tears what is stored.
     """
 
     @property
