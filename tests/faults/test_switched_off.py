@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from scripts.reliability import tests_of_rows
+from scripts import reliability
 from tests.conftest import Figures
 
 HERE = Path(__file__).parent
@@ -43,7 +43,7 @@ def judged() -> list[str]:
 
 def elsewhere() -> Iterator[str]:
     """Those outside this folder that are named by a row."""
-    for row, tests in tests_of_rows().items():
+    for row, tests in reliability.tests_of_rows().items():
         for test in tests:
             file = test.partition("::")[0]
             if not file.startswith("faults/") and row not in NO_FAULTS and file not in PROCESSES:
@@ -80,7 +80,7 @@ def test_no_test_of_a_fault_passes_without_its_fault(every: int, tmp_path: Path,
 @pytest.mark.faultless("it is about which are judged")
 def test_what_is_left_out_is_there() -> None:
     """A file that has gone, or a row that has no test, is no reason."""
-    rows = tests_of_rows()
+    rows = reliability.tests_of_rows()
     files = {test.partition("::")[0] for tests in rows.values() for test in tests}
     assert files >= set(PROCESSES)
     assert rows.keys() >= NO_FAULTS.keys()
