@@ -13,6 +13,7 @@ import re
 import time
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -197,7 +198,7 @@ def test_l15_after_a_night_the_lease_is_lost_and_what_moved_is_stopped_and_stays
         device.set_mode("velocity")
         device.enable_torque()
         bus = robot.buses["arm"]
-        link: MemoryLink = bus.link  # type: ignore[attr-defined]
+        link: Any = bus.link
 
         def sleeps() -> None:
             with robot.attended(lasts=0.5) as hand:
