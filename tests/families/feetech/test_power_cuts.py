@@ -82,7 +82,7 @@ def test_d10_every_cut_ends_old_or_new(verb: str, model: str, rounds: Rounds, fi
             assert ended(world) == [], f"{options} {cut}"
             counted += 1
     assert struck > 0.8 * counted > 0, "but for those at records that are never written"
-    what = f"D10 {verb} of {model}, cut once"
+    what = f"D10 {verb} cut once, {model}"
     figures(what, family="feetech", promise=4, cuts=counted, struck=struck, lost=0)
 
 
@@ -122,7 +122,7 @@ def test_d10_every_cut_of_the_recovery_too(verb: str, model: str, rounds: Rounds
                 assert ended(world) == [], f"{kind} {first} {second}"
                 counted += 1
     assert states > 3
-    what = f"D10 {verb} of {model}, cut, and its recovery cut"
+    what = f"D10 {verb} cut and its recovery cut, {model}"
     figures(what, family="feetech", promise=4, states=states, cuts=counted, lost=0)
 
 

@@ -195,7 +195,7 @@ def test_d10_provisioning_cut_anywhere_ends_old_or_new(
             assert world.mended() == [], f"{options} {cut}"
     assert fired == counted
     assert len(states) > 3, "the cuts strike in different states"
-    what = f"D10 D11 provisioning {' and '.join(wanted)}, cut once"
+    what = f"D10 D11 provisioning cut once, {' and '.join(wanted)}"
     figures(what, family="kst", promise=4, cuts=counted, states=len(states), lost=0)
 
 
@@ -226,5 +226,5 @@ def test_d10_provisioning_cut_while_it_is_mended_too(
                 assert world.faults() == [], f"{options} {first} {second}"
                 assert world.mended() == [], f"{options} {first} {second}"
     assert counted > 10
-    what = f"D10 D11 provisioning {' and '.join(wanted)}, cut, and cut again while it is mended"
+    what = f"D10 D11 provisioning cut and again while it is mended, {' and '.join(wanted)}"
     figures(what, family="kst", promise=4, cuts=counted, states=len(seen), lost=0)
