@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from motorbus.errors import (
+    AnotherAdapter,
     ChecksumError,
     DeviceError,
     Faulted,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "AnotherAdapter",
     "AsyncRobot",
     "ChecksumError",
     "DeviceError",

@@ -5,6 +5,7 @@
     │   ├── PortNotFound     there is no such port
     │   ├── PortBusy         another program holds it; `owner` names it
     │   └── LinkLost         it was open and went away
+    │       └── AnotherAdapter   and another adapter is there in its place
     ├── WireError            bytes came that are not an answer; they are attached
     │   ├── FramingError     no frame could be made of them
     │   ├── ChecksumError    a frame, but its checksum is wrong
@@ -92,6 +93,10 @@ class PortBusy(LinkError):
 
 class LinkLost(LinkError):
     """The port was open and is gone (unplugged, connection closed)."""
+
+
+class AnotherAdapter(LinkLost):
+    """The port is gone, and another adapter has its name. Nothing was said to that one."""
 
 
 class WireError(MotorbusError):

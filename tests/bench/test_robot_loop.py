@@ -11,9 +11,11 @@ import pytest
 from bench.responder import build
 from bench.robot_loop import (
     COLUMNS,
+    LOOKS,
     STEP,
     Sample,
     Wrong,
+    counted,
     course,
     described,
     is_urgent,
@@ -23,6 +25,7 @@ from bench.robot_loop import (
     urgent,
     verdict,
 )
+from bench.workloads import to_and_fro
 from motorbus.motion.machine import Machine
 
 STEADY = Sample("followed", 909.1, 1136.4, 909.1, 54546, 0, 0, 4e-6, 950e-6, 120e-6)
@@ -45,16 +48,25 @@ NOBODY: frozenset[str] = frozenset()
 def test_every_reading_is_one_more() -> None:
     judged([({"a1": number * STEP}, NOBODY) for number in range(10)])
     judged([({"a1": (number + (number >= 5)) * STEP}, NOBODY) for number in range(10)])  # how the motor fares
-    for wrong in (4, 7):
+    for wrong in (3, 4, 5 + LOOKS + 1):
         counts = [wrong if number == 5 else number for number in range(10)]
-        with pytest.raises(Wrong, match=r"cycle 5: a1 shows \d+ readings since the last, and 1 were asked"):
+        with pytest.raises(Wrong, match=r"cycle 5: a1 shows \d+, 1 readings after \d+"):
             judged([({"a1": count * STEP}, NOBODY) for count in counts])
+
+
+def test_at_the_end_of_its_range_a_servo_counts_down() -> None:
+    half = counted(0.0)
+    readings = [({"a1": (to_and_fro(number) - half) * STEP}, NOBODY) for number in range(half, 3 * half)]
+    assert max(here["a1"] for here, _ in readings) > readings[-1][0]["a1"] + math.pi / 2
+    judged(readings)
+    with pytest.raises(Wrong):
+        judged([*readings, readings[-2]])
 
 
 def test_a_reading_that_was_told_as_lost_is_one_that_was_asked() -> None:
     lost = [({"a1": 0.0}, NOBODY), ({"a1": 0.0}, frozenset({"a1"})), ({"a1": 2 * STEP}, NOBODY)]
     judged(lost)
-    with pytest.raises(Wrong, match="cycle 2: a1 shows 1 readings since the last, and 2 were asked"):
+    with pytest.raises(Wrong, match=r"cycle 2: a1 shows \d+, 2 readings after \d+"):
         judged([*lost[:2], ({"a1": STEP}, NOBODY)])
 
 

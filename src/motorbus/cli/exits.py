@@ -65,6 +65,7 @@ CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.PortNotFound: Exit.PORT_NOT_FOUND,
     errors.PortBusy: Exit.PORT_BUSY,
     errors.LinkLost: Exit.PORT_NOT_FOUND,
+    errors.AnotherAdapter: Exit.PORT_NOT_FOUND,
     errors.WireError: Exit.FAILURE,
     errors.FramingError: Exit.FAILURE,
     errors.ChecksumError: Exit.FAILURE,

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from motorbus.errors import LinkLost, PortNotFound
+from motorbus.errors import AnotherAdapter, LinkLost, PortNotFound
 
 PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 _PLACE = re.compile(r"\d+-\d+(\.\d+)*:\d+\.\d+")
@@ -21,10 +21,6 @@ _PLACE = re.compile(r"\d+-\d+(\.\d+)*:\d+\.\d+")
 
 Lister = Callable[[], Iterable[Any]]
 """What tells of the serial ports there are, as `serialx.list_serial_ports` does."""
-
-
-class AnotherAdapter(LinkLost):
-    """The port is gone, and its name leads to something else by now."""
 
 
 class Identity(NamedTuple):

@@ -18,10 +18,10 @@ from threading import Lock
 from typing import Any, Final, Protocol
 
 from motorbus.core.operation import Data
-from motorbus.errors import LinkLost, MotorbusError, PortNotFound
+from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
 from motorbus.link.base import Link
 from motorbus.link.can_config import SOCKETCAND_PORT
-from motorbus.link.identity import PSEUDO_TERMINALS, AnotherAdapter, Lister, another, found_again, identity_of
+from motorbus.link.identity import PSEUDO_TERMINALS, Lister, another, found_again, identity_of
 from motorbus.link.lock import PortLock
 from motorbus.link.refusal import lost
 from motorbus.link.tcp import split_address
