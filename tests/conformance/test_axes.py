@@ -309,7 +309,9 @@ def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Fa
         goals = train.goals(heard(there, train))
         row = next(row for row in kept(there.table(NODE)) if not row.choices)
         held = row.to_raw(device.read(row.name)[row.name])
-        device.write(**{row.name: row.to_value(held - 1 if held > row.low else held + 1)})  # what is so is not written
+        device.write(
+            **{row.name: row.to_value(held - 1 if held > row.low else held + 1)}
+        )  # what is so is not written
         mine = [one for one in goals if NODE in {goal.node for goal in one.goals}]
         with sent(there.bus) as frames:
             for one in mine:

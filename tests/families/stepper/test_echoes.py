@@ -121,7 +121,7 @@ def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learn
 @pytest.mark.parametrize("pace", [True, False])
 def test_l8_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Rounds, figures: Figures) -> None:
     """With requests that are not heard and replies that are lost; every acknowledgement is held against what was."""
-    total = rounds(100_000, 2_500)
+    total = rounds(100_000, 1_500)
     line = Echoing(OFF, pace=pace)
     line.share = 0.05
     rig = rig_on(line, opened=True)

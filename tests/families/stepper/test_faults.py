@@ -5,12 +5,11 @@ And what no fault touches is right at its first try. What is asked and what stri
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from motorbus.errors import OutcomeUnknown
 from motorbus.families.stepper.table import ORDERS
+from tests.conftest import Rounds
 from tests.families.stepper.fault_rig import KEPT, MOTIONS, FalseWord, Rig
 from tests.families.stepper.mischief import EVERYTHING, NOTICES, REPLIES, REQUESTS, Mischief
 from tests.faults.off import are_off
@@ -55,12 +54,12 @@ ENOUGH = 5_000
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("share", "pace"), [(0.02, True), (0.02, False), (0.2, True)])
 def test_everything_at_once_tells_nothing_false_and_nothing_hangs(
-    share: float, pace: bool, rounds: Callable[[int], int]
+    share: float, pace: bool, rounds: Rounds
 ) -> None:
     line = Mischief(11, share, *EVERYTHING, copy_after=None if pace else 0.0)
     ledger = Ledger(Rig(line, 12, pace=pace), line)
     ledger.rig.open()
-    total = max(rounds(100_000), 0 if are_off() else ENOUGH)
+    total = max(rounds(100_000, ENOUGH), 0 if are_off() else ENOUGH)
     for _ in range(total):
         ledger.call()
     print(ledger.told(f"{share:.0%} of all that is said" + (", at 9600 baud" if pace else ", without pace")))
@@ -91,7 +90,7 @@ def test_what_may_not_be_said_twice_is_said_once_and_its_outcome_is_unknown(name
     assert isinstance(rig.errors[-1], OutcomeUnknown)
 
 
-def test_a_copy_that_something_hands_over_later_is_the_known_limit(rounds: Callable[[int], int]) -> None:
+def test_a_copy_that_something_hands_over_later_is_the_known_limit(rounds: Rounds) -> None:
     """Nothing in an acknowledgement tells it from an older one to the same command: see docs/explanation/taint.md.
 
     A line of 9600 baud that the bus knows to be one has carried a copy before it can be taken for anything. This

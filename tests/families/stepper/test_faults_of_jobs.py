@@ -157,7 +157,7 @@ ENOUGH = 5_000
 def test_l7_jobs_among_all_faults_are_as_they_are_told(
     share: float, rounds: Rounds, figures: Figures
 ) -> None:
-    total = max(rounds(100_000), 0 if are_off() else ENOUGH) // 10
+    total = max(rounds(100_000, ENOUGH), 0 if are_off() else ENOUGH) // 10
     line = Mischief(31, share, *FAULTS)
     jobs = Jobs(line)
     jobs.open()
