@@ -197,3 +197,16 @@ class VerificationFailed(MotorbusError):
 
 class OutcomeUnknown(MotorbusError):
     """The request was sent and no evidence says whether it took effect."""
+
+
+def unread(why: MotorbusError, *, node: int, what: str = "the write") -> OutcomeUnknown:
+    """The error for what has left and could not be read back: nobody tells what became of it, and `why` says why."""
+    return OutcomeUnknown(
+        f"{why.summary}; whether {what} took effect is not known",
+        sent=why.sent,
+        received=why.received,
+        expected=why.expected,
+        cause=why.cause,
+        advice=why.advice,
+        node=node,
+    )

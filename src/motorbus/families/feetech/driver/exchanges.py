@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Final, NamedTuple, TypeVar
 
+from motorbus import errors
 from motorbus.core.goal import Later
 from motorbus.core.operation import (
     Answer,
@@ -262,15 +263,7 @@ def verified(
 
 def unread(node: Node, why: MotorbusError) -> OutcomeUnknown:
     """The error for a write that has left, when nobody tells what became of it."""
-    return OutcomeUnknown(
-        f"{why.summary}; whether the write took effect is not known",
-        sent=why.sent,
-        received=why.received,
-        expected=why.expected,
-        cause=why.cause,
-        advice=why.advice,
-        node=node.node,
-    )
+    return errors.unread(why, node=node.node)
 
 
 def _differs(node: Node, block: Block, found: bytes) -> VerificationFailed:

@@ -15,7 +15,7 @@ from typing import Final
 
 from motorbus.core.entry import Entry
 from motorbus.core.operation import Alone, Effect, Exchange, Operation, Pause, Rank, Timeout
-from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, VerificationFailed, WireError
+from motorbus.errors import NoReply, VerificationFailed, WireError, unread
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.exchanges import STORE, decided, listening, order, refused, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -126,21 +126,9 @@ def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
             try:
                 found = yield from upload_row(node, row, int)
             except (NoReply, WireError) as error:
-                raise _unread(node, row, error) from error
+                raise unread(error, node=node.node, what=f"the write of {row.name}") from error
             if found != raw:
                 raise _differs(node, row, raw, found)
-
-
-def _unread(node: Node, row: Entry, why: MotorbusError) -> OutcomeUnknown:
-    return OutcomeUnknown(
-        f"{why.summary}; whether the write of {row.name} took effect is not known",
-        sent=why.sent,
-        received=why.received,
-        expected=why.expected,
-        cause=why.cause,
-        advice=why.advice,
-        node=node.node,
-    )
 
 
 def _differs(node: Node, row: Entry, raw: int, found: int) -> VerificationFailed:
