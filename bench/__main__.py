@@ -1,30 +1,56 @@
-"""`python -m bench`: measure, print, and write build/bench.json and docs/performance.md."""
+"""`python -m bench`: measure, print, and write build/bench.json, docs/performance.md and its pictures.
+
+`--rows 4 5` measures these rows of the table of goals only, prints them, and leaves the page as it is.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from bench import (
     can_rounds,
     estimates,
     estop,
+    goals,
+    growth,
     machine,
+    page,
+    plots,
     report,
     responder,
     robot_loop,
     rounds,
+    samples,
     startup,
     stepper_line,
-    syscalls,
 )
 from bench.places import BUILD, ROOT
-from bench.rounds import CANDIDATES, Candidate
-from bench.workloads import WORKLOADS
+from bench.rounds import Sample
+from bench.row import SAMPLES, Row, Say
 from motorbus.errors import MotorbusError
 
+T = TypeVar("T")
+
 DOCUMENT = ROOT / "docs" / "performance.md"
+IMAGES = DOCUMENT.parent / "images"
+GROWN = 3
+"""Rounds for the growth of cost, which has many points."""
+CAN_COUNT = 3000
+"""Readings of one measurement on CAN."""
+ERRORS = (
+    responder.NoCompiler,
+    rounds.Failed,
+    stepper_line.Wrong,
+    robot_loop.Wrong,
+    estop.Wrong,
+    MotorbusError,
+    OSError,
+)
 
 
 def say(text: str) -> None:
@@ -38,66 +64,81 @@ def say(text: str) -> None:
 def parsed() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    parser.add_argument("--rounds", type=int, default=7, help="shuffled rounds (default 7)")
-    parser.add_argument("--count", type=int, default=3000, help="exchanges of one measurement (default 3000)")
-    parser.add_argument("--only", action="append", choices=CANDIDATES, help="this contender; may be repeated")
+    parser.add_argument("--rounds", type=int, default=SAMPLES, help="shuffled rounds (default %(default)s)")
+    parser.add_argument(
+        "--rows", nargs="+", default=[], metavar="N", help="only these rows of the table of goals"
+    )
     parser.add_argument("--output", type=Path, default=DOCUMENT, help="page to write")
     return parser.parse_args()
 
 
-def counted(program: Path, candidates: list[Candidate]) -> dict[tuple[str, str], dict[str, float]] | None:
-    """System calls of everyone, or None where they cannot be counted."""
-    if not syscalls.available():
-        say("strace is absent or may not trace: system calls are not measured\n")
-        return None
-    found = {}
-    for candidate in candidates:
-        for workload in WORKLOADS:
-            say(f"system calls: {candidate.name}, {workload}")
-            found[candidate.name, workload] = syscalls.per_exchange(program, candidate, workload)
-    return found
+def had(name: str, measure: Callable[[], T], failures: list[str], otherwise: T) -> T:
+    """What was measured; where that failed it is told, for all else is worth having."""
+    try:
+        return measure()
+    except ERRORS as error:
+        failures.append(f"{name}: {(str(error).splitlines() or [type(error).__name__])[0]}")
+        return otherwise
 
 
-def measured(given: argparse.Namespace) -> report.Results:
-    """The whole run. Raises NoCompiler or Failed."""
-    program = responder.build()
-    wanted = [CANDIDATES[name] for name in given.only or CANDIDATES]
-    missing = [candidate.name for candidate in wanted if candidate.missing()]
-    there = [candidate for candidate in wanted if not candidate.missing()]
-    inside = [candidate for candidate in there if candidate.in_memory]
+def of_each(
+    name: str,
+    measure: Callable[[tuple[str, ...], int, Say], Sequence[Sample]],
+    times: int,
+    failures: list[str],
+) -> list[Sample]:
+    """The samples of every group of workloads."""
+    nothing: Sequence[Sample] = ()
+    found = [had(name, partial(measure, group, times, say), failures, nothing) for group in samples.GROUPS]
+    return [one for group in found for one in group]
+
+
+def measured(times: int) -> report.Results:
+    """The whole run."""
+    found, failures = goals.measured(times, say)
     return report.Results(
         machine=machine.description(),
-        exchanges=given.count,
-        rounds=given.rounds,
-        wire=rounds.rounds(rounds.on_wire(program), there, given.count, given.rounds, say),
-        memory=rounds.rounds(rounds.in_memory, inside, given.count, given.rounds, say),
-        calls=counted(program, there),
-        starts=startup.costs(given.rounds, say),
-        missing=missing + can_rounds.missing(),
-        can=() if given.only or can_rounds.missing() else can_rounds.rounds(given.count, given.rounds, say),
-        forecasts=() if given.only else estimates.costs(given.rounds, say),
-        stepper=() if given.only else stepper_line.samples(given.rounds, say),
-        loop=() if given.only else robot_loop.samples(robot_loop.SECONDS, say),
-        stops=() if given.only else estop.samples(estop.STOPS, say),
+        rounds=times,
+        rows=found,
+        failures=failures,
+        growth=had("growth", lambda: growth.points(GROWN, say), failures, []),
+        wire=of_each("on a pseudo-terminal", samples.on_wire, times, failures),
+        memory=of_each("in process", samples.in_process, times, failures),
+        calls=had("system calls", lambda: samples.all_calls(say), failures, None),
+        starts=had("start-up", lambda: startup.costs(times, say), failures, []),
+        missing=samples.missing() + can_rounds.missing(),
+        can=had("CAN", lambda: can_rounds.rounds(CAN_COUNT, times, say), failures, []),
+        forecasts=had("estimates", lambda: estimates.costs(times, say), failures, []),
+        stepper=had("stepper", lambda: stepper_line.samples(times, say), failures, []),
+        loop=had("robot.loop", lambda: robot_loop.samples(robot_loop.SECONDS, say), failures, []),
+        stops=had("emergency stop", lambda: estop.samples(estop.STOPS, say), failures, []),
     )
+
+
+def printed(found: list[Row], failures: list[str]) -> int:
+    """Some rows on the terminal; exit code 1 when one could not be measured."""
+    print(report.as_text(report.goal_table(found)))
+    print(goals.summary(found))
+    for failure in failures:
+        print(f"NOT MEASURED: {failure}", file=sys.stderr)
+    return 1 if failures else 0
+
+
+def written(results: report.Results, output: Path) -> None:
+    """The page and its pictures."""
+    output.parent.mkdir(exist_ok=True)
+    IMAGES.mkdir(exist_ok=True)
+    output.write_text(page.page(results), encoding="utf-8")
+    plots.growth(IMAGES / "performance-growth.png", results.growth)
+    plots.goals(IMAGES / "performance-goals.png", results.rows)
 
 
 def main() -> int:
     """Exit code 0 when everything was measured and every value was right."""
     given = parsed()
-    try:
-        results = measured(given)
-    except (
-        responder.NoCompiler,
-        rounds.Failed,
-        stepper_line.Wrong,
-        robot_loop.Wrong,
-        estop.Wrong,
-        MotorbusError,
-        OSError,
-    ) as error:
-        print(f"\n{error}", file=sys.stderr)
-        return 1
+    if given.rows:
+        return printed(*goals.measured(given.rounds, say, given.rows))
+    results = measured(given.rounds)
     say("")
     shown = [report.as_text(table) for table in report.tables(results)]
     print("\n\n".join([*shown, report.verdict(results), report.spoiled(results)]))
@@ -105,12 +146,11 @@ def main() -> int:
     (BUILD / "bench.json").write_text(report.as_json(results), encoding="utf-8")
     for name in results.missing:
         print(f"NOT AVAILABLE: {name}; `make bench` installs it", file=sys.stderr)
-    if given.only or results.missing:
+    if results.missing:
         print("not everyone was measured, so the page is left as it is", file=sys.stderr)
-        return 1 if results.missing else 0
-    given.output.parent.mkdir(exist_ok=True)
-    given.output.write_text(report.page(results), encoding="utf-8")
-    return 0
+        return 1
+    written(results, given.output)
+    return printed(list(results.rows), list(results.failures))
 
 
 if __name__ == "__main__":

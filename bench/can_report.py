@@ -17,7 +17,8 @@ Positions of simulated KST servos in another process, over the slcan protocol on
 at once and the bus takes no bit time, so this compares libraries; what a bus at its bit rate carries, and how much of
 that motorbus uses, is computed exactly in [figures](reference/figures.md). *Times as many* is our readings per second
 divided by theirs, taken within each round: the median, and in brackets the least and the greatest. python-canopen
-reads several nodes by a thread each, motorbus by one blocking bus that keeps them all in flight.
+reads several nodes by a thread each, canopen-asyncio by a task each, motorbus by one blocking bus that keeps them all
+in flight.
 
 """
 COLUMNS = ("", "", "readings/s", "min – max", "processor µs", "times as many")

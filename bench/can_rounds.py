@@ -1,4 +1,4 @@
-"""CAN side by side with python-canopen: over slcan on a pseudo-terminal, simulated servos in a process of their own.
+"""CAN side by side with python-canopen and canopen-asyncio, over slcan: simulated servos in a process of their own.
 
 Everyone reads positions, of one node and of eight, in shuffled rounds. The simulator answers at once, so what differs
 is the library; on a real bus the wire and the adapter set the pace, and what counts is how many are kept in flight.
@@ -40,6 +40,7 @@ WORKLOADS = (
 CANDIDATES = (
     Candidate(OURS, "motorbus_can"),
     Candidate("python-canopen", "canopen_client", ("canopen",)),
+    Candidate("canopen-asyncio", "canopen_asyncio_client", ("canopen-asyncio",)),
 )
 
 

@@ -13,25 +13,24 @@ from resource import RUSAGE_SELF, getrusage
 from time import perf_counter
 from typing import Any, Protocol
 
-from bench.workloads import WARM_UP, WORKLOADS, Workload, goals, position
+from bench.workloads import EXPECTED, POSITION, WARM_UP, Workload, goals, named
 
 
 class Contender(Protocol):
     """One library, used as its own documentation shows. Its values stay in its own unit.
 
-    `read`, `sync_read` and `cycle` return what they read; `sync_write` and `cycle` take prepared goals.
+    It is made with the port and the workload, and has the method that the workload names besides `read`. `read`,
+    `sync_read`, `fields`, `blocks`, `many` and `cycle` return what they read; `sync_write` and `cycle` take prepared
+    goals.
     """
 
     def read(self, prepared: Any) -> Any: ...
-    def sync_read(self, prepared: Any) -> Any: ...
-    def sync_write(self, prepared: Any) -> Any: ...
-    def cycle(self, prepared: Any) -> Any: ...
 
     def prepare(self, counts: list[int]) -> Any:
-        """Goals of the six servos in the unit that this library takes."""
+        """Goals of the servos in the unit that this library takes."""
 
-    def counts(self, values: Any) -> Sequence[int]:
-        """What `read` or `sync_read` returned, in counts."""
+    def counts(self, values: Any) -> Sequence[Any]:
+        """What was read, one for each servo: counts; or `Fields` or bytes where the workload reads those."""
 
     def close(self) -> None: ...
 
@@ -40,10 +39,11 @@ class WrongValue(Exception):
     """A contender returned something else than what the responder sent."""
 
 
-def check(readings: Sequence[Sequence[int]], nodes: tuple[int, ...]) -> None:
+def check(readings: Sequence[Sequence[Any]], nodes: tuple[int, ...], what: str = POSITION) -> None:
     """Every reading against the rule. Raises WrongValue for the first that differs."""
+    rule = EXPECTED[what]
     for index, values in enumerate(readings):
-        expected = [position(node, index) for node in nodes]
+        expected = [rule(node, index) for node in nodes]
         if list(values) != expected:
             raise WrongValue(f"reading {index}: {list(values)}, expected {expected}")
 
@@ -72,7 +72,8 @@ class Course:
     def _stretch(self, count: int) -> None:
         inputs: list[Any] = [None] * count
         if self.workload.writes:
-            chosen = [goals(len(self.written) + index) for index in range(count)]
+            nodes = self.workload.writes
+            chosen = [goals(len(self.written) + index, nodes) for index in range(count)]
             self.written += chosen
             inputs = [self.contender.prepare(counts) for counts in chosen]
         exchange, keep = self.exchange, self.readings.append
@@ -87,7 +88,7 @@ class Course:
         """Raises WrongValue unless every reading is what the responder must have sent."""
         counts = self.contender.counts
         if self.workload.reads:
-            check([counts(values) for values in self.readings], self.workload.reads)
+            check([counts(values) for values in self.readings], self.workload.reads, self.workload.what)
         check([counts(value) for value in self.barriers], (1,))
 
     def books(self) -> dict[str, list[int]]:
@@ -117,16 +118,16 @@ def measure(contender: Contender, workload: Workload, count: int) -> dict[str, A
     }
 
 
-def main(contender: Callable[[str], Contender]) -> None:
+def main(contender: Callable[[str, Workload], Contender]) -> None:
     """The whole program of a contender's process: `PORT WORKLOAD COUNT`."""
     parser = argparse.ArgumentParser()
     parser.add_argument("port")
-    parser.add_argument("workload", choices=sorted(WORKLOADS))
+    parser.add_argument("workload", type=named)
     parser.add_argument("count", type=int)
     given = parser.parse_args()
-    opened = contender(given.port)
+    opened = contender(given.port, given.workload)
     try:
-        print(json.dumps(measure(opened, WORKLOADS[given.workload], given.count)))
+        print(json.dumps(measure(opened, given.workload, given.count)))
     except WrongValue as error:
         sys.exit(f"wrong value: {error}")
     finally:

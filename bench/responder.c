@@ -1,4 +1,4 @@
-/* The other end of the wire for the measurements: thirty servos that answer at once.
+/* The other end of the wire for the measurements: servos that answer at once.
 
    A library can only be timed against something that is never slower than itself, and that notices when a library
    cheats. So this answers FEETECH PING, READ, WRITE, SYNC READ and SYNC WRITE from plain memory, a whole sync-read
@@ -7,7 +7,8 @@
    its range and down again, to and fro, for no motor jumps from one end to the other.
 
    With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
-   until the line is free, and an answer is there when its last byte has passed.
+   until the line is free, and an answer is there when its last byte has passed. A second argument is the turnaround in
+   microseconds: so long the line is silent between a request and its answers, which then come without a gap.
 
    Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
 #define _GNU_SOURCE
@@ -23,7 +24,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { SERVOS = 30, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
+enum { SERVOS = 252, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
 enum { THERE_AND_BACK = 2 * (COUNTS - 1) };
 enum { BITS = 10, SECOND = 1000000000, EXACTLY = 60000, WATCHFUL = 300000 };
 enum { PING = 1, READ = 2, WRITE = 3, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
@@ -37,8 +38,10 @@ struct servo {
 
 static struct servo servos[SERVOS + 1];
 static unsigned long frames, strays;
+/* Only ids that this divides are there. */
+static int every = 1;
 /* Nanoseconds that a byte takes, 0 where it takes none; when the line is free again; when an answer left last. */
-static long long byte_time, line_free, answered;
+static long long byte_time, line_free, answered, turnaround;
 static byte answer[ROOM];
 static size_t filled;
 static int urgent;
@@ -49,7 +52,9 @@ static unsigned position_of(int id) {
     return (unsigned)(at < COUNTS ? at : THERE_AND_BACK - at);
 }
 
-static struct servo *servo_of(int id) { return id >= 1 && id <= SERVOS ? &servos[id] : NULL; }
+static struct servo *servo_of(int id) {
+    return id >= 1 && id <= SERVOS && id % every == 0 ? &servos[id] : NULL;
+}
 
 static byte checksum(const byte *from, size_t count) {
     unsigned sum = 0;
@@ -176,6 +181,7 @@ static void send_bytes(int master, const byte *from, size_t count) {
 /* On a line that takes its time all of it is there when its last byte has passed. */
 static void send_answer(int master) {
     if (byte_time) {
+        line_free += turnaround;
         pass(filled);
         wait_for_line();
         answered = now();
@@ -206,14 +212,22 @@ int main(int count_of_arguments, char **arguments) {
     size_t have = 0;
     long baud = count_of_arguments > 1 ? atol(arguments[1]) : 0;
     byte_time = baud > 0 ? (long long)BITS * SECOND / baud : 0;
+    turnaround = count_of_arguments > 2 ? atol(arguments[2]) * 1000 : 0;
+    every = count_of_arguments > 3 ? atoi(arguments[3]) : 1;
     prctl(PR_SET_TIMERSLACK, 1);
     urgent = sched_getscheduler(0) == SCHED_FIFO;
     int master = open_terminal();
     struct pollfd watched[] = {{.fd = master, .events = POLLIN}, {.fd = STDIN_FILENO, .events = POLLIN}};
     for (int id = 1; id <= SERVOS; id++) {
-        /* Firmware 3.10, low byte first, STS3215; id, rate, delay, answers everything, limits 0 to 4095. */
-        byte start[] = {3, 10, 0, 9, 3, (byte)id, 0, 0, 1, 0, 0, 0xFF, 0x0F};
+        /* Firmware 3.10, low byte first, STS3215; id, rate, delay, answers everything, limits 0 to 4095; its phase makes
+           velocities counts/s. */
+        byte start[] = {3, 10, 0, 9, 3, (byte)id, 0, 0, 1, 0, 0, 0xFF, 0x0F, 0, 0, 0, 0, 0, 12};
+        /* Velocity, load, 12.0 V, temperature, no asynchronous write, no alarm, it moves, 2 unused, current; the
+           contenders know the same rule. */
+        byte shown[] = {(byte)(50 + id), (byte)((50 + id) >> 8), (byte)(100 + id), (byte)((100 + id) >> 8), 120,
+                        (byte)(30 + id % 8), 0, 0, 1, 0, 0, (byte)(10 + id), (byte)((10 + id) >> 8)};
         memcpy(servos[id].memory, start, sizeof start);
+        memcpy(servos[id].memory + POSITION + 2, shown, sizeof shown);
     }
     puts(ptsname(master));
     fflush(stdout);

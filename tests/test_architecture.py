@@ -76,6 +76,7 @@ OFFENCES: dict[str, list[dict[str, str]]] = {
         {"cli/offence.py": "from can import Message"},
     ],
     "matplotlib-in-one-file": [{"cli/offence.py": "from matplotlib import pyplot"}],
+    "numpy-in-one-file": [{"recorder/decoder.py": "import numpy"}, {"plot.py": "import numpy"}],
     "tomlkit-in-one-file": [{"motion/machine/reading.py": "import tomlkit"}],
     "ruckig-in-one-file": [{"motion/profile/following.py": "import ruckig"}],
     "nothing-names-a-family": [

@@ -15,6 +15,7 @@ EXPECTED = {
     "async_servos.py": ["1: 3.142 rad", "6: 3.142 rad", "7: no reply"],
     "can_servo.py": ["simulated", "at 10.9°", "at -0.8°", "at 0.0°"],
     "control_loop.py": ["cycles/s, simulated"],
+    "fleet.py": ["30 axes within 0.000 rad of their goals, simulated", "times faster than real time"],
     "robot.py": [
         "bench: 9 axes, simulated",
         "3 axes moved in 1.00",

@@ -14,7 +14,7 @@ import tty
 from typing import Any
 
 from bench.loop import main
-from bench.workloads import IDS
+from bench.workloads import SIZES, Workload
 
 GOAL, POSITION = 42, 56
 ONE = 8
@@ -30,14 +30,17 @@ def packet(node: int, instruction: int, parameters: bytes) -> bytes:
 class Bare:
     """`os.write`, `poll`, `os.read`."""
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, workload: Workload) -> None:
         self.descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.descriptor, termios.TCSANOW)
         self.poll = select.poll()
         self.poll.register(self.descriptor, select.POLLIN)
+        self.nodes = workload.reads or workload.writes
+        size = SIZES[workload.what]
         self.read_one = packet(1, 2, bytes((POSITION, 2)))
-        self.read_six = packet(254, 0x82, bytes((POSITION, 2, *IDS)))
-        self.six = struct.Struct("<" + "5xHx" * len(IDS))
+        self.read_all = packet(254, 0x82, bytes((POSITION, size, *self.nodes)))
+        self.length = len(self.nodes) * (6 + size)
+        self.values = struct.Struct("<" + ("5xHx" if size == 2 else f"5x{size}sx") * len(self.nodes))
 
     def read(self, prepared: Any) -> bytes:
         os.write(self.descriptor, self.read_one)
@@ -47,21 +50,27 @@ class Bare:
             answer += os.read(self.descriptor, 4096)
         return answer[5:7]
 
-    def sync_read(self, prepared: Any) -> tuple[int, ...]:
-        os.write(self.descriptor, self.read_six)
+    def sync_read(self, prepared: Any) -> tuple[Any, ...]:
+        os.write(self.descriptor, self.read_all)
         self.poll.poll(1000)
         answer = os.read(self.descriptor, 4096)
-        while len(answer) < ONE * len(IDS):
+        while len(answer) < self.length:
             answer += os.read(self.descriptor, 4096)
-        return self.six.unpack(answer)
+        return self.values.unpack(answer)
+
+    blocks = sync_read
 
     def sync_write(self, prepared: list[int]) -> None:
-        data = [byte for node, goal in zip(IDS, prepared, strict=True) for byte in _six_bytes(node, goal)]
+        data = [
+            byte for node, goal in zip(self.nodes, prepared, strict=True) for byte in _six_bytes(node, goal)
+        ]
         os.write(self.descriptor, packet(254, 0x83, bytes((GOAL, 6, *data))))
 
     def cycle(self, prepared: list[int]) -> tuple[int, ...]:
         data = [
-            byte for node, goal in zip(IDS, prepared, strict=True) for byte in (node, goal & 255, goal >> 8)
+            byte
+            for node, goal in zip(self.nodes, prepared, strict=True)
+            for byte in (node, goal & 255, goal >> 8)
         ]
         os.write(self.descriptor, packet(254, 0x83, bytes((GOAL, 2, *data))))
         return self.sync_read(None)
@@ -69,7 +78,7 @@ class Bare:
     def prepare(self, counts: list[int]) -> list[int]:
         return counts
 
-    def counts(self, values: bytes | tuple[int, ...]) -> tuple[int, ...]:
+    def counts(self, values: bytes | tuple[Any, ...]) -> tuple[Any, ...]:
         return (int.from_bytes(values, "little"),) if isinstance(values, bytes) else values
 
     def close(self) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from time import monotonic
 from typing import Any
 
 import motorbus
 from bench import memory
 from bench.loop import main
-from bench.workloads import COUNTS, IDS
+from bench.workloads import BLOCK, COUNTS, FIELDS, SIZES, Fields, Workload, parts
 from motorbus import feetech
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Data
@@ -17,12 +18,15 @@ from motorbus.motion.safety import Gate
 
 STEP = math.tau / COUNTS
 SPEED = 1000 * STEP
+PRESENT = 56
+LONG = 0.1
+"""s of air that a train of answers may need here: nobody has to be stopped in between."""
 
 
 class MemoryLink:
     """A link without a kernel: what is written is answered at once."""
 
-    def __init__(self) -> None:
+    def __init__(self, workload: Workload) -> None:
         self.name = "memory"
         self.rate = 1_000_000
         self.latency = 0.0
@@ -30,15 +34,13 @@ class MemoryLink:
         self.virtual = False
         self.simulated = True
         self.warnings: tuple[str, ...] = ()
-        self.wire = memory.Wire()
+        self.answer: Callable[[Any], bytes] = memory.Wire(workload).answer
         self.arrived: list[Data] = []
 
-    def now(self) -> float:
-        return monotonic()
+    now = staticmethod(monotonic)
 
     def write(self, data: Data) -> None:
-        assert isinstance(data, bytes)
-        answer = self.wire.answer(data)
+        answer = self.answer(data)
         if answer:
             self.arrived.append(answer)
 
@@ -56,9 +58,9 @@ class MemoryLink:
         """Nothing is open."""
 
 
-def _in_memory() -> Bus:
+def _in_memory(workload: Workload) -> Bus:
     """A bus as `motorbus.open` would leave it, after the test of the echo."""
-    bus = Bus(MemoryLink(), feetech.FAMILY, admit=Gate())
+    bus = Bus(MemoryLink(workload), feetech.FAMILY, admit=Gate())
     test = feetech.FAMILY.echo_test()
     bus.turns.expect_echo(test)
     bus.run(test)
@@ -68,39 +70,78 @@ def _in_memory() -> Bus:
 class Motorbus:
     """Servos are prepared once, prepared exchanges kept, as a control loop would."""
 
-    def __init__(self, port: str) -> None:
-        self.bus = _in_memory() if port == memory.PORT else motorbus.open(f"feetech:{port},baud=1000000")
-        self.servos = [feetech.Servo(self.bus, node) for node in IDS]
-        for servo in self.servos:
+    def __init__(self, port: str, workload: Workload) -> None:
+        self.bus = (
+            _in_memory(workload) if port == memory.PORT else motorbus.open(f"feetech:{port},baud=1000000")
+        )
+        every = {node: feetech.Servo(self.bus, node) for node in workload.nodes}
+        for servo in every.values():
             servo.prepare()
-        self.positions = feetech.sync_read_positions(self.servos)
+        self.first = every[1]
+        self.nodes = workload.reads or workload.writes
+        self.servos = [every[node] for node in self.nodes]
+        self.groups = [
+            self._kept([every[node] for node in part], workload.what) for part in parts(workload.reads)
+        ]
+        self.kept: Any = self.groups[0] if self.groups else None
+        self.rows = feetech.sync_writer(self.servos, "goal_position", "goal_time", "goal_velocity")
+        self.goals = feetech.sync_writer(self.servos, "goal_position")
+
+    def _kept(self, servos: list[feetech.Servo], what: str) -> Any:
+        if what == FIELDS:
+            return feetech.sync_read_states(servos)
+        if what == BLOCK:
+            return feetech.sync_read_raw(PRESENT, SIZES[BLOCK], servos)
+        return feetech.sync_read_positions(servos, air=LONG)
 
     def read(self, prepared: Any) -> float:
-        return self.servos[0].position()
+        return self.first.position()
 
-    def sync_read(self, prepared: Any) -> feetech.Positions:
-        return self.bus.run(self.positions)
+    def sync_read(self, prepared: Any) -> Any:
+        return self.bus.run(self.kept)
 
-    def sync_write(self, prepared: list[float]) -> None:
-        orders: dict[feetech.Node, dict[str, float]] = {
-            servo: {"goal_position": goal, "goal_time": 0.0, "goal_velocity": SPEED}
-            for servo, goal in zip(self.servos, prepared, strict=True)
-        }
-        self.bus.run(feetech.sync_write(orders))
+    fields = blocks = sync_read
 
-    def cycle(self, prepared: list[float]) -> feetech.Positions:
-        self.bus.run(feetech.sync_write_positions(self.servos, prepared))
-        return self.bus.run(self.positions)
+    def many(self, prepared: Any) -> list[Any]:
+        return [self.bus.run(group) for group in self.groups]
 
-    def prepare(self, counts: list[int]) -> list[float]:
+    def sync_write(self, prepared: list[tuple[float, ...]]) -> None:
+        self.bus.run(self.rows(prepared))
+
+    def cycle(self, prepared: list[float]) -> Any:
+        return self.bus.volley(self.goals(prepared), self.kept)[1]
+
+    def prepare(self, counts: list[int]) -> list[Any]:
+        if self.kept is None:
+            return [(goal * STEP, 0.0, SPEED) for goal in counts]
         return [goal * STEP for goal in counts]
 
-    def counts(self, values: float | feetech.Positions) -> list[int]:
-        found = [values] if isinstance(values, float) else [values.values[node] for node in IDS]
-        return [round(value / STEP) for value in found]
+    def counts(self, values: Any) -> list[Any]:
+        if isinstance(values, float):
+            return [round(values / STEP)]
+        found: dict[int, Any] = {}
+        for group in values if isinstance(values, list) else [values]:
+            found |= group if isinstance(group, dict) else group.values
+        return [_raw(found.get(node)) for node in self.nodes]
 
     def close(self) -> None:
         self.bus.close()
+
+
+def _raw(value: Any) -> Any:
+    """One servo's position, quantities or bytes in the servo's own units; None where it did not answer."""
+    if isinstance(value, float):
+        return round(value / STEP)
+    if value is None or isinstance(value, bytes):
+        return value
+    return Fields(
+        round(value.position / STEP),
+        round(value.velocity / STEP),
+        round(value.load * 1000),
+        round(value.voltage * 10),
+        round(value.temperature),
+        round(value.current / 0.0065),
+    )
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ The names a user needs are here and are loaded when first used, so that `import 
     Robot, AsyncRobot   a machine by its file motorbus.toml          motorbus.Robot.load("motorbus.toml")
     open, open_async    a bus by its address, blocking or async     motorbus.open("feetech:/dev/ttyACM0")
     simulate            a simulated bus in this process             motorbus.simulate("feetech", ids="1-6")
+    recorder            recordings taken apart                      motorbus.recorder.Decoder("feetech")
     the errors          motorbus.NoReply and all others             see `motorbus.errors`
     the families        motorbus.feetech …                          device classes and driver functions
 """
@@ -41,6 +42,7 @@ from motorbus.errors import (
 )
 
 if TYPE_CHECKING:
+    from motorbus import recorder
     from motorbus.families import feetech, kst, stepper
     from motorbus.session import open, open_async, simulate
     from motorbus.session.robot import AsyncRobot, Robot
@@ -77,6 +79,7 @@ __all__ = [
     "kst",
     "open",
     "open_async",
+    "recorder",
     "simulate",
     "stepper",
 ]
@@ -93,6 +96,8 @@ _LAZY = {
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
+    if name == "recorder":
+        return import_module("motorbus.recorder")
     if name.startswith("_"):
         raise AttributeError(name)
     try:

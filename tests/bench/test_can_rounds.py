@@ -56,7 +56,8 @@ def test_the_ratio_is_theirs_by_ours_within_a_round() -> None:
         for name, seconds in (("motorbus", 1e-4), ("python-canopen", 3e-4))
     ]
     found = rows(samples)
-    assert [row[:2] for row in found] == [(load.name, one.name) for load in WORKLOADS for one in CANDIDATES]
+    names = ("motorbus", "python-canopen")  # the third was not measured
+    assert [row[:2] for row in found] == [(load.name, name) for load in WORKLOADS for name in names]
     assert found[1][-1] == "3.00 (3.00 – 3.00)"
     assert found[0][2:4] == ("5000", "3333 – 10000")
     assert all(len(row) == len(COLUMNS) for row in found)

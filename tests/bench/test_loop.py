@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import pytest
@@ -9,78 +10,134 @@ import pytest
 from bench import memory
 from bench.loop import WrongValue, measure
 from bench.rounds import CANDIDATES, Failed, compare
-from bench.workloads import IDS, WARM_UP, WORKLOADS, goals
+from bench.workloads import (
+    FIELDS,
+    IDS,
+    POSITION,
+    SIZES,
+    WARM_UP,
+    WORKLOADS,
+    Fields,
+    Workload,
+    goals,
+    growing,
+    named,
+    parts,
+)
 
 BARE = CANDIDATES["bare loop"]
 READ_ONE = memory.packet(1, memory.READ, bytes((memory.POSITION, 2)))
-READ_SIX = memory.packet(254, memory.SYNC_READ, bytes((memory.POSITION, 2, *IDS)))
+SIX = WORKLOADS["sync-read-6x2"]
 
 
 class Honest:
-    """Returns what the wire says, in counts."""
+    """Returns what the wire says: counts, or bytes, or the quantities in them."""
 
-    def __init__(self) -> None:
-        self.wire = memory.Wire()
+    def __init__(self, workload: Workload = SIX) -> None:
+        self.workload = workload
+        self.wire = memory.Wire(workload)
+        self.size = SIZES[workload.what]
+        self.requests = [
+            memory.packet(254, memory.SYNC_READ, bytes((memory.POSITION, self.size, *group)))
+            for group in parts(workload.reads)
+        ]
         self.calls = 0
 
     def read(self, prepared: Any) -> list[int]:
-        return self._positions(READ_ONE)
+        return [data[0] | data[1] << 8 for data in self._data([READ_ONE], 2)]
 
-    def sync_read(self, prepared: Any) -> list[int]:
-        return self._positions(READ_SIX)
+    def sync_read(self, prepared: Any) -> list[Any]:
+        found = self._data(self.requests, self.size)
+        if self.workload.what == POSITION:
+            return [data[0] | data[1] << 8 for data in found]
+        return [_fields(data) for data in found] if self.workload.what == FIELDS else found
+
+    fields = blocks = many = sync_read
 
     def sync_write(self, prepared: Any) -> None:
         self.calls += 1
 
-    def cycle(self, prepared: Any) -> list[int]:
+    def cycle(self, prepared: Any) -> list[Any]:
         return self.sync_read(None)
 
     def prepare(self, counts: list[int]) -> list[int]:
         return counts
 
-    def counts(self, values: list[int]) -> list[int]:
+    def counts(self, values: list[Any]) -> list[Any]:
         return values
 
     def close(self) -> None:
         """Nothing is open."""
 
-    def _positions(self, request: bytes) -> list[int]:
+    def _data(self, requests: list[bytes], size: int) -> list[bytes]:
         self.calls += 1
-        train = self.wire.answer(request)
-        return [train[start + 5] | train[start + 6] << 8 for start in range(0, len(train), 8)]
+        train = b"".join(map(self.wire.answer, requests))
+        return [train[start + 5 : start + 5 + size] for start in range(0, len(train), 6 + size)]
+
+
+def _fields(data: bytes) -> Fields:
+    position, velocity, load = struct.unpack_from("<HHH", data)
+    return Fields(position, velocity, load, data[6], data[7], data[13] | data[14] << 8)
 
 
 class Stale(Honest):
     """Gives the last answer again, once."""
 
-    def _positions(self, request: bytes) -> list[int]:
+    def _data(self, requests: list[bytes], size: int) -> list[bytes]:
         if self.calls == WARM_UP + 50:
-            self.wire.answer(request)
-        return super()._positions(request)
+            self.wire.answer(requests[0])
+        return super()._data(requests, size)
 
 
 @pytest.mark.parametrize("workload", WORKLOADS.values(), ids=WORKLOADS)
 def test_honest_work_is_accepted_and_counted(workload: Any) -> None:
-    found = measure(Honest(), workload, 100)
+    found = measure(Honest(workload), workload, 100)
     done = WARM_UP + 100
     assert found["processor"] > 0
     reads, writes, _ = found["books"]["1"]
-    barriers = 11 if workload.stride else 0  # 7 in the warm-up, 4 after it
+    barriers = {0: 0, 32: 11, 8: 38}[workload.stride]  # of the shorter ones 25 in the warm-up, 13 after it
     assert (reads, writes) == (done * bool(workload.reads) + barriers, done * bool(workload.writes))
 
 
 def test_the_sum_of_the_goals_is_the_sum_of_the_goals() -> None:
     written = [goals(index) for index in range(WARM_UP + 10)]
-    books = measure(Honest(), WORKLOADS["cycle"], 10)["books"]
+    books = measure(Honest(WORKLOADS["cycle"]), WORKLOADS["cycle"], 10)["books"]
     assert {node: books[str(node)][2] for node in IDS} == {
         node: sum(each[node - 1] for each in written) for node in IDS
     }
 
 
-@pytest.mark.parametrize("name", ["read1", "sync-read-6x2", "cycle"])
+@pytest.mark.parametrize("name", ["read1", "sync-read-6x2", "sync-read-6x15", "sync-read-6x15-raw", "cycle"])
 def test_one_stale_reading_in_hundreds_is_found(name: str) -> None:
     with pytest.raises(WrongValue, match=f"reading {WARM_UP + 50}:"):
-        measure(Stale(), WORKLOADS[name], 100)
+        measure(Stale(WORKLOADS[name]), WORKLOADS[name], 100)
+
+
+def test_a_quantity_that_is_wrong_is_found() -> None:
+    class Scaled(Honest):
+        def counts(self, values: list[Any]) -> list[Any]:
+            return [
+                value._replace(current=value.current + 1) if isinstance(value, Fields) else value
+                for value in values
+            ]
+
+    workload = WORKLOADS["sync-read-6x15"]
+    with pytest.raises(WrongValue, match="reading 0:"):
+        measure(Scaled(workload), workload, 10)
+
+
+def test_more_servos_than_a_packet_can_name_take_two() -> None:
+    workload = growing(253)
+    contender = Honest(workload)
+    assert [len(group) for group in parts(workload.reads)] == [240, 13]
+    assert set(measure(contender, workload, 10)["books"]) == {str(node) for node in range(1, 254)}
+
+
+def test_workloads_are_known_by_name() -> None:
+    assert named("many-64") == growing(64)
+    assert named("cycle") is WORKLOADS["cycle"]
+    with pytest.raises(KeyError):
+        named("many-65")
 
 
 def test_books_that_agree_pass() -> None:

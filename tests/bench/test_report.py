@@ -6,9 +6,12 @@ import json
 
 from bench.estimates import Cost as Estimated
 from bench.figures import Spread
-from bench.report import Results, as_json, as_text, page, spoiled, tables, verdict
+from bench.growth import MEMORY, Point
+from bench.page import page
+from bench.report import Results, as_json, as_text, spoiled, tables, verdict
 from bench.robot_loop import Sample as Looped
 from bench.rounds import Sample
+from bench.row import PROCESS, Row
 from bench.startup import Cost
 from bench.stepper_line import BACKUP
 from bench.stepper_line import Sample as Job
@@ -17,7 +20,6 @@ from bench.workloads import WORKLOADS
 MACHINE = {"processor": "A processor", "cores": "2", "system": "Linux", "python": "CPython"}
 RESULTS = Results(
     machine=MACHINE,
-    exchanges=100,
     rounds=1,
     wire=[
         Sample(0, name, workload, seconds, 5e-5)
@@ -65,6 +67,27 @@ def test_the_page_holds_every_table() -> None:
     looped = page(RESULTS._replace(loop=[flat]))
     assert "| direct | 1136.4 | 1020.0 | 89.8% | 5000 | 500 | 400 | 970 | 120 |" in looped
     assert "89.8%. At least 88%: reached." in looped
+
+
+def test_the_page_begins_with_the_goals_and_shows_the_pictures() -> None:
+    assert "## Goals" not in page(RESULTS)
+    row = Row("4", "something", "somebody", "x", 0.7, 0.6, 0.9, "<= 0.8", "<= 0.65", margin=PROCESS)
+    point = Point(MEMORY, "motorbus", 253, Spread(1e-4, 9e-5, 2e-4))
+    text = page(RESULTS._replace(rows=[row], growth=[point], failures=["rows of x: why"]))
+    assert text.index("## Goals") < text.index("## On a pseudo-terminal") < text.index("## Growth")
+    assert "| 4 | something | somebody | <= 0.8 | <= 0.65 | 0.70 | 0.60 – 0.90 | met |" in text
+    assert "1 of 1 goals are met." in text
+    assert "Not measured: rows of x: why." in text
+    assert "| in process | motorbus | 253 | 100.0 | 90.0 – 200.0 |" in text
+    assert "(images/performance-goals.png)" in text
+    assert "(images/performance-growth.png)" in text
+
+
+def test_a_contender_is_in_the_tables_of_what_it_can_do() -> None:
+    lacking = [one for one in RESULTS.wire if (one.contender, one.workload) != ("other", "cycle")]
+    by_title = {table.title.split(":")[0]: table for table in tables(RESULTS._replace(wire=lacking))}
+    assert [row[0] for row in by_title["cycle"].rows] == ["motorbus"]
+    assert [row[0] for row in by_title["read1"].rows] == ["motorbus", "other"]
 
 
 def test_the_json_has_every_sample() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bench.rounds import CANDIDATES, REPEATS, Candidate, Failed, rounds
+from bench.rounds import CANDIDATES, REPEATS, Candidate, Failed, in_memory, rounds
 from bench.workloads import WORKLOADS
 
 BARE = CANDIDATES["bare loop"]
@@ -32,7 +32,7 @@ def silent(text: str) -> None:
 def test_everyone_does_everything_once_a_round() -> None:
     samples = rounds(Flaky(0), [BARE], count=1, times=3, progress=silent)
     assert sorted((s.round, s.workload) for s in samples) == sorted(
-        (number, name) for number in range(3) for name in WORKLOADS
+        (number, name) for number in range(3) for name, load in WORKLOADS.items() if BARE.can(load)
     )
     assert {s.repeats for s in samples} == {0}
 
@@ -45,10 +45,37 @@ def test_the_order_differs_from_round_to_round() -> None:
 
 
 def test_a_spoiled_measurement_is_repeated_and_counted() -> None:
-    samples = rounds(Flaky(REPEATS), [BARE], count=1, times=1, progress=silent)
-    assert [s.repeats for s in samples] == [REPEATS, 0, 0, 0]
+    two = [WORKLOADS["read1"], WORKLOADS["cycle"]]
+    samples = rounds(Flaky(REPEATS), [BARE], count=1, times=1, progress=silent, workloads=two)
+    assert [s.repeats for s in samples] == [REPEATS, 0]
 
 
-def test_what_stays_spoiled_ends_the_run() -> None:
+def test_nobody_is_asked_for_what_it_has_no_call_for() -> None:
+    found = rounds(Flaky(0), [CANDIDATES["servolab"]], count=1, times=1, progress=silent)
+    assert {s.workload for s in found} == {
+        "read1",
+        "sync-read-6x15",
+        "sync-read-6x15-raw",
+        "sync-write-6x6",
+        "sync-write-30x6",
+    }
+
+
+def test_what_stays_spoiled_ends_the_run_if_it_is_ours() -> None:
     with pytest.raises(Failed, match="held up"):
-        rounds(Flaky(REPEATS + 1), [BARE], count=1, times=1, progress=silent)
+        rounds(Flaky(REPEATS + 1), [CANDIDATES["motorbus"]], count=1, times=1, progress=silent)
+
+
+def test_another_that_stays_spoiled_is_left_out_of_this_round_and_said() -> None:
+    two = [WORKLOADS["read1"], WORKLOADS["cycle"]]
+    told: list[str] = []
+    samples = rounds(Flaky(REPEATS + 1), [BARE], count=1, times=1, progress=told.append, workloads=two)
+    assert len(samples) == 1
+    assert "left out of round 1: held up\n" in told
+
+
+@pytest.mark.parametrize("name", [one.name for one in CANDIDATES.values() if one.in_memory])
+def test_each_library_in_python_really_reads_and_writes(name: str) -> None:
+    candidate = CANDIDATES[name]
+    load = next(one for one in reversed(WORKLOADS.values()) if candidate.can(one))
+    assert in_memory(candidate, load.name, 5)["processor"] > 0

@@ -88,6 +88,8 @@ def everyone(what: int = NUMBER) -> Exchange[Answer]:
 class Frames:
     """The receiver."""
 
+    held = 0
+
     def feed(self, data: Data) -> list[Event]:
         if not isinstance(data, CanFrame) or data.id - 0x580 not in range(1, 128):
             return [Noise(data.data if isinstance(data, CanFrame) else data, "foreign")]

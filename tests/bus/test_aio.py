@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.aio import NAP
+from motorbus.bus.watch import NAP
 from motorbus.core.operation import Operation, Together
 from motorbus.errors import LinkLost, NoReply
 from tests.bus.responder import LOCK, async_bus, guarded, memory_bus, position, positions

@@ -256,7 +256,7 @@ def test_a_second_copy_of_the_last_reply_is_not_the_next() -> None:
     assert not flight.done, "this node is in doubt now"
     script.clear(1)
     script.sent()
-    last = script.turns._flying[0].exchange.replies
+    last = script.turns.flying[0].exchange.replies
     assert isinstance(last, tuple)
     script.feed(wire.encode_status(1, 0, b"\x33\x33\x00"[: last[0].length - 6]))
     assert flight.result().replies[0].data[5:7] == b"\x33\x33"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from motorbus.bus.air import MARGIN
+from motorbus.bus.pace import MARGIN
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import (
     CanFrame,

@@ -117,7 +117,7 @@ def test_a_stop_goes_before_a_claim_that_waits() -> None:
     script.sent()
     claim = claimed(script, "a")
     script.submit(torque(2, rank=Rank.STOP))
-    script.turns._flying.clear()
+    script.turns.flying.clear()
     script.turns._claims.waiting.clear()
     script.turns._claims.waiting.append(claim)
     assert script.turns._has_turn(Flight(torque(2, rank=Rank.STOP)))
@@ -152,7 +152,7 @@ def test_what_waits_for_one_alone_keeps_the_bus_busy() -> None:
     script.submit(position(1))
     script.sent()
     claimed(script, "a")
-    script.turns._flying.clear()
+    script.turns.flying.clear()
     assert not script.turns.idle
 
 
@@ -193,7 +193,7 @@ def test_a_link_that_takes_bit_time_is_free_when_the_bits_have_passed(paced: boo
     script.submit(Exchange(wire.action()))
     script.submit(Exchange(wire.action(7)))
     script.sent()
-    free = script.turns._free_at
+    free = script.turns.free_at
     if paced:
         assert free > script.now
         assert script.send() is None

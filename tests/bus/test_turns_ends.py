@@ -223,7 +223,7 @@ def test_a_scan_that_heard_its_own_echo_is_tried_again() -> None:
     flight = script.submit(ping(1))
     script.sent()
     assert flight.exchange.timeout is Timeout.SCAN
-    script.turns._flying.clear()
+    script.turns.flying.clear()
     script.turns._failed(flight, "echo", script.now)
     assert not flight.done
     assert script.turns.waiting

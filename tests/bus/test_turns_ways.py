@@ -76,7 +76,7 @@ def test_a_bus_is_free_at_the_very_moment_when_the_bits_have_passed() -> None:
     script.sent()
     assert script.send() is None
     script.now = script.turns.due()
-    assert script.now == script.turns._free_at < inf
+    assert script.now == script.turns.free_at < inf
     assert script.sent() == wire.action(7)
 
 
@@ -86,7 +86,7 @@ def test_the_short_path_waits_for_bits_only_where_they_surely_take_time(paced: b
     script.submit(Exchange(wire.action()))
     script.sent()
     assert script.turns.idle
-    assert script.now < script.turns._free_at
+    assert script.now < script.turns.free_at
     went = script.turns.short(Flight(position(1)), script.now)
     assert (went is None) is bool(paced)
 

@@ -142,3 +142,56 @@ def test_a_recording_that_is_empty_or_not_there_is_told(run: Run, tmp_path: Path
         assert f"{name} cannot be read: no such file or directory" in ran.err
     assert run("decode", "--family", "kst", GOAL, "--file", str(tmp_path / "empty.log")).code == 2
     assert run("decode", "--family", "feetech", "--file", str(tmp_path / "empty.log")).code == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("line.bin", bytes.fromhex(READ + ANSWER)),
+        ("line.RAW", bytes.fromhex(READ + ANSWER)),
+        ("line.hex", f"{READ}\n{ANSWER}\n".encode()),
+        ("line.txt", f"{READ.lower()} {ANSWER.replace(' ', '')}".encode()),
+    ],
+)
+def test_a_recording_of_a_serial_line_is_read(name: str, content: bytes, run: Run, tmp_path: Path) -> None:
+    file = tmp_path / name
+    file.write_bytes(content)
+    ran = run("decode", "--family", "feetech", "--file", str(file))
+    assert ran.code == 0, ran.err
+    assert "at byte 0\n" in ran.out
+    assert "at byte 8\n" in ran.out
+    assert "1304" in ran.out, "the answer is read by the question before it"
+    records = run("decode", "--family", "feetech", "--file", str(file), "--json").records
+    assert [(one["schema"], one["start"], one["data"]) for one in records] == [
+        ("motorbus.decode.frame/1", 0, READ),
+        ("motorbus.decode.frame/1", 8, ANSWER),
+    ]
+
+
+def test_frames_of_a_recording_are_numbered(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(LOG))
+    assert [one["start"] for one in run("decode", "--family", "kst", "--json").records] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("family", "name", "content", "words"),
+    [
+        ("feetech", "line.txt", b"no bytes at all", "not bytes in hexadecimal"),
+        ("feetech", "line.bin", b"", "there are no bytes to decode"),
+        (
+            "feetech",
+            "line.pdf",
+            b"\xff",
+            "a name that ends in .bin, .raw (bytes) or .hex, .txt (hexadecimal)",
+        ),
+        ("feetech", "trace.log", LOG.encode(), "feetech devices are on no CAN bus"),
+        ("kst", "line.bin", b"\xff", "no log of CAN frames that is known here"),
+    ],
+)
+def test_a_file_that_is_no_recording_of_such_a_bus_ends_with_2(
+    family: str, name: str, content: bytes, words: str, run: Run, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    ran = run("decode", "--family", family, "--file", str(tmp_path / name))
+    assert (ran.code, ran.out) == (2, "")
+    assert words in ran.err

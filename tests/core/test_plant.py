@@ -242,3 +242,24 @@ def test_duty_and_current_follow_velocity_and_torque() -> None:
     assert drive.current(0.0) == 0.0
     assert drive.current(100.0) == 0.15
     assert drive.current(-100.0, torque=-0.5) == pytest.approx(-1.15)
+
+
+@given(places, places, velocities, speeds, accelerations, st.floats(-1.0, 60.0))
+def test_its_state_is_what_it_tells_one_by_one(
+    begin: float, goal: float, velocity: float, speed: float, acceleration: float, at: float
+) -> None:
+    motion = move(0.0, begin, goal, velocity=velocity, speed=speed, acceleration=acceleration)
+    assert motion.state(at) == (motion.position(at), motion.velocity(at), motion.acceleration(at))
+
+
+@given(places, places, velocities, speeds, accelerations)
+def test_its_peak_is_that_of_its_stretches(
+    begin: float, goal: float, velocity: float, speed: float, acceleration: float
+) -> None:
+    motion = move(0.0, begin, goal, velocity=velocity, speed=speed, acceleration=acceleration)
+    assert motion.peak == max(abs(stretch.velocity) for stretch in motion.stretches())
+
+
+def test_the_peak_of_what_goes_on_for_ever() -> None:
+    assert run(0.0, 5.0, -300.0, velocity=100.0, acceleration=50.0).peak == 300.0
+    assert rest(0.0, 5.0).peak == 0.0

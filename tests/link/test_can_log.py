@@ -10,7 +10,7 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.can_log import looks_like_can, parse_line, parse_word, read_lines, read_log
+from motorbus.link.can_log import is_log, looks_like_can, parse_line, parse_word, read_lines, read_log
 
 DATA = bytes.fromhex("2203600093FF0000")
 FRAMES = [CanFrame(0x625, DATA), CanFrame(0x625, DATA, extended=True), CanFrame(0x5A5, b"")]
@@ -168,3 +168,12 @@ def test_without_python_can_the_line_that_installs_it_is_named(
         list(read_log(tmp_path / "trace.asc"))
     (tmp_path / "trace.log").write_text("(1.0) can0 5A5#\n")
     assert len(list(read_log(tmp_path / "trace.log"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "only"),
+    [("a.log", True), ("a.ASC", True), ("a.blf", True), ("a.trc", True), ("a.candump", True), ("a.txt", False),
+     ("a", False), ("a.bin", False)],
+)  # fmt: skip
+def test_a_name_may_say_that_it_can_be_nothing_else(name: str, only: bool, tmp_path: Path) -> None:
+    assert is_log(tmp_path / name) == only

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import PortNotFound, RequestError
+from motorbus.link.adapters import TERMINAL_LATENCY
 from motorbus.link.can import CanLink
 from motorbus.link.pty import PtyMaster
 from motorbus.link.serial import SerialLink
@@ -20,6 +21,13 @@ def test_a_device_is_opened(master: PtyMaster) -> None:
     assert isinstance(link, SerialLink)
     assert (link.name, link.rate) == (master.slave_name, 500_000)
     link.close()
+
+
+def test_a_latency_that_is_said_holds_and_else_that_of_the_link(master: PtyMaster) -> None:
+    for options, latency in (({"latency": 0.0}, 0.0), ({"latency": 0.0005}, 0.0005), ({}, TERMINAL_LATENCY)):
+        link = open_link(master.slave_name, rate=500_000, options=options)
+        assert link.latency == latency
+        link.close()
 
 
 def test_a_symbolic_link_to_a_device_is_opened(master: PtyMaster, tmp_path: Path) -> None:

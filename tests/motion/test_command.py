@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Alone, Answer, Effect, Exchange, Operation, Pause, Rank, Together
+from motorbus.core.aimed import Aim, Aimed
+from motorbus.core.operation import Alone, Answer, Effect, Exchange, Goal, Operation, Pause, Rank, Together
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply
 from motorbus.motion.command import Command
 from motorbus.session.robot import Robot
@@ -264,3 +265,50 @@ def test_a_stop_of_another_device_costs_one_look_and_then_it_is_quick_again(
         robot["a1"].bus.run(robot["a1"].able["disable_torque"](robot["a1"].device))  # past the axis
         assert isinstance(mine.lost(), Interrupted)
         assert isinstance(mine.lost(), Interrupted)
+
+
+# -- orders of a mould -------------------------------------------------------------------------------------------------
+
+
+def ordered(why: MotorbusError | None = None) -> tuple[Aim, Aimed]:
+    aim = Aim((1,), lambda raws: (Goal(1, "position", float(raws[0]), -9.0, 9.0),), lambda _: why)
+    return aim, Aimed(b"\x01", aim, (2,))
+
+
+def test_an_order_of_a_mould_stays_one_and_does_not_leave_once_the_command_is_lost() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        mine = Command(robot.axes.values())
+        aim, order = ordered()
+        guarded: Any = mine.guarded(order)
+        assert isinstance(guarded, Aimed)
+        assert (guarded.request, guarded.goals, guarded.sure) == (order.request, order.goals, True)
+        assert guarded.refusal(lambda _: 0) is None
+        again: Any = mine.guarded(Aimed(b"\x02", aim, (3,)))
+        assert again.aim is guarded.aim  # kept, for a loop asks in each cycle
+        robot["a1"].stop()
+        assert isinstance(guarded.refusal(lambda _: 0), Interrupted)
+        assert isinstance(again.refusal(lambda _: 0), Interrupted)
+        assert order.refusal(lambda _: 0) is None
+
+
+def test_what_its_maker_has_against_an_order_of_a_mould_counts_first() -> None:
+    why = NoReply("no")
+    with machine(arm="1") as (made, _), Robot.of(made) as robot:
+        mine = Command(robot.axes.values())
+        mine.guarded(ordered()[1])
+        guarded: Any = mine.guarded(ordered(why)[1])  # of another mould
+        robot["a1"].stop()
+        assert guarded.refusal(lambda _: 0) is why
+
+
+def test_an_order_of_a_mould_is_asked_of_the_command_that_has_it_now() -> None:
+    with machine(arm="1-2") as (made, _), Robot.of(made) as robot:
+        mine, (_, order) = Command(robot.axes.values()), ordered()
+        mine.guarded(order)
+        robot["a1"].stop()
+        rest: Any = mine.rest().guarded(order)
+        joined: Any = mine.joined(Command(robot.axes.values())).guarded(order)
+        before: Any = mine.guarded(order)
+        assert rest.refusal(lambda _: 0) is None
+        assert joined.refusal(lambda _: 0) is None
+        assert isinstance(before.refusal(lambda _: 0), Interrupted)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
+import subprocess
+import sys
 
 import pytest
 
@@ -35,30 +36,12 @@ def test_what_is_not_there_is_told_by_both(address: str) -> None:
         buses.open_async(address)
 
 
-def test_an_async_bus_that_was_cancelled_while_it_was_entered_gives_its_port_back() -> None:
-    async def entered(url: str) -> None:
-        async with buses.open_async(url):
-            raise AssertionError("it was cancelled before")
-
-    async def main() -> None:
-        with buses.simulate("feetech") as sim:
-            task = asyncio.create_task(entered(sim.url))
-            await asyncio.sleep(0)
-            task.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await task
-            async with buses.open_async(sim.url) as bus:
-                assert bus.simulated
-
-    asyncio.run(main())
-
-
-def test_the_async_bus_finds_out_about_echo_when_it_is_entered() -> None:
-    async def main() -> None:
-        with buses.simulate("feetech") as sim:
-            bus = buses.open_async(sim.url)
-            assert bus.turns.echo.present is None
-            async with bus:
-                assert bus.turns.echo.present is False
-
-    asyncio.run(main())
+def test_a_bus_that_blocks_needs_no_asyncio() -> None:
+    program = """
+import sys, motorbus
+with motorbus.simulate("feetech") as sim, motorbus.open(sim.url) as bus:
+    motorbus.feetech.Servo(bus, 1).position()
+print(*{"argparse", "asyncio", "numpy", "serial", "serialx"} & set(sys.modules))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == ""

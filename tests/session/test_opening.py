@@ -28,11 +28,26 @@ def test_what_a_family_takes_goes_to_the_family_and_the_rest_to_the_link() -> No
     assert simulated.options == {"ids": "1-3", "model": "sts3215"}
 
 
+@pytest.mark.parametrize(("said", "seconds"), [("0", 0.0), ("500us", 0.0005), ("1ms", 0.001), (0.002, 0.002)])
+def test_the_latency_of_a_serial_port_goes_to_its_link_in_seconds(said: object, seconds: float) -> None:
+    assert prepare("feetech:/dev/ttyAMA0", {"latency": said}).options == {"latency": seconds}
+    assert prepare("stepper:socket://10.0.0.7:4000", {"latency": said}).options == {"latency": seconds}
+
+
+@pytest.mark.parametrize("bus", ["feetech:sim", "feetech:sim:arm", "stepper:sim"])
+def test_a_simulator_in_this_process_has_no_latency(bus: str) -> None:
+    with pytest.raises(RequestError, match="unknown option 'latency'"):
+        prepare(f"{bus},latency=0", {})
+
+
 @pytest.mark.parametrize(
     ("address", "why"),
     [
         ("feetech:/dev/ttyACM0,speed=3", "unknown option 'speed'"),
         ("feetech:/dev/ttyACM0,baud=fast", "not a rate in bit/s"),
+        ("feetech:/dev/ttyACM0,latency=-1", "no adapter holds bytes back for that long"),
+        ("feetech:/dev/ttyACM0,latency=2s", "no adapter holds bytes back for that long"),
+        ("feetech:/dev/ttyACM0,latency=fast", "is not a number"),
         ("kst:sim,bitrate=-1", "not a rate in bit/s"),
         ("nobody:/dev/ttyACM0", "no family 'nobody'"),
     ],

@@ -6,92 +6,13 @@ Nothing here depends on the machine: the same figures come out everywhere. `make
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import pytest
 
-from motorbus.bus.pump import Bus
-from motorbus.core.operation import Operation, Together
-from motorbus.diagnose.budget import Budget, Transfer, budget
-from motorbus.families.kst import FAMILY, Servo
-from motorbus.families.kst.driver.feedback import position_exchange
-from motorbus.families.kst.simulator import KstBus
-from motorbus.families.kst.wire import encode_upload, encode_upload_reply
-from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
-from motorbus.simulation.can_wire import CanWire
+from bench.can_filled import counted, measured
 
-LATENCY = 0.001
-TURNAROUND = 0.0001
-POSITION = 0x6002
 READS = 4000
 COUNTS = (1, 2, 4, 8, 16)
-
-
-class Filled(NamedTuple):
-    """Reads per second of all nodes together, the time of a read that 99 in 100 keep (s), and the limits of both."""
-
-    rate: float
-    limit: float
-    p99: float
-    ideal: float
-
-    @property
-    def share(self) -> float:
-        return self.rate / self.limit
-
-
-def raw(node: int) -> int:
-    """Where a servo stands: each elsewhere, all over the range."""
-    return node * 377 % 1801 - 900
-
-
-def counted(nodes: range, bitrate: int) -> Budget:
-    """What the frames of these reads cost, to the bit."""
-    cycle = [
-        Transfer(
-            node,
-            (
-                [encode_upload(node, POSITION)],
-                [encode_upload_reply(node, POSITION, 0, raw(node).to_bytes(2, "little", signed=True))],
-            ),
-        )
-        for node in nodes
-    ]
-    return budget(cycle, bitrate, latency=LATENCY, turnaround=TURNAROUND)
-
-
-def measured(nodes: range, bitrate: int, reads: int) -> Filled:
-    """Every node is read as fast as it answers, by one blocking bus."""
-    simulator = FAMILY.simulator(tuple(nodes), "", turnaround=TURNAROUND, bit_rate=bitrate)
-    assert isinstance(simulator, KstBus)
-    for servo in simulator.servos:
-        servo.raw_position = raw(servo.node)
-    wire = CanWire(simulator, latency=LATENCY / 2)
-    bus = Bus(MemoryLink(wire, rate=bitrate), FAMILY.configured(), admit=Gate())
-    times: list[float] = []
-
-    def reading(node: int) -> Operation[None]:
-        servo = Servo(bus, node)
-        exchange = position_exchange(servo)
-        for _ in range(reads // len(nodes)):
-            begun = bus.link.now()
-            assert servo.table["present_position"].to_raw((yield from exchange)) == raw(node)
-            times.append(bus.link.now() - begun)
-
-    def together() -> Operation[None]:
-        yield from Together([reading(node) for node in nodes])
-
-    bus.run(together())
-    assert all(ledger.sent == ledger.ok for ledger in bus.statistics.nodes.values())
-    cost = counted(nodes, bitrate)
-    full, alone = cost.highest_rate.mean, cost.sequential_rate * len(nodes)
-    return Filled(
-        rate=len(times) / bus.link.now(),
-        limit=len(nodes) * min(full, alone),
-        p99=sorted(times)[int(0.99 * len(times))],
-        ideal=max(1 / full, 1 / alone),
-    )
 
 
 @pytest.mark.parametrize("bitrate", [500_000, 1_000_000])

@@ -5,19 +5,28 @@ from __future__ import annotations
 import pytest
 
 from motorbus.core.can_bits import bits
-from motorbus.core.operation import CanFrame
+from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.link.memory import NoisyLine
-from motorbus.simulation.course import BACKLOG, HASTE, Course
+from motorbus.simulation.course import AHEAD, BACKLOG, HASTE, PIECE, Course
 from tests.simulation.parrots import ANSWER, THINKS, Parrots
 
+RATE = 100_000
+BYTE = 10 / RATE
 FRAME = CanFrame(0x601, bytes(8))
 REPLY = CanFrame(0x601 ^ ANSWER, bytes(8))
 
 
 def told(course: Course, now: float) -> list[tuple[object, object, object]]:
     return [(event.at, event.data, event.sender) for event in course.happen(now)]
+
+
+class Ears(Parrots):
+    """Devices on a serial line: they note what they hear, and say nothing but what they are told to."""
+
+    def receive(self, data: Data, at: float) -> None:
+        self.heard.append((at, data))
 
 
 def test_without_pace_a_frame_arrives_and_is_answered_at_once() -> None:
@@ -90,10 +99,6 @@ def test_an_echo_is_heard_by_the_sender_too() -> None:
 
 
 def test_bytes_are_for_the_device_alone() -> None:
-    class Ears(Parrots):
-        def receive(self, data: object, at: float) -> None:
-            self.heard.append((at, b"x"))
-
     bus = Ears()
     course = Course(bus)
     course.hear(b"abc", 1.0)
@@ -126,3 +131,79 @@ def test_what_is_forgotten_never_arrives() -> None:
     course.hear(FRAME, 1.0, "me")
     course.forget()
     assert told(course, 9.0) == []
+
+
+def test_a_paced_piece_is_heard_packet_by_packet_each_when_its_last_byte_has_passed() -> None:
+    bus = Ears()
+    course = Course(bus, pace=RATE)
+    said = bytes(range(200)) * 3
+    course.hear(said, 1.0)
+    list(course.happen(2.0))
+    assert b"".join(bytes(data) for _, data in bus.heard if isinstance(data, bytes)) == said
+    passed = [min(PIECE * number, len(said)) for number in (1, 2, 3)]
+    assert [at for at, _ in bus.heard] == pytest.approx([1.0 + count * BYTE for count in passed])
+
+
+def test_without_pace_it_is_one_piece() -> None:
+    bus = Ears()
+    Course(bus).hear(bytes(1000), 1.0)
+    course = Course(bus)
+    course.hear(bytes(1000), 1.0)
+    list(course.happen(1.0))
+    assert bus.heard == [(1.0, bytes(1000))]
+
+
+def test_bytes_are_given_early_with_their_own_moment() -> None:
+    bus = Ears()
+    course = Course(bus, pace=RATE)
+    course.hear(bytes(100), 1.0)
+    end = 1.0 + 100 * BYTE
+    assert course.next() == pytest.approx(end - AHEAD)
+    list(course.happen(end - AHEAD - 1e-6))
+    assert bus.heard == []
+    list(course.happen(end - AHEAD + 1e-6))
+    ((at, data),) = bus.heard
+    assert at == pytest.approx(end)
+    assert data == bytes(100)
+
+
+def test_what_a_device_says_before_is_said_before() -> None:
+    bus = Ears()
+    course = Course(bus, pace=RATE)
+    course.hear(bytes(100), 1.0)
+    end = 1.0 + 100 * BYTE
+    bus.say(FRAME, end - 0.001)
+    list(course.happen(end - 0.002))
+    assert bus.heard == []
+    list(course.happen(end))
+    assert len(bus.heard) == 1
+
+
+def test_time_never_goes_back_for_devices() -> None:
+    class Clocked(Ears):
+        now = 0.0
+
+        def receive(self, data: Data, at: float) -> None:
+            super().receive(data, at)
+            self.now = at
+
+        def advance(self, to: float) -> list[tuple[float, Data]]:
+            assert to >= self.now
+            self.now = to
+            return super().advance(to)
+
+    bus = Clocked()
+    course = Course(bus, pace=RATE)
+    course.hear(bytes(100), 1.0)
+    for step in range(20):
+        list(course.happen(1.0 + step * 0.001))
+    assert len(bus.heard) == 1
+    assert bus.now == pytest.approx(1.019)
+
+
+def test_frames_are_not_given_early_for_others_see_them_too() -> None:
+    course = Course(Parrots(), pace=RATE)
+    course.hear(FRAME, 1.0, "me")
+    end = 1.0 + bits(FRAME) / RATE
+    assert course.next() == pytest.approx(end)
+    assert told(course, end - 1e-6) == []

@@ -225,3 +225,31 @@ def test_the_address_tells_a_rate_that_is_not_the_usual_one() -> None:
         assert sim.url == "feetech:sim:arm,baud=115200"
         sim[3].memory["baud_rate"] = 0  # the address is that of the bus as it was made
         assert sim.url == "feetech:sim:arm,baud=115200"
+
+
+def test_simulations_that_wait_for_the_same_moments_have_one_clock() -> None:
+    with simulation() as one, simulation() as other:
+        link = one.link()
+        one.wait(2.0)
+        other.wait(2.0)
+        assert (one.now, other.now, link.now()) == (2.0, 2.0, 2.0)
+        assert asked(other.link()) == [PONG_1]
+        other.wait(1.0)
+        assert other.now >= 2.0
+
+
+def test_what_was_sent_happens_while_one_waits() -> None:
+    with simulation() as sim:
+        link = sim.link()
+        link.write(PING_1)
+        sim.wait(1.0)
+        assert link.read(sim.now) == [PONG_1]
+
+
+def test_a_real_clock_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    monkeypatch.setattr("motorbus.simulation.named.time.sleep", slept.append)
+    with simulation(clock="real") as sim:
+        sim.wait(sim.now - 1.0)
+        sim.wait(sim.now + 5.0)
+    assert slept == [pytest.approx(5.0, abs=0.5)]

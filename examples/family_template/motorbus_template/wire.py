@@ -120,6 +120,8 @@ def alarms(status: int) -> tuple[str, ...]:
 class FrameReceiver:
     """Answers, reports, and what is neither. One frame is one event, so nothing is ever held back."""
 
+    held = 0
+
     def feed(self, data: Data) -> list[Event]:
         """Take one frame; give what it is. Never raises."""
         if not isinstance(data, CanFrame):

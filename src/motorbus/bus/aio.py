@@ -13,12 +13,12 @@ from typing import Self, TypeVar
 
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
+from motorbus.bus.glide import glide, let_go
 from motorbus.bus.run import Notify, Run
 from motorbus.bus.watch import Watch
-from motorbus.core.operation import Runnable
+from motorbus.core.operation import UNLIKE, Exchange, Runnable
 
 T = TypeVar("T")
-NAP = 0.05  # s; a waiting task looks at its own tickets at least this often
 
 
 class AsyncBus(BusFace):
@@ -30,6 +30,8 @@ class AsyncBus(BusFace):
 
     async def run(self, operation: Runnable[T], report: Notify | None = None) -> T:
         """Carry out an operation as `Bus.run` does. A cancelled task first cleans up, then raises CancelledError."""
+        if isinstance(operation, Exchange) and (value := await glide(self, operation)) is not UNLIKE:
+            return value
         news, loop = asyncio.Event(), asyncio.get_running_loop()
 
         def wake() -> None:
@@ -41,6 +43,7 @@ class AsyncBus(BusFace):
         while True:
             try:
                 if caught is not None:
+                    let_go(self.turns.lock)
                     run.interrupt(caught)
                 while not run.advance():
                     await self._turn(news)
@@ -59,12 +62,7 @@ class AsyncBus(BusFace):
             crank(self.link, self.turns, inf)
             await asyncio.sleep(0)
             return
-        self.watch.start(asyncio.get_running_loop())
-        self.watch.crank()
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(NAP):
-                await news.wait()
-        news.clear()
+        await self.watch.turn(news)
 
     async def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""

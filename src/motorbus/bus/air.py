@@ -13,7 +13,7 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
-from motorbus.bus.pace import Pace, byte_time, least_time
+from motorbus.bus.pace import Pace, byte_time, least_time, patience
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket, all_taken
 from motorbus.bus.trace import Feed, TraceRecord
@@ -31,14 +31,8 @@ from motorbus.core.operation import (
     Notice,
     Rank,
     Reply,
-    Timeout,
 )
 
-MARGIN = {  # s; a busy host may run this late without a reply counting as missing
-    Timeout.SCAN: 0.002,  # silence is the usual answer here, and a second pass follows
-    Timeout.REPLY: 0.02,
-    Timeout.STORE: 0.02,
-}
 SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 ECHO_SETTLE = 3.0  # byte times after a reply that may be the beginning of an echo, for the rest of it
 
@@ -54,17 +48,21 @@ class Air:
         self.pace = pace
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notice] = Feed()
-        self.statistics = Statistics()
+        self.statistics = Statistics(self.made_good)
         self.trust = Trust(family)
         self.echo = Echo()
         self.receiver = family.receiver()
         self.known = Known(family, rate)
         self.settled = 0
-        self._flying: dict[int, Flight] = {}
+        self.flying: dict[int, Flight] = {}
         self.leaving: list[
             Flight
         ] = []  # handed out and not known to be written, of those that nobody answers
-        self._free_at = 0.0
+        self.free_at = 0.0
+
+    def made_good(self) -> None:
+        """Whatever was put off is done now."""
+        raise AssertionError("turns knows what was put off")
 
     def _failed(self, flight: Flight, kind: str, now: float) -> None:
         raise AssertionError("turns decides whether there is another try")
@@ -93,19 +91,18 @@ class Air:
                 flight.spoiled == "echo" or flight.echo_checked
             ) and self.echo.present is False
             flight.reset()
-        start, air = max(now, self._free_at), self.family.air_time(exchange, self.rate)
+        start, air = max(now, self.free_at), self.family.air_time(exchange, self.rate)
         flight.sent_at, flight.left = now, True
         awaited = exchange.replies != ()
         if awaited:
             self.trust.ask(exchange, now)
-            flight.deadline = start + air + self.family.turnaround(exchange) + self.latency
-            flight.deadline += MARGIN[Timeout.SCAN if flight.rank is Rank.STOP else exchange.timeout]
+            flight.deadline = start + air + patience(exchange, self.family, self.latency)
         if self.window > 1:
             self._share_wire(flight, air)
         if awaited:
-            self._flying[exchange.lane] = flight
+            self.flying[exchange.lane] = flight
         else:
-            self._free_at = start + air
+            self.free_at = start + air
         if exchange.effect or exchange.goals:
             self.known.order(exchange, self.rate)
         if isinstance(exchange.request, bytes):
@@ -126,12 +123,12 @@ class Air:
     def _share_wire(self, flight: Flight, air: float) -> None:
         """Lanes share one wire: whichever goes first, each may have to wait for all the others, once."""
         flight.air = air
-        for other in self._flying.values():
+        for other in self.flying.values():
             flight.deadline += other.air
             if other.beside < self.window - 1 and not other.abandoned:
                 other.deadline += air
                 other.beside += 1
-        flight.beside = len(self._flying)
+        flight.beside = len(self.flying)
 
     def expect_echo(self, exchange: Exchange[Any]) -> None:
         """This exchange, sent when the bus is opened, shows whether the adapter echoes."""
@@ -153,7 +150,7 @@ class Air:
                     self._echo_broke(now)
             if data:
                 events = self.receiver.feed(data)
-                if not all_taken(self._flying, events, self.echo.recent):
+                if not all_taken(self.flying, events, self.echo.recent):
                     for event in events:
                         self._take(event, now)
             if isinstance(data, bytes):
@@ -168,7 +165,7 @@ class Air:
 
         One that came whole needs none, unless it may be the beginning of an echo, of which the rest may follow.
         """
-        for flight in self._flying.values():
+        for flight in self.flying.values():
             last = flight.last
             if flight.settling or not flight.complete or last is None:
                 continue
@@ -190,7 +187,7 @@ class Air:
             self._take_noise(event, now)
 
     def _take_reply(self, reply: Reply, now: float) -> None:
-        flight = self._flying.get(reply.lane)
+        flight = self.flying.get(reply.lane)
         if flight is None:
             if not self._late(reply) and not self._everyones(reply):
                 self._nobodys(reply, now)
@@ -227,7 +224,7 @@ class Air:
 
     def _everyones(self, reply: Reply) -> bool:
         """Everybody was asked, and this is what one of them says."""
-        flight = self._flying.get(EVERY_LANE)
+        flight = self.flying.get(EVERY_LANE)
         return flight is not None and flight.take(reply)
 
     def _nobodys(self, reply: Reply, now: float) -> None:
@@ -238,7 +235,7 @@ class Air:
         self.statistics.other[noise.fault] += 1
         if noise.fault == "foreign":
             return
-        for lane, flight in self._flying.items():
+        for lane, flight in self.flying.items():
             if noise.lane in (None, lane):
                 flight.hear_noise(noise.fault, noise.data)
         self.trust.doubt(now, self._quiet, noise.lane)
@@ -246,17 +243,17 @@ class Air:
     def _echo_broke(self, now: float) -> None:
         self.echo.broken = False
         self.statistics.other["echo"] += 1
-        for flight in self._flying.values():
+        for flight in self.flying.values():
             flight.spoiled = "echo"
         self.trust.doubt(now, self._quiet)
 
     def _echo_returned(self) -> None:
         """What was sent is back where no echo was known: who waits has heard himself, unless that was just tested."""
-        if any(flight.echo_checked or flight.spoiled == "echo" for flight in self._flying.values()):
+        if any(flight.echo_checked or flight.spoiled == "echo" for flight in self.flying.values()):
             return
         self.echo.doubted()
         self.statistics.other["echo"] += 1
-        for flight in self._flying.values():
+        for flight in self.flying.values():
             flight.spoiled = "echo"
 
     @property
@@ -266,7 +263,7 @@ class Air:
     # -- what is settled ------------------------------------------------------------------------------------
 
     def _land(self, now: float) -> None:
-        for lane, flight in list(self._flying.items()):
+        for lane, flight in list(self.flying.items()):
             if not flight.complete or flight.exchange.replies is ANY:
                 continue
             if flight.settling and not flight.surplus and now < flight.deadline:
@@ -308,7 +305,7 @@ class Air:
 
     def expire(self, now: float) -> None:
         """Settle everything whose moment has passed."""
-        for lane, flight in list(self._flying.items()):
+        for lane, flight in list(self.flying.items()):
             if now >= flight.deadline:
                 self._overdue(lane, flight, now)
 
@@ -318,12 +315,12 @@ class Air:
             self._echo_broke(now)
         for event in (self.receiver.feed(held) if held else []) + self.receiver.flush():
             self._take(event, now)
-        if self._flying.get(lane) is not flight:
+        if self.flying.get(lane) is not flight:
             return
         if flight.put_aside is not None and not flight.complete and self.pace is not None:
             self._take_back(flight, self.pace)
         if flight.done and not flight.abandoned:  # an interrupt fell between settling it and forgetting it
-            del self._flying[lane]
+            del self.flying[lane]
         elif flight.exchange.replies is ANY:
             self._accepted(lane, flight, now)
         elif flight.complete:
@@ -344,8 +341,8 @@ class Air:
             self._settle(flight, answer)
         self._believe(flight, answer, now)
         self._echo_settled(flight)
-        if self._flying.get(lane) is flight:
-            del self._flying[lane]
+        if self.flying.get(lane) is flight:
+            del self.flying[lane]
         self._landed()
 
     def _echo_settled(self, flight: Flight) -> None:
@@ -394,6 +391,6 @@ class Air:
         if kind == "silence":
             self._echo_settled(flight)
         self._failed(flight, kind, now)
-        if self._flying.get(lane) is flight:
-            del self._flying[lane]
+        if self.flying.get(lane) is flight:
+            del self.flying[lane]
         self._landed()

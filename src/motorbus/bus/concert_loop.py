@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
-from motorbus.bus.aio import NAP, AsyncBus
+from motorbus.bus.aio import AsyncBus
 from motorbus.bus.crank import crank
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
+from motorbus.bus.watch import NAP
 from motorbus.core.operation import Runnable
 
 

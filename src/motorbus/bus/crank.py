@@ -129,7 +129,7 @@ def launch(link: Link, turns: Turns, *flights: Flight) -> bool:
     try:
         with turns.lock:
             now = link.now()
-            if turns.idle and turns.gone is None and not turns.leaving:
+            if turns.idle and turns.gone is None and not (turns.leaving or turns.chores):
                 drain(link, turns, now)
                 requests: list[Any] = []
                 for flight in flights:

@@ -45,6 +45,15 @@ class Echo:
     def _last(self) -> bytes:
         return self.recent[-1] if self.recent else b""
 
+    def left(self) -> None:
+        """What was sent last has gone the straight way, and nothing has come since."""
+        self._since = b""
+
+    @property
+    def is_out(self) -> bool:
+        """It is known that nothing comes back, and nothing is held back to find out."""
+        return self.present is False and not (self._expected or self._matched)
+
     @property
     def disproved(self) -> bool:
         """Since something was sent last bytes came that it does not begin with: no echo came first."""

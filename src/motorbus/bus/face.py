@@ -65,6 +65,8 @@ class BusFace:
             admit(exchange)
             if exchange.effect in GATED:
                 self.stopper.start()
+                self.turns.admit = admit  # it is ready now, and stays so
+                self.turns.passes = getattr(admit, "passes", None)
 
         return admitted
 

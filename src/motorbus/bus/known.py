@@ -28,6 +28,8 @@ ENDLESS = (
 class Known(dict[int, Answer | None]):
     """Nodes with their last answer that told a position.
 
+    Who looks has the lock of the turns, so that what was put off is there; see `course.TurnsLock`.
+
     `seen` has the last exchange that told where a node is, with its answer, also when it was ordered to move since.
     `rate` is the bit rate at which one was last heard. `frames` stop everybody known, without a position: they are
     made when a node becomes known, for the case that a stop cannot make new ones. `stopping` counts the stops that
@@ -58,6 +60,11 @@ class Known(dict[int, Answer | None]):
         self.seen.update(dict.fromkeys(nodes, (exchange, answer)))
         self.hear_all(nodes, answer, rate)
 
+    def saw(self, nodes: Sequence[int], exchange: Exchange[Any], answer: Answer) -> None:
+        """These nodes, which are known, have told their positions."""
+        self.seen.update(dict.fromkeys(nodes, (exchange, answer)))
+        self.update(dict.fromkeys(nodes, answer))
+
     def hear(self, node: int, position: Answer | None, rate: int) -> None:
         """This node has answered, or has been ordered to move (None)."""
         self.hear_all((node,), position, rate)
@@ -65,6 +72,8 @@ class Known(dict[int, Answer | None]):
     def hear_all(self, nodes: Iterable[int], position: Answer | None, rate: int) -> None:
         """The same of several, which one answer told of."""
         self.rate = rate
+        if position is None and self.keys() >= set(nodes):
+            return
         for node in nodes:
             if node not in self:
                 self[node] = position
@@ -74,7 +83,7 @@ class Known(dict[int, Answer | None]):
 
     def order(self, exchange: Exchange[Any], rate: int) -> None:
         """An exchange leaves that may set something moving: whom it orders is known, and is not where it was."""
-        ordered = [goal.node for goal in exchange.goals]
+        ordered = exchange.ordered
         if ordered and exchange.rank is not Rank.STOP:
             self.hear_all(ordered, None, rate)
         if exchange.effect not in MOVING:
@@ -84,11 +93,14 @@ class Known(dict[int, Answer | None]):
             self.stopping += 1
             return
         nodes = named(exchange) if exchange.replies else ordered
-        for node in nodes or list(self):  # one that names nobody may move everybody
-            self._said.pop(node, None)
-            self._given.pop(node, None)
-            if node in self:
-                self[node] = None
+        self.moves(nodes or list(self))  # one that names nobody may move everybody
+
+    def moves(self, nodes: Iterable[int]) -> None:
+        """These may be anywhere from now on, and what they said last was not about this order."""
+        for said in (self._said, self._given):
+            for node in nodes if said else ():
+                said.pop(node, None)
+        self.update(dict.fromkeys(self.keys() & nodes))
 
     def forget(self) -> None:
         """Whoever is there may have started anew: where they are and what they said last counts no more."""

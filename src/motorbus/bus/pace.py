@@ -13,11 +13,17 @@ from typing import Any
 
 from motorbus.core.can_bits import bits, least
 from motorbus.core.family import Family
-from motorbus.core.operation import ANY, CanFrame, Exchange
+from motorbus.core.operation import ANY, CanFrame, Exchange, Rank, Timeout
 
 SHOWN = 32  # replies in a row, none of them too early
 MISSED = 2  # replies in a row that were put aside and had none behind them
 EARLY = 0.9  # of the least time; clocks differ, and so do bit rates by their tolerance
+MARGIN = {  # s; a busy host may run this late without a reply counting as missing
+    Timeout.SCAN: 0.002,  # silence is the usual answer here, and a second pass follows
+    Timeout.REPLY: 0.02,
+    Timeout.STORE: 0.02,
+}
+DIRECT = 0.001  # s; a link of less latency has no adapter that holds bytes back
 
 
 class Pace:
@@ -73,6 +79,21 @@ def least_time(exchange: Exchange[Any], family: Family, rate: int, without: Coll
     if not isinstance(request, CanFrame) or dues is ANY:
         return family.air_time(exchange, rate)
     return (bits(request) + sum(least(due.length, request.extended) for due in dues)) / rate
+
+
+def patience(exchange: Exchange[Any], family: Family, latency: float) -> float:
+    """s from when all frames can have passed until what has not come counts as missing.
+
+    Where silence is the usual answer a family may wait for what adapters hold back. On a line without one a device gets
+    as long as for any other answer, and the host no margin: one that is late looks once more before it calls anybody
+    silent.
+    """
+    thinks = family.turnaround(exchange)
+    if exchange.timeout is Timeout.SCAN and latency < DIRECT:
+        usual = family.turnaround(Exchange(exchange.request, exchange.replies))
+        if usual < thinks:
+            return usual + latency
+    return thinks + latency + MARGIN[Timeout.SCAN if exchange.rank is Rank.STOP else exchange.timeout]
 
 
 def byte_time(exchange: Exchange[Any], family: Family, rate: int) -> float:

@@ -12,9 +12,10 @@ from typing import Any, Self, TypeVar
 from motorbus.bus.face import BusFace
 from motorbus.bus.look import questions
 from motorbus.bus.relay import Relay
-from motorbus.bus.run import Notify, Run, taken
-from motorbus.bus.ticket import Flight
-from motorbus.core.operation import Exchange, Runnable
+from motorbus.bus.run import Notify, Run
+from motorbus.bus.straight import cast, fly, usual
+from motorbus.bus.volley import volley
+from motorbus.core.operation import UNLIKE, Exchange, Runnable
 
 T = TypeVar("T")
 
@@ -31,8 +32,12 @@ class Bus(BusFace):
 
         Raises whatever the operation raises; KeyboardInterrupt after the operation has cleaned up.
         """
-        if isinstance(operation, Exchange) and not (operation.effect and questions(self.turns, operation)):
-            return self._exchange(operation)
+        if isinstance(operation, Exchange):
+            value = fly(self, operation) if operation.whole is not None else cast(self, operation)
+            if value is not UNLIKE:
+                return value
+            if not (operation.effect and questions(self.turns, operation)):
+                return usual(self, operation)
         relay = self.relay
         run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=relay.wake)
         caught: BaseException | None = None
@@ -48,21 +53,13 @@ class Bus(BusFace):
                 caught = interruption
         return run.result()
 
-    def _exchange(self, exchange: Exchange[T]) -> T:
-        """The short path: one exchange needs no run."""
-        flight, relay = Flight(exchange), self.relay
-        try:
-            relay.start(flight)
-            while not flight.done:
-                relay.turn()
-        except BaseException:
-            relay.recover()
-            with self.turns.lock:
-                self.turns.abandon(flight)
-            raise
-        answer: Any = flight.result()
-        value: T = taken(self.turns, exchange, answer)
-        return value
+    def volley(self, *exchanges: Exchange[Any]) -> list[Any]:
+        """Carry out several exchanges in their order, as a control loop does in every cycle; their values.
+
+        What nobody answers leaves in one write with what follows it, where the bus is idle: goals out, positions in.
+        Raises the first error as `run` does; what comes behind has not been sent then.
+        """
+        return volley(self, exchanges)
 
     def close(self) -> None:
         """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""

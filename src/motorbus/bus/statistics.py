@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 from motorbus.core.operation import ANY, Any_, Due
 
@@ -25,12 +26,33 @@ class NodeStatistics:
     latency: list[int] = field(default_factory=lambda: [0] * BUCKETS)
 
 
-@dataclass(slots=True)
 class Statistics:
-    """The ledgers of all nodes, and what belongs to none: noise, foreign frames, notices, echoes."""
+    """The ledgers of all nodes, and what belongs to none: noise, foreign frames, notices, echoes.
 
-    nodes: dict[int, NodeStatistics] = field(default_factory=dict)
-    other: Counter[str] = field(default_factory=Counter)
+    `settle` is called before anybody looks at `nodes`: it counts what was put off.
+    """
+
+    def __init__(self, settle: Callable[[], None] | None = None) -> None:
+        self.other: Counter[str] = Counter()
+        self._nodes: dict[int, NodeStatistics] = {}
+        self._settle = settle
+
+    @property
+    def nodes(self) -> dict[int, NodeStatistics]:
+        """The ledgers by node."""
+        if self._settle is not None:
+            self._settle()
+        return self._nodes
+
+    def add(self, nodes: Sequence[int], times: Sequence[int]) -> None:
+        """Several exchanges with all of these, each answered; `times` are they by their buckets."""
+        count, hit = sum(times), [(bucket, number) for bucket, number in enumerate(times) if number]
+        for node in nodes:
+            ledger = self.of(node)
+            ledger.sent += count
+            ledger.ok += count
+            for bucket, number in hit:
+                ledger.latency[bucket] += number
 
     def asked(self, dues: tuple[Due, ...] | Any_) -> None:
         """A request has left that calls for these replies; one that calls for none, or for any, belongs to no node."""
@@ -42,8 +64,8 @@ class Statistics:
 
     def answered(self, dues: Iterable[Due], seconds: float) -> None:
         """A good reply of each of these, all of them after this time."""
-        bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
-        nodes = self.nodes
+        bucket = bucket_of(seconds)[0]
+        nodes = self._nodes
         for due in dues:
             ledger = nodes[due.node]
             ledger.ok += 1
@@ -51,7 +73,14 @@ class Statistics:
 
     def of(self, node: int) -> NodeStatistics:
         """This node's ledger, a new one at its first exchange."""
-        ledger = self.nodes.get(node)
+        ledger = self._nodes.get(node)
         if ledger is None:
-            ledger = self.nodes[node] = NodeStatistics()
+            ledger = self._nodes[node] = NodeStatistics()
         return ledger
+
+
+def bucket_of(seconds: float) -> tuple[int, float, float]:
+    """The bucket of an answer that took so long, and from which time (s) to which it reaches."""
+    bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
+    low = 1e-6 * 2 ** (bucket - 1) if bucket else 0.0
+    return bucket, low, inf if bucket == BUCKETS - 1 else 1e-6 * 2**bucket

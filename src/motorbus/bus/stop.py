@@ -23,8 +23,8 @@ from threading import Event, Lock, Thread
 from typing import NamedTuple
 
 from motorbus.bus import obedience
-from motorbus.bus.air import MARGIN
 from motorbus.bus.crank import crank, retune
+from motorbus.bus.pace import MARGIN
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.family import Stop
@@ -85,8 +85,10 @@ class Stopper:
 
         Raises LinkError where the system gives no more threads: nothing is sent then that might have to be stopped.
         """
+        if self._thread is not None or self.link.virtual:
+            return
         with self._starting:
-            if self._thread is None and not self.link.virtual and not self._closed:
+            if self._thread is None and not self._closed:
                 self._pair = self._pair or socket.socketpair()
                 thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
                 try:

@@ -34,6 +34,7 @@ class NodeTrust:
         "length",
         "outstanding",
         "probe_at",
+        "probes",
         "quiet_until",
         "run",
         "silent",
@@ -52,6 +53,7 @@ class NodeTrust:
         self.probe_at = 0.0
         self.silent = 0
         self.attempt = 0
+        self.probes: list[Exchange[bool]] = []
         self.outstanding: dict[tuple[int, Key, int], float] = {}
 
 
@@ -141,7 +143,7 @@ class Trust:
                 del trust.outstanding[kind]
         oldest: tuple[float, Exchange[bool]] | None = None
         for _ in range(ATTEMPTS):
-            exchange = self.family.probe(node, trust.attempt)
+            exchange = self._made(node, trust)
             trust.attempt += 1
             due = exchange.replies[0]  # type: ignore[index]  # a probe has exactly one reply
             asked_at = trust.outstanding.get((exchange.lane, due.key, due.length))
@@ -151,6 +153,13 @@ class Trust:
                 oldest = asked_at, exchange
         assert oldest is not None
         return oldest[1]
+
+    def _made(self, node: int, trust: NodeTrust) -> Exchange[bool]:
+        """The probe of this attempt. They are kept, for of a node that answers nothing many are looked at each time."""
+        number = trust.attempt % ATTEMPTS
+        if number == len(trust.probes):
+            trust.probes.append(self.family.probe(node, number))
+        return trust.probes[number]
 
     def doubt_everyone(self, now: float, quiet: float) -> None:
         """The line to all of them was cut, and is there again: what is outstanding may still come, from now on."""

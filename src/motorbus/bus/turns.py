@@ -14,13 +14,13 @@ import contextlib
 from collections import deque
 from collections.abc import Callable, Sequence
 from math import inf
-from threading import RLock
 from typing import Any
 
 from motorbus.bus import verdict
 from motorbus.bus.absence import Absence
 from motorbus.bus.air import Air
 from motorbus.bus.claims import Claims
+from motorbus.bus.course import Straight, TurnsLock
 from motorbus.bus.known import rest_of, withdraws
 from motorbus.bus.pace import Pace
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
@@ -36,7 +36,7 @@ Admit = Callable[[Exchange[Any]], None]
 Look = Callable[[Exchange[Any]], "Sequence[Runnable[Any]]"]  # what must be asked before this may leave
 
 
-class Turns(Absence, Air):
+class Turns(Absence, Straight, Air):
     """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link.
 
     `paced` says whether it takes bit time; None: it will show. While the link is `listening` every exchange is
@@ -58,7 +58,8 @@ class Turns(Absence, Air):
         self.listen_only = self.listening = listen_only
         self.admit = admit
         self.trouble: Callable[[], str] = str  # what the link has to say of failures since it was last asked
-        self.lock = RLock()
+        self.lock = TurnsLock(self.settle)
+        self.pending, self.counting, self.groups, self.aims = [], [], [], {}
         self.look: Look | None = None
         self.chores: list[Callable[[], None]] = []  # what else whoever pumps does; see `background`
         self.latched = self.stopping = False
@@ -104,7 +105,7 @@ class Turns(Absence, Air):
 
     def _withdraw(self, stop: Exchange[Any]) -> None:
         """Whatever would move whom this stop is for ends here: nothing of it may be sent, or sent again, after it."""
-        for ticket in [*self._flying.values(), *(one for queue in self._queues for one in queue)]:
+        for ticket in [*self.flying.values(), *(one for queue in self._queues for one in queue)]:
             if isinstance(ticket, Flight) and withdraws(stop, ticket.exchange):
                 self._settle(ticket, error=verdict.withdrawn())
                 self.abandon(ticket)
@@ -119,7 +120,7 @@ class Turns(Absence, Air):
             self._courtesy = sum(map(len, self._queues))
 
     def _grant_claim(self) -> None:
-        self._claims.grant(not (self._flying or (self._courtesy and self.waiting)), self._settle)
+        self._claims.grant(not (self.flying or (self._courtesy and self.waiting)), self._settle)
 
     @property
     def waiting(self) -> bool:
@@ -129,11 +130,7 @@ class Turns(Absence, Air):
     @property
     def idle(self) -> bool:
         """Nothing waits, nothing flies, nobody holds the bus."""
-        return not (self._flying or self._claims or self.latched or any(self._queues))
-
-    @property
-    def _takes_time(self) -> bool:
-        return self.pace is not None and self.pace.certain
+        return not (self.flying or self._claims or self.latched or any(self._queues))
 
     # -- what goes out --------------------------------------------------------------------------------------
 
@@ -142,12 +139,12 @@ class Turns(Absence, Air):
         self._look_at = inf
         while self.leaving:  # an interrupt fell between handing it out and writing it
             self._settle(self.leaving.pop(), error=verdict.cancelled())
-        if self._claims.waiting and not self._flying:  # who was to hand it on may have been interrupted
+        if self._claims.waiting and not self.flying:  # who was to hand it on may have been interrupted
             self._grant_claim()
-        if len(self._flying) >= self.window:
+        if len(self.flying) >= self.window:
             return None
-        if now < self._free_at and self._takes_time:
-            self._look_at = self._free_at
+        if now < self.free_at and self.takes_time:
+            self._look_at = self.free_at
             return None
         for queue in self._queues:
             for ticket in list(queue):
@@ -161,7 +158,7 @@ class Turns(Absence, Air):
     def short(self, flight: Flight, now: float) -> Data | None:
         """The short path: launch at once when the bus is idle and the node is clean; None means queue it."""
         exchange = flight.exchange
-        if not self.idle or self.listening or (now < self._free_at and self._takes_time):
+        if not self.idle or self.listening or (now < self.free_at and self.takes_time):
             return None
         if exchange.replies is not ANY:
             nodes = self.trust.nodes
@@ -170,7 +167,7 @@ class Turns(Absence, Air):
                 if trust is not None and trust.tainted:
                     return None
         try:
-            self._admitted(exchange)
+            self.admitted(exchange)
         except MotorbusError as refusal:
             self._settle(flight, error=refusal)
             return None
@@ -196,7 +193,7 @@ class Turns(Absence, Air):
         if self._must_wait(ticket, now):
             return None
         try:
-            self._admitted(ticket.exchange)
+            self.admitted(ticket.exchange)
         except MotorbusError as refusal:
             queue.remove(ticket)
             self._settle(ticket, error=refusal)
@@ -207,7 +204,7 @@ class Turns(Absence, Air):
         return request
 
     def _may_go(self, ticket: Flight | Retune) -> bool:
-        busy = bool(self._flying) if isinstance(ticket, Retune) else ticket.exchange.lane in self._flying
+        busy = bool(self.flying) if isinstance(ticket, Retune) else ticket.exchange.lane in self.flying
         return self._has_turn(ticket) and not busy
 
     def _awaits_silence(self, ticket: Flight | Retune) -> bool:
@@ -240,9 +237,9 @@ class Turns(Absence, Air):
             self.receiver = self.family.receiver()
         self._settle(ticket, before, error)
 
-    def _admitted(self, exchange: Exchange[Any]) -> None:
-        plain = exchange.later is None or self.admit is None  # a gate must know what waits from now on
-        if (exchange.effect not in GATED and plain) or exchange.rank is Rank.STOP:
+    def admitted(self, exchange: Exchange[Any]) -> None:
+        plain = exchange.effect not in GATED and (exchange.later is None or self.admit is None)
+        if plain or exchange.rank is Rank.STOP:  # a gate must know what waits from now on
             return
         if self.admit is None:
             raise verdict.ungated(exchange)
@@ -269,7 +266,7 @@ class Turns(Absence, Air):
                 unbelieved += (node,)
             elif now >= trust.quiet_until:
                 probe = Flight(self.trust.probe(node, now), flight.owner, parent=flight)
-                if probe.exchange.lane not in self._flying:
+                if probe.exchange.lane not in self.flying:
                     return probe
         flight.unbelieved = unbelieved
         return None
@@ -284,7 +281,7 @@ class Turns(Absence, Air):
 
     def expire(self, now: float) -> None:
         """Settle everything whose moment has passed."""
-        if self._flying:
+        if self.flying:
             super().expire(now)
         for timer in list(self._timers) if self._timers else ():
             if now >= timer.deadline:
@@ -346,7 +343,7 @@ class Turns(Absence, Air):
     def due(self) -> float:
         """The next moment something must be settled or may be sent; inf when nothing is awaited."""
         moments = [self._look_at]
-        moments += [flight.deadline for flight in self._flying.values()]
+        moments += [flight.deadline for flight in self.flying.values()]
         moments += [timer.deadline for timer in self._timers]
         return min(moments)
 
@@ -360,7 +357,7 @@ class Turns(Absence, Air):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:
                     queue.remove(ticket)
                     self._settle(ticket, error=verdict.latched())
-        for flight in self._flying.values():
+        for flight in self.flying.values():
             rest = rest_of(flight, self.family, self.rate, now)
             flight.deadline = min(flight.deadline, now + rest + self.latency)
             flight.abandoned = True
@@ -381,11 +378,11 @@ class Turns(Absence, Air):
     def lost(self, error: LinkError) -> None:
         """The link is gone: everything awaited fails with this error; moments awaited since then do not."""
         was_gone = self._was_gone(error)
-        for lane, flight in self._flying.items():
+        for lane, flight in self.flying.items():
             for due in () if flight.exchange.replies is ANY else flight.exchange.replies:
                 self.statistics.of(due.node).errors["lost"] += 1
                 self.trust.missed(lane, due, flight.sent_at, self._quiet)
-        waiting: list[Ticket] = [*self._flying.values(), *self._claims.waiting]
+        waiting: list[Ticket] = [*self.flying.values(), *self._claims.waiting]
         if not was_gone:
             waiting += self._timers
             self._timers.clear()
@@ -394,7 +391,7 @@ class Turns(Absence, Air):
             queue.clear()
         waiting += self.leaving
         self.leaving.clear()
-        self._flying.clear()
+        self.flying.clear()
         self._claims.waiting.clear()
         for ticket in waiting:
             self._settle(ticket, *self._fate(ticket, was_gone, error))

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.bus.look import questions
 from motorbus.bus.run import taken
+from motorbus.bus.straight import fly
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import Exchange
+from motorbus.core.operation import UNLIKE, Exchange
+from motorbus.errors import LinkError
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
@@ -30,6 +32,8 @@ def volley(
     behind has not been sent then.
     """
     told: list[Any] = []
+    if together and len(exchanges) == 2 and _flown(bus, exchanges, forgiven, told):
+        return told
     begin = 0
     for end, exchange in enumerate(exchanges, 1):
         if exchange.replies == () and end < len(exchanges) and isinstance(exchange.request, bytes):
@@ -45,6 +49,29 @@ def volley(
             except forgiven as error:
                 told.append(error)
     return told
+
+
+def _flown(bus: Bus, burst: Exchanges, forgiven: tuple[type[Exception], ...], told: list[Any]) -> bool:
+    """The straight way of an order and a question: are both over? What came of them is told then."""
+    order, question = burst
+    if (
+        question.whole is None
+        or not order.sure
+        or order.replies != ()
+        or not isinstance(order.request, bytes)
+    ):
+        return False
+    value: Any
+    try:
+        value = fly(bus, question, order)
+    except LinkError:
+        raise
+    except forgiven as error:
+        value = error
+    if value is UNLIKE:
+        return False
+    told += (None, value)  # nothing comes of an order that is sure, but that it has left
+    return True
 
 
 def _sent(bus: Bus, burst: Exchanges) -> list[Flight]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
@@ -18,8 +17,10 @@ from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.cli.target import said
 from motorbus.core.family import Explanation
+from motorbus.core.operation import REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.link import can_log
+from motorbus.recorder.files import from_hex, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -33,10 +34,13 @@ app = App(
     help_epilogue="""Bytes are hexadecimal, with or without spaces, commas, colons or 0x; without
 any, they are read from stdin. A CAN frame is written as candump writes it:
 IDENTIFIER#DATA, 3 digits for 11 bits, 8 for 29, #R for a remote frame. The
-text of candump on stdin is explained as it comes, and --file reads its logs,
-and ASC, BLF and TRC files (with python-can); both give JSON Lines with --json.
-Times that count from the beginning of a recording are shown with a +. Ends
-with exit code 1 if any frame is bad or any byte belongs to none.
+text of candump on stdin is explained as it comes. --file reads a recording:
+of a serial line .bin and .raw (bytes), .hex and .txt (hexadecimal); of a CAN
+bus logs of candump, and ASC, BLF and TRC files (with python-can). Recordings
+give JSON Lines with --json, each with its start, in bytes or frames. Times
+that count from the beginning of a recording are shown with a +. --summary
+counts instead of explaining, quickly where numpy is installed. Ends with exit
+code 1 if any frame is bad or any byte belongs to none.
 
 Examples:
 
@@ -44,6 +48,8 @@ Examples:
     motorbus decode --family feetech ffff010402 3802be ffff0104001805dd
     motorbus decode --family feetech --json < capture.txt
     motorbus decode --family kst 625#2203600084030000 5A5#6003600000000000
+    motorbus decode --family feetech --file line.bin
+    motorbus decode --family feetech --summary --direction rx --file in.bin
     motorbus decode --family kst --file trace.asc
     candump -L can0 | motorbus decode --family kst --json""",
 )
@@ -54,6 +60,8 @@ def decode(
     *data: Annotated[str, Parameter(name="HEX")],
     family: str,
     file: Path | None = None,
+    summary: Annotated[bool, Parameter(negative="")] = False,
+    direction: Literal["rx", "tx"] | None = None,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -66,21 +74,61 @@ def decode(
     family
         Whose protocol it is.
     file
-        A recording of CAN frames, by its ending: .log, .asc, .blf, .trc
+        A recording, by its ending: .bin, .raw, .hex, .txt of a line; .log, .asc, .blf, .trc of a CAN bus
+    summary
+        Count the packets of each kind, node and code, and the noise, instead of explaining each.
+    direction
+        All bytes went this way, rx from the devices or tx to them; with --summary.
     options
         How such a bus is spoken to, as --profile xqpower.
     """
     found = _spoken(families.load(family), options)
+    if file is not None and data:
+        raise RequestError("bytes and --file: one of them", advice="decode them one after the other")
+    if direction is not None and not summary:
+        raise RequestError("--direction goes with --summary", advice="without it each frame tells its own")
+    if summary:
+        return _summary(data, file, found, direction or "", output)
     if file is not None:
-        if data:
-            raise RequestError("bytes and --file: one of them", advice="decode them one after the other")
-        return _stream(_on_can(found, _recorded(file)), found, output)
+        return _file(file, found, output)
     if data:
         return _bytes_or_frames(data, found, output)
     first = sys.stdin.readline() if found.link.kind == "frames" else ""
     if can_log.looks_like_can(first):
         return _stream(_on_can(found, can_log.read_lines(chain([first], sys.stdin))), found, output)
     return _document(found.explain(_bytes(first + sys.stdin.read())), found, output)
+
+
+def _file(file: Path, family: Family, output: Output) -> Exit:
+    if _is_serial(file, family):
+        return _told(((one, {}, None) for one in family.explain(_serial(file))), family, output)
+    return _stream(_on_can(family, _recorded(file)), family, output)
+
+
+def _is_serial(file: Path, family: Family) -> bool:
+    return family.link.kind == "bytes" and not can_log.is_log(file)
+
+
+def _serial(file: Path) -> bytes:
+    with usable(file, "read"):
+        return read_bytes(file)
+
+
+def _summary(data: Sequence[str], file: Path | None, family: Family, direction: str, output: Output) -> Exit:
+    from motorbus.cli.counted import summary
+
+    if file is not None and _is_serial(file, family):
+        return summary(family, _serial(file), direction, output)
+    lines = data or ([] if file is not None else sys.stdin.read().splitlines())
+    if family.link.kind == "bytes" and file is None:
+        return summary(family, _bytes(" ".join(lines)), direction, output)
+    logged = _recorded(file) if file is not None else can_log.read_lines(_words(lines))
+    return summary(family, [_classic(one) for one in _on_can(family, logged)], direction, output)
+
+
+def _classic(one: Logged) -> CanFrame:
+    """The frame; one that is no classic CAN frame is nobody's, as is any other that nobody understands."""
+    return one.frame if one.frame is not None else CanFrame(REMOTE_FLAG, b"")
 
 
 def _recorded(file: Path) -> Iterator[Logged]:
@@ -100,10 +148,15 @@ def _spoken(family: Family, options: Mapping[str, str]) -> Family:
 def _bytes_or_frames(texts: Sequence[str], family: Family, output: Output) -> Exit:
     if not can_log.looks_like_can(" ".join(texts)):
         return _document(family.explain(_bytes(" ".join(texts))), family, output)
-    lines = chain.from_iterable([text] if set("([") & set(text) else text.split() for text in texts)
+    lines = _words(texts)
     logged = [one for line in lines if (one := can_log.parse_line(line))]
     frames = [_explained(one, family) for one in _on_can(family, logged)]
     return _document(list(chain.from_iterable(frames)), family, output)
+
+
+def _words(texts: Iterable[str]) -> Iterator[str]:
+    """A line of candump as it is, else each frame by itself."""
+    return chain.from_iterable([text] if set("([") & set(text) else text.split() for text in texts)
 
 
 def _on_can(family: Family, logged: Iterable[Logged]) -> Iterable[Logged]:
@@ -121,13 +174,7 @@ def _explained(one: Logged, family: Family) -> list[Explanation]:
 
 
 def _bytes(text: str) -> bytes:
-    digits = re.sub(r"0[xX]|[\s,:;]", "", text)
-    try:
-        found = bytes.fromhex(digits)
-    except ValueError:
-        raise RequestError(
-            "these are not bytes in hexadecimal", sent=text.strip()[:60], expected="pairs of 0-9 A-F"
-        ) from None
+    found = from_hex(text)
     if not found:
         raise RequestError("there are no bytes to decode", advice="give them as arguments or on stdin")
     return found
@@ -143,17 +190,33 @@ def _document(explained: list[Explanation], family: Family, output: Output) -> E
 
 def _stream(logged: Iterable[Logged], family: Family, output: Output) -> Exit:
     """Each frame as soon as it is read, with the time and the direction that were noted with it."""
-    bad, empty = False, True
-    for recorded in logged:
-        empty = False
-        when = {"time": recorded.at, "relative": recorded.relative, "direction": recorded.direction or None}
-        for one in _explained(recorded, family):
-            bad = bad or bool(one.fault)
-            output.document("motorbus.decode.frame/1", {"family": family.name, **when, **_facts(one, family)})
-            _show(one, family, output, _when(recorded))
-    if empty:
+    return _told(
+        (
+            (one, {"time": recorded.at, "relative": recorded.relative, "direction": recorded.direction or None},
+             _when(recorded))
+            for recorded in logged
+            for one in _explained(recorded, family)
+        ),
+        family,
+        output,
+    )  # fmt: skip
+
+
+def _told(
+    explained: Iterable[tuple[Explanation, Mapping[str, object], str | None]], family: Family, output: Output
+) -> Exit:
+    """A recording, frame by frame, each with what was noted with it, as facts and in words."""
+    bad, start = False, 0
+    for one, noted, when in explained:
+        bad = bad or bool(one.fault)
+        facts = {"family": family.name, "start": start, **noted, **_facts(one, family)}
+        output.document("motorbus.decode.frame/1", facts)
+        _show(one, family, output, f"at byte {start}" if when is None else when)
+        start += 1 if family.link.kind == "frames" else len(one.data)
+    if not start:
         raise RequestError(
-            "there are no frames to decode", expected="the text of candump, or a log of CAN frames"
+            f"there are no {family.link.kind} to decode",
+            expected="the bytes of a serial line, the text of candump, or a log of CAN frames",
         )
     return Exit.FAILURE if bad else Exit.OK
 

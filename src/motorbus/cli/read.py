@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import App, Parameter
@@ -98,7 +97,7 @@ UNITS: Final = {
 
 def state_facts(state: State) -> dict[str, object]:
     """One sample as plain data; what the device does not tell is null."""
-    return {**asdict(state), "alarm": list(state.alarm), "quality": state.quality.value}
+    return {**state._asdict(), "alarm": list(state.alarm), "quality": state.quality.value}
 
 
 def sampled(one: Any) -> State | Told:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import gc
 import os
 import signal
 import time
@@ -179,6 +180,8 @@ def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[in
 
 def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> None:
     """Serve until told to stop, and say what the devices remark, if there is anything to say it on."""
+    gc.collect()
+    gc.freeze()  # hundreds of devices live as long as this; to look through them again and again makes replies late
     if output is None:
         mount.serve(stop)
         return

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
 from motorbus.core.assurance import Assurance
+from motorbus.core.capture import Captures
 from motorbus.core.entry import Table, Value
 from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Runnable
 
@@ -43,6 +44,7 @@ class LinkNeeds(NamedTuple):
     `both_ways` a device hears while it speaks: a stop waits for no reply
     `stops`     what an emergency stop may do to an axis, `torque_off` or `hold`, the usual first; () where that cannot
                 be said. Who has both takes a setting `estop_hold`, the ids of those that it holds
+    `captures`  how a recording of its line is taken apart; None: as the receiver hears it
     """
 
     kind: str
@@ -54,6 +56,7 @@ class LinkNeeds(NamedTuple):
     only: int | None = None
     both_ways: bool = False
     stops: tuple[str, ...] = ()
+    captures: Captures | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +97,7 @@ class Quality(Enum):
     SUSPECT = "suspect"
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(NamedTuple):
     """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None where it does not tell.
 
     `at` is the arrival time on the link's clock in seconds, `alarm` the names of the alarm bits that are set.
@@ -200,6 +202,10 @@ class Receiver(Protocol):
 
     Every byte that is fed comes out in exactly one event.
     """
+
+    @property
+    def held(self) -> int:
+        """How many bytes wait for more before anything can be made of them."""
 
     def feed(self, data: Data, /) -> list[Event]:
         """Take bytes (cut anywhere) or one CAN frame; give what is complete."""

@@ -13,33 +13,15 @@ from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from enum import Enum, IntEnum
 from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
+from motorbus.core.frame import ERROR_FLAG as ERROR_FLAG
+from motorbus.core.frame import REMOTE_FLAG as REMOTE_FLAG
+from motorbus.core.frame import CanFrame as CanFrame
 from motorbus.core.goal import Goal as Goal
 from motorbus.core.goal import Later
 from motorbus.errors import MotorbusError
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
-
-ERROR_FLAG: Final = 1 << 29
-"""Set in the identifier of what is no data frame but the adapter's report of a bus error, as SocketCAN does it."""
-REMOTE_FLAG: Final = 1 << 30
-"""Set in the identifier of a remote frame."""
-
-
-class CanFrame(NamedTuple):
-    """One classic CAN frame: identifier (with the flags above), 0 to 8 data bytes, 29-bit identifier or not."""
-
-    id: int
-    data: bytes
-    extended: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.id:0{8 if self.extended else 3}X}#{self.data.hex().upper()}"
-
-    def flat(self) -> bytes:
-        """How a frame stands in a run of bytes: identifier (4, big-endian, top bit for 29 bits), count, data."""
-        return (self.id | self.extended << 31).to_bytes(4, "big") + bytes((len(self.data),)) + self.data
-
 
 Data: TypeAlias = bytes | CanFrame
 Key: TypeAlias = Hashable
@@ -75,8 +57,7 @@ class Timeout(IntEnum):
 class Due(NamedTuple):
     """One reply that an exchange calls for: from which node, recognised by which key, how many bytes exactly.
 
-    A refusal is a reply too: where refusals are shorter, the family's `wire` pads them to this length, as CANopen
-    does on the bus.
+    A refusal is a reply too: where it is shorter, the family's `wire` pads it to this length, as CANopen does.
     """
 
     node: int
@@ -139,6 +120,16 @@ class Answer(NamedTuple):
     at: float
 
 
+class Unlike(Enum):
+    """The type of `UNLIKE`: these bytes are not exactly the replies due, or not as they usually are."""
+
+    UNLIKE = "unlike"
+
+
+UNLIKE: Final = Unlike.UNLIKE
+Whole: TypeAlias = "Callable[[Any, float], T | Unlike]"
+"""What all that came, and when (s), says at once; `UNLIKE` where it must be looked at piece by piece."""
+
 Stops: TypeAlias = Callable[[int], int]
 """How many stops have left for a node by now, those for everybody included."""
 Refusal: TypeAlias = Callable[[Stops], MotorbusError | None]
@@ -164,11 +155,14 @@ class Exchange(Generic[T_co]):
     `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
                   must not, None when it may. It can ask how many stops have left for a node by now. So an order that
                   was made under other settings, or before a stop, does not leave the queue
-    `other`       makes an exchange that says the same and has replies of another length: where replies carry no
-                  number, taking turns keeps a second copy of the last one from being taken for the next
+    `whole`       of one that is kept: what `read` makes of the answer, straight from all the bytes of the replies due,
+                  when each is sound and tells no alarm; else `UNLIKE`. `course` is what a bus keeps of it
+    `other`       makes one that says the same and has replies of another length: where replies carry no number, taking
+                  turns keeps a second copy of the last one from being taken for the next
     """
 
     __slots__ = (
+        "course",
         "effect",
         "goals",
         "lane",
@@ -182,7 +176,12 @@ class Exchange(Generic[T_co]):
         "request",
         "tells_position",
         "timeout",
+        "whole",
     )
+
+    aim: Any = None
+    sure = False
+    """Every goal of it lies within the limits that it brings, and moves nothing without an end: see `Aimed`."""
 
     def __init__(
         self,
@@ -200,6 +199,7 @@ class Exchange(Generic[T_co]):
         refusal: Refusal | None = None,
         later: Later | None = None,
         other: Callable[[], Exchange[T_co]] | None = None,
+        whole: Whole[T_co] | None = None,
     ) -> None:
         self.request: Final = request
         self.replies: Final = replies
@@ -214,10 +214,17 @@ class Exchange(Generic[T_co]):
         self.refusal: Final = refusal
         self.later: Final = later
         self.other: Final = other
+        self.whole: Final = whole
+        self.course: Any = None
+
+    @property
+    def ordered(self) -> Sequence[int]:
+        """The nodes of its goals."""
+        return [goal.node for goal in self.goals]
 
     def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:
         """The same request, whose answer is read in another way."""
-        rest = [name for name in self.__slots__ if name not in ("request", "replies", "read", "other")]
+        rest = [name for name in Exchange.__slots__ if name not in _ITS_OWN]
         return Exchange(self.request, self.replies, read, **{name: getattr(self, name) for name in rest})
 
     def __iter__(self) -> Generator[Step, Any, T_co]:
@@ -227,6 +234,9 @@ class Exchange(Generic[T_co]):
     def __repr__(self) -> str:
         shown = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
         return f"<Exchange {shown}>"
+
+
+_ITS_OWN: Final = ("request", "replies", "read", "other", "whole", "course")
 
 
 class Together(Generic[T_co]):
@@ -289,9 +299,8 @@ class Listen:
 class Tune:
     """Set the rate of the link, in bit/s, once nothing is in flight; gives the rate it had. 0 only asks.
 
-    With `listen_only` the link from then on sends nothing, not even the acknowledge bit of CAN, until it is tuned
-    again: so a bus of unknown rate can be listened to without disturbing it. A serial link is silent anyway while
-    nothing is sent.
+    With `listen_only` the link sends nothing, not even the acknowledge bit of CAN, until it is tuned again: so a bus of
+    unknown rate is not disturbed. A serial link is silent anyway while nothing is sent.
     """
 
     __slots__ = ("listen_only", "rate")

@@ -50,8 +50,7 @@ class Stretch(NamedTuple):
         return copysign(1.0, direction) if direction else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(NamedTuple):
     """A movement that began at `start` (s) and afterwards is at `goal`, or goes on at `cruise` for ever.
 
     Before `start` it answers as at `start`, so a question that comes late on a reordered wire is harmless.
@@ -64,20 +63,34 @@ class Motion:
 
     def position(self, at: float) -> float:
         """Where it is at this moment."""
-        phase, elapsed = self._phase(at)
-        if phase is not None:
-            return phase.position_after(elapsed)
-        return self.goal + self.cruise * elapsed if self.cruise else self.goal
+        return self.state(at)[0]
 
     def velocity(self, at: float) -> float:
         """How fast it is at this moment, with its sign."""
-        phase, elapsed = self._phase(at)
-        return self.cruise if phase is None else phase.velocity_after(elapsed)
+        return self.state(at)[1]
 
     def acceleration(self, at: float) -> float:
         """How much faster it gets at this moment, with its sign."""
-        phase, _ = self._phase(at)
-        return 0.0 if phase is None else phase.acceleration
+        return self.state(at)[2]
+
+    def state(self, at: float) -> tuple[float, float, float]:
+        """Position, velocity and acceleration at this moment: what every packet asks of every servo."""
+        elapsed = max(0.0, at - self.start)
+        for duration, position, velocity, acceleration in self.phases:
+            if elapsed < duration:
+                place = position + elapsed * (velocity + 0.5 * acceleration * elapsed)
+                return place, velocity + acceleration * elapsed, acceleration
+            elapsed -= duration
+        return self.goal + self.cruise * elapsed if self.cruise else self.goal, self.cruise, 0.0
+
+    @property
+    def peak(self) -> float:
+        """The greatest speed with which a phase begins, or that it keeps in the end."""
+        greatest = abs(self.cruise)
+        for _, _, velocity, _ in self.phases:
+            if abs(velocity) > greatest:
+                greatest = abs(velocity)
+        return greatest
 
     def moving(self, at: float) -> bool:
         """Whether it has not come to its end yet."""
@@ -97,14 +110,6 @@ class Motion:
                     yield stretch
             begin += phase.duration
         yield Stretch(begin, inf, self.goal, self.cruise, 0.0)
-
-    def _phase(self, at: float) -> tuple[Phase | None, float]:
-        elapsed = max(0.0, at - self.start)
-        for phase in self.phases:
-            if elapsed < phase.duration:
-                return phase, elapsed
-            elapsed -= phase.duration
-        return None, elapsed
 
 
 def rest(at: float, position: float) -> Motion:
@@ -130,11 +135,13 @@ def move(
     in no time. `speed` 0 brakes to a halt wherever that is. Raises ValueError for a negative or missing figure, for
     an infinite speed with an infinite acceleration, and where only one of the accelerations is infinite.
     """
-    braking = acceleration if deceleration is None else deceleration
     _check(speed, acceleration, position, goal, velocity)
-    _check(speed, braking)
-    if (braking == inf) != (acceleration == inf):
-        raise ValueError("acceleration and deceleration are both infinite, or none is")
+    braking = acceleration
+    if deceleration is not None:
+        _check(speed, deceleration)
+        if (deceleration == inf) != (acceleration == inf):
+            raise ValueError("acceleration and deceleration are both infinite, or none is")
+        braking = deceleration
     if not speed:
         return run(at, position, 0.0, velocity=velocity, acceleration=braking)
     if acceleration == inf:
@@ -207,8 +214,9 @@ def _time_over(distance: float, stretch: Stretch) -> float | None:
 
 
 def _check(speed: float, acceleration: float, *finite: float) -> None:
-    if not all(map(isfinite, finite)):
-        raise ValueError("position, goal and velocity must be finite")
+    for number in finite:
+        if not isfinite(number):
+            raise ValueError("position, goal and velocity must be finite")
     if not speed >= 0 or not acceleration > 0:
         raise ValueError("speed must be 0 or more, acceleration more than 0")
     if speed == acceleration == inf:
@@ -244,19 +252,17 @@ def _trapezoid(
     cruises: bool,
 ) -> Motion:
     """To the velocity `peak`, along at it if it is the highest allowed, and down to nothing at the goal."""
-    first = Phase(
-        abs(peak - velocity) / acceleration, position, velocity, copysign(acceleration, peak - velocity)
-    )
+    gain = peak - velocity
+    first = Phase(abs(gain) / acceleration, position, velocity, copysign(acceleration, gain))
     reached = first.position_after(first.duration)
-    last = Phase(
-        abs(peak) / deceleration,
-        goal - peak * abs(peak) / (2 * deceleration),
-        peak,
-        -copysign(deceleration, peak),
-    )
+    braking = goal - peak * abs(peak) / (2 * deceleration)
+    phases = [first] if first.duration else []
     # A triangle has no cruise: there the difference is rounding, and divided by a tiny peak it would be ages.
-    cruise = Phase(max(0.0, (last.position - reached) / peak) if cruises else 0.0, reached, peak, 0.0)
-    return Motion(at, tuple(phase for phase in (first, cruise, last) if phase.duration), goal)
+    if cruises and (cruise := max(0.0, (braking - reached) / peak)):
+        phases.append(Phase(cruise, reached, peak, 0.0))
+    if brake := abs(peak) / deceleration:
+        phases.append(Phase(brake, braking, peak, -copysign(deceleration, peak)))
+    return Motion(at, tuple(phases), goal)
 
 
 @dataclass(frozen=True, slots=True)

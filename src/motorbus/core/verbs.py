@@ -28,14 +28,26 @@ class AsyncRunner(Protocol):
     async def run(self, operation: Runnable[T], /) -> T: ...
 
 
-class Blocking:
+class Spoken:
+    """What verbs are said to. A copy has methods of its own: those that are kept here speak for this one."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        kind = type(self)
+        return {
+            name: value
+            for name, value in self.__dict__.items()
+            if not isinstance(getattr(kind, name, None), Said)
+        }
+
+
+class Blocking(Spoken):
     """Carries out verbs by a blocking bus."""
 
     def __init__(self, bus: BlockingRunner) -> None:
         self.bus = bus
 
 
-class Awaiting:
+class Awaiting(Spoken):
     """Carries out verbs by an async bus."""
 
     def __init__(self, bus: AsyncRunner) -> None:
@@ -89,4 +101,17 @@ class verb(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     @overload
     def __get__(self, device: Awaiting, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
-        return self if device is None else self.method(device, lambda said: device.bus.run(said))
+        if device is None:
+            return self
+        function: Callable[..., Any] = self.function
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            said = function(device, *args, **kwargs) if args or kwargs else function(device)
+            return device.bus.run(said)
+
+        method = dressed(call, self.name, function, device)
+        if (
+            getattr(type(device), self.name, None) is self
+        ):  # not where a subclass says more and asks for this one
+            device.__dict__[self.name] = method  # from now on it is found there, without coming here
+        return method

@@ -96,6 +96,11 @@ def looks_like_can(text: str) -> bool:
     return "#" in first or _SCREEN.fullmatch(first) is not None
 
 
+def is_log(path: Path) -> bool:
+    """Does the name say that this can be nothing but a log of CAN frames?"""
+    return path.suffix.lower() in (_TEXT[0], ".candump", *_BY_PYTHON_CAN)
+
+
 def read_lines(lines: Iterable[str]) -> Iterator[Logged]:
     """Every frame in the text of candump, as it comes. Raises RequestError with the number of a bad line."""
     for number, line in enumerate(lines, 1):

@@ -24,9 +24,9 @@ def open_link(
     """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://…` or `can://INTERFACE/CHANNEL`.
 
     `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
-    wants: bytes or frames; `options` are for the CAN adapter. Raises RequestError for what is no port,
-    PortNotFound, PortBusy (naming its owner) or LinkError. `kept` is a lock that we have already, maybe of this port;
-    `patience` how long (s) a host of the network is waited for.
+    wants: bytes or frames; `options` are for the CAN adapter, or say the `latency` (s) of a serial port. `kept` is a
+    lock that we have already, maybe of this port; `patience` how long (s) a host of the network is waited for. Raises
+    RequestError for what is no port, PortNotFound, PortBusy (naming its owner) or LinkError.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
     if scheme == "can" and kind == "frames" and "\0" not in port:
@@ -35,6 +35,12 @@ def open_link(
         return CanLink(port, rate=rate, usual=usual, options=options or {}, kept=kept)
     rate = rate or usual
     _check(port, scheme, rate, kind)
+    link = _serial(port, scheme, rate, kept, patience)
+    link.latency = (options or {}).get("latency", link.latency)  # type: ignore[assignment]
+    return link
+
+
+def _serial(port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None) -> Link:
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
 

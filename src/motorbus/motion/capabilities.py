@@ -7,7 +7,6 @@ to raise. Here is what an axis is, and what it tells and is told without moving;
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
@@ -271,8 +270,7 @@ def state(axis: AxisVerbs) -> Operation[State]:
         found, quality = yield from _judged(axis)
     yield from canary.looked_after(axis, found.at)
     spec = axis.spec
-    return replace(
-        found,
+    return found._replace(
         quality=quality,
         position=None if found.position is None else spec.from_device(found.position),
         velocity=None if found.velocity is None else spec.rate_from_device(found.velocity),

@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.bus import verdict
+from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.operation import (
     Alone,
     Effect,
@@ -56,6 +57,7 @@ class Command:
         self._stops = {axis.name: _stops(axis) for axis in self.axes}
         self._orders: dict[str, int] = {}
         self._counts: tuple[tuple[AxisVerbs, int], ...] = ()
+        self._aim: tuple[Aim, Aim] | None = None
         self._count()
 
     def _count(self) -> None:
@@ -92,6 +94,7 @@ class Command:
         Whatever was told to one of them since is as good as told to all.
         """
         found = copy(other)
+        found._aim = None
         axes = {axis.name: axis for axis in (*self.axes, *other.axes)}
         found.axes = tuple(axes.values())
         if other._turns is None:
@@ -107,6 +110,7 @@ class Command:
     def rest(self) -> Command:
         """The command over those that nobody else has told anything since, without the others."""
         found, held = copy(self), self.held()
+        found._aim = None
         found.axes = tuple(held)
         found._counts = tuple((axis, self._orders[axis.name]) for axis in held)
         return found
@@ -135,6 +139,9 @@ class Command:
 
     def guarded(self, exchange: Exchange[T]) -> Exchange[T]:
         """The same exchange, which does not leave once the command is lost."""
+        if isinstance(exchange, Aimed):
+            aimed: Any = exchange.under(self._aim_of(exchange.aim))
+            return aimed  # type: ignore[no-any-return]
         own, other = exchange.refusal, exchange.other
         return Exchange(
             exchange.request,
@@ -150,6 +157,14 @@ class Command:
             refusal=self._refusal if own is None else partial(self._either, own),
             other=None if other is None else lambda: self.guarded(other()),
         )
+
+    def _aim_of(self, aim: Aim) -> Aim:
+        """The same aim, of which nothing leaves once the command is lost; kept, for a loop asks in each cycle."""
+        known = self._aim
+        if known is None or known[0] is not aim:
+            own = Aim(aim.ordered, aim.goals, partial(self._either, aim.refusal))
+            known = self._aim = aim, own
+        return known[1]
 
     def _refusal(self, _: Stops) -> MotorbusError | None:
         return self.lost()

@@ -12,14 +12,13 @@ is opened by its file, see `robot`.
 from __future__ import annotations
 
 from motorbus.session.address import Address, parse_address, parse_ids
-from motorbus.session.buses import LOG, OpenAsyncBus, open, open_async, simulate
+from motorbus.session.buses import LOG, open, open_async, simulate
 from motorbus.session.keeping import journal_of, unfinished
 from motorbus.session.opening import Opening, lock_name, prepare
 
 __all__ = [
     "LOG",
     "Address",
-    "OpenAsyncBus",
     "Opening",
     "journal_of",
     "lock_name",

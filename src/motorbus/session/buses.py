@@ -8,10 +8,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus import families
-from motorbus.bus.aio import AsyncBus
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Exchange
@@ -28,6 +27,9 @@ from motorbus.session.keeping import kept_for
 from motorbus.session.opening import FAULTS, Opening, prepare
 from motorbus.simulation.faults import strike
 from motorbus.simulation.named import Faults, Simulation, find
+
+if TYPE_CHECKING:
+    from motorbus.bus.aio import AsyncBus
 
 LOG = logging.getLogger("motorbus.session")
 logging.getLogger("motorbus").addHandler(
@@ -47,7 +49,7 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
     """
     bus = _opened(Bus, address, report, options)
     try:
-        test = _echo_test(bus)
+        test = echo_test(bus)
         if test is not None:
             _settled(bus, lambda: bus.run(test))
     except BaseException:
@@ -56,25 +58,10 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
     return bus
 
 
-class OpenAsyncBus(AsyncBus):
-    """An async bus that finds out about echo when its `async with` is entered."""
-
-    async def __aenter__(self) -> Self:
-        test = _echo_test(self)
-        if test is not None:
-            try:
-                await self.run(test)
-            except MotorbusError as silence:
-                LOG.debug("echo test: %s", silence.summary)
-            except BaseException:  # cancelled: whoever is not let in is not shown out either
-                await self.close()
-                raise
-            _tell_echo(self)
-        return self
-
-
 def open_async(address: str, *, report: Notify | None = None, **options: object) -> AsyncBus:
     """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
+    from motorbus.session.awaited import OpenAsyncBus
+
     return _opened(OpenAsyncBus, address, report, options)
 
 
@@ -166,7 +153,8 @@ def _warn(bus: BusFace, journal: BusJournal | None) -> None:
         bus.warnings += (warning,)
 
 
-def _echo_test(bus: BusFace) -> Exchange[Any] | None:
+def echo_test(bus: BusFace) -> Exchange[Any] | None:
+    """What shows an echo, to be sent next; None where the family needs none. The warnings of the bus are told."""
     for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)
     test = bus.family.echo_test()
@@ -180,9 +168,10 @@ def _settled(bus: BusFace, run: Callable[[], object]) -> None:
         run()
     except MotorbusError as silence:
         LOG.debug("echo test: %s", silence.summary)
-    _tell_echo(bus)
+    tell_echo(bus)
 
 
-def _tell_echo(bus: BusFace) -> None:
+def tell_echo(bus: BusFace) -> None:
+    """After the test: say that the adapter echoes, if it does."""
     if bus.turns.echo.present:
         LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

@@ -11,11 +11,14 @@ from motorbus.core.family import Family
 from motorbus.errors import RequestError
 from motorbus.session.address import parse_address
 
+LATEST = 1.0  # s
 FAULTS = "faults"
 """What goes wrong by script, for simulated devices only; see `motorbus.simulation.faults`."""
 ADAPTER = "can://"
 """Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
 
+LATENCY = "latency"
+"""The option of every serial port that says for how long its adapter holds bytes back, where the user knows better."""
 RECONNECT = "reconnect"
 """The option of every bus that says whether a port that was lost is looked for."""
 
@@ -42,6 +45,7 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     word = "baud" if family.link.kind == "bytes" else "bitrate"
     rate = _rate(word, merged.pop(word)) if word in merged else 0
     reconnect = _yes(RECONNECT, merged.pop(RECONNECT, True))
+    late = _latency(merged.pop(LATENCY)) if LATENCY in merged and _is_serial(family, spot.port) else {}
     settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
     if FAULTS in merged and not simulated:
@@ -50,11 +54,28 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
-        allowed = {word, RECONNECT, *known, *(option.name for option in family.link.settings)}
+        more = {LATENCY} if _is_serial(family, spot.port) else set()
+        allowed = {word, RECONNECT, *more, *known, *(option.name for option in family.link.settings)}
         raise RequestError(
             f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
         )
-    return Opening(family.configured(**settings), spot.port, rate, rest, reconnect)
+    return Opening(family.configured(**settings), spot.port, rate, {**rest, **late}, reconnect)
+
+
+def _is_serial(family: Family, port: str) -> bool:
+    """A port that carries bytes, and is no simulator in this process."""
+    return family.link.kind == "bytes" and port.partition(":")[0] != "sim"
+
+
+def _latency(said: object) -> dict[str, object]:
+    """The option as the link takes it, in s."""
+    seconds = units.parse(str(said), "time")
+    if not 0 <= seconds <= LATEST:
+        raise RequestError(
+            f"{LATENCY}={said}: no adapter holds bytes back for that long",
+            expected=f"0 to {LATEST:g} s, as 0, 1ms or 500us; 0 for a line without an adapter",
+        )
+    return {LATENCY: seconds}
 
 
 def _no_faults(address: str, port: str) -> RequestError:

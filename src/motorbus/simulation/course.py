@@ -4,6 +4,10 @@ It knows no ports: what clients send comes in, what they get goes out, each with
 `pace` everything takes its time on the wire, which carries one thing at a time. Without it the wire is infinitely
 fast: air time and return delays, all that is over within a few milliseconds, are not waited for; what takes longer
 (an EEPROM write, a restart) is.
+
+On a full line there is something to do at every moment, so with `pace` it is done where it holds nothing up: devices
+hear a long piece packet by packet, not all of it at its end, and they work out what they will say while the last bytes
+of the request are still on the wire.
 """
 
 from __future__ import annotations
@@ -24,6 +28,11 @@ HASTE: Final = 0.004
 """Without pace, what a device would do within so many seconds it does at once."""
 BACKLOG: Final = 1024
 """So many things under way, and clients are no longer listened to until some have arrived."""
+PIECE: Final = 256
+"""Bytes that devices on a paced line hear at once, about a packet: each piece when its own last byte has passed."""
+AHEAD: Final = 0.004
+"""s by which devices on a paced line are given bytes early, with the moment at which the last of them has passed:
+nothing can come between, for one thing at a time is on the wire."""
 _BITS_PER_BYTE = 10
 
 
@@ -59,6 +68,7 @@ class Course:
         self._events: list[Event] = []
         self._order = count()
         self._free_at = -inf
+        self._heard_at = -inf
 
     @property
     def crowded(self) -> bool:
@@ -79,31 +89,60 @@ class Course:
         """A client has sent this, at this rate (bit/s) if it has set one."""
         at = self._passed(data, now)
         for delivery in self.line.carry(Side.HOST, data, at):
-            to_device = delivery.to is Side.DEVICE  # the client hears an echo as others do
-            self._push(delivery, *((sender, rate) if to_device else (None, None)))
+            if delivery.to is Side.HOST:  # the client hears an echo as others do
+                self._push(delivery)
+                continue
+            for piece in self._pieces(delivery):
+                self._push(piece, sender, rate)
 
     def next(self) -> float:
         """The next moment at which something happens by itself."""
-        due = self.simulator.due()
-        spoken = inf if due is None else due if self.pace else due - HASTE
-        return min(spoken, self._events[0].at) if self._events else spoken
+        spoken = self._speaks()
+        return min(spoken, self._arrives(spoken))
 
     def happen(self, now: float) -> Iterator[Event]:
         """Everything up to this moment, in order; gives what clients get of it.
 
         A frame that reaches the devices reaches the other clients as well: on CAN everyone hears everyone.
         """
-        while self.next() <= now:
-            if self._events and self._events[0].at <= now:
+        while min(spoken := self._speaks(), arrives := self._arrives(spoken)) <= now:
+            if arrives <= now:
                 event = heappop(self._events)
                 if event.to is Side.DEVICE:
+                    self._heard_at = max(self._heard_at, event.at)
                     self.tune(event.rate)
                     self.simulator.receive(event.data, event.at)
                 if event.to is Side.HOST or isinstance(event.data, CanFrame):
                     yield event
             else:
                 self._speak(now)
-        self.simulator.advance(now)
+        if now >= self._heard_at:
+            self.simulator.advance(now)
+
+    def _speaks(self) -> float:
+        """When the devices are to be asked what they say."""
+        due = self.simulator.due()
+        return inf if due is None else due if self.pace else due - HASTE
+
+    def _arrives(self, spoken: float) -> float:
+        """When the first of what is under way is to be given to whom it reaches."""
+        if not self._events:
+            return inf
+        first = self._events[0]
+        plain = first.to is Side.DEVICE and not isinstance(first.data, CanFrame)
+        return first.at - AHEAD if self.pace and plain and first.at < spoken else first.at
+
+    def _pieces(self, delivery: Delivery) -> list[Delivery]:
+        """The same in pieces, each with the moment at which its own last byte has passed."""
+        end, to, data = delivery
+        if not self.pace or isinstance(data, CanFrame) or len(data) <= PIECE:
+            return [delivery]
+        byte = _BITS_PER_BYTE / (self.rate or self.pace)
+        cut = [data[begin : begin + PIECE] for begin in range(0, len(data), PIECE)]
+        left = range(len(data) - PIECE, 0, -PIECE)
+        return [
+            Delivery(end - max(0, more) * byte, to, one) for one, more in zip(cut, [*left, 0], strict=True)
+        ]
 
     def _speak(self, now: float) -> None:
         """The devices begin to send what is due next."""

@@ -144,7 +144,8 @@ class Mount:
                 doors[descriptor].admit()
             elif descriptor in attended:
                 attended[descriptor].attend(descriptor)
-        self._happen(self._clock())
+        if ready:
+            self._happen(self._clock())
         self._sweep()
         return stop in ready
 

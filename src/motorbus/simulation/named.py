@@ -134,6 +134,26 @@ class Simulation:
         if self._link is not None:
             self._link.unplug(seconds=seconds)
 
+    @property
+    def now(self) -> float:
+        """The moment (s) on the devices' clock; a virtual one begins at 0."""
+        return self._now()
+
+    def wait(self, until: float) -> None:
+        """Let time pass for the devices until this moment (s); when it has passed already, nothing happens.
+
+        A virtual clock goes there at once, so simulations that all wait for the same moments have one clock.
+        """
+        seconds = until - self._now()
+        if seconds <= 0:
+            return
+        if self.clock == "real" or isinstance(self._link, Served):
+            time.sleep(seconds)
+        elif self._link is not None:
+            self._link.advance(seconds)
+        else:
+            self._left_at = until
+
     def __getitem__(self, node: int) -> Any:
         """The simulated device with this id: at least a `core.family.SimulatedNode`, and what its family adds.
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from motorbus.core.operation import Effect, Rank
-from motorbus.errors import DeviceError, UnexpectedReply
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Answer, Effect, Exchange, Rank, Reply
+from motorbus.errors import DeviceError, MotorbusError, UnexpectedReply
 from motorbus.families.kst import driver, wire
 from motorbus.families.kst.driver import dialect_of
-from motorbus.families.kst.driver.exchanges import OtherSize, meant, order, upload_row, whole
+from motorbus.families.kst.driver.exchanges import OtherSize, meant, order, sized, upload, upload_row, whole
 from tests.families.kst.bench import abort, bench, node, play, watch
 
 READ = "605#4002600000000000"
@@ -35,6 +38,36 @@ def test_a_value_of_another_size_is_no_value(back: str) -> None:
     one = node()
     with pytest.raises(OtherSize, match="and not in 2"):
         play(upload_row(one, one.table["present_position"], int), (READ, back))
+
+
+ROWS = [row for row in node("kst-ext").table.values() if row.readable]
+SPECIFIERS = st.one_of(st.sampled_from([0x4F, 0x4B, 0x47, 0x43, 0x42, 0x41, 0x80]), st.integers(0, 255))
+RESTS = st.one_of(st.binary(max_size=9), st.binary(min_size=4, max_size=4), st.just(b"\x84\x03\x00\x00"))
+
+
+def said_by(exchange: Exchange[int], data: bytes) -> object:
+    """The value that these data of a reply come to, or all that its error says."""
+    assert exchange.read is not None
+    answer = Answer((Reply(5, None, data),), (), 100.0)
+    try:
+        return exchange.read(answer)
+    except MotorbusError as error:
+        return type(error), str(error), error.node, error.received, getattr(error, "__notes__", None)
+
+
+@given(st.sampled_from(ROWS), SPECIFIERS, st.sampled_from([0, 0, 0, 1, 2, 3]), RESTS)
+@example(node().table["present_position"], 0x4B, 0, b"\x84\x03\xff\xff")
+@example(node().table["present_position"], 0x4B, 0, b"\x84\x03\xff")
+def test_a_reply_that_is_read_as_it_is_comes_to_what_it_says_taken_apart(
+    row: Entry, specifier: int, wrong: int, rest: bytes
+) -> None:
+    one, other = node("kst-ext"), node("kst-ext")
+    index, subindex = row.address, row.subindex or 0
+    head = bytes((specifier, index & 0xFF, index >> 8, subindex))
+    data = bytes(byte ^ (wrong == at > 0) for at, byte in enumerate(head)) + rest
+    apart = upload(other, index, subindex, lambda reply: row.decode(sized(other, row, reply)))
+    assert said_by(upload_row(one, row, int), data) == said_by(apart, data)
+    assert one.at == other.at
 
 
 def test_a_refusal_is_told_in_the_manual_s_words() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
-from motorbus.core.operation import Exchange
+from motorbus.core.operation import CanFrame, Exchange
 from motorbus.errors import RequestError
 from motorbus.families.kst import driver
-from motorbus.families.kst.driver import RawStatus, Status
-from motorbus.families.kst.driver.feedback import SAME_FRAME
+from motorbus.families.kst.driver import Node, RawStatus, Status
+from motorbus.families.kst.driver.feedback import SAME_FRAME, position_exchange
 from tests.families.kst.bench import bench, node, play
 
 POSITION = "605#4002600000000000"
@@ -20,6 +23,42 @@ def test_a_position_is_a_prepared_exchange() -> None:
     assert isinstance(exchange, Exchange)
     assert exchange.tells_position
     assert play(exchange, (POSITION, "4b02600084030000")) == pytest.approx(1.5707963)
+
+
+QUANTITIES: list[Callable[[Node], Any]] = [
+    driver.position,
+    driver.current,
+    driver.temperature,
+    driver.status,
+    driver.raw_status,
+]
+
+
+def test_each_quantity_is_one_exchange_that_is_kept() -> None:
+    one, other = node("kst-ext"), node("kst-ext", 6)
+    first = [say(one) for say in QUANTITIES]
+    assert [say(one) for say in QUANTITIES] == first, "made once"
+    assert len(set(first)) == len(QUANTITIES), "and each of them is another"
+    assert not {*first} & {say(other) for say in QUANTITIES}, "another node is asked by others"
+    assert [(exchange.request.id, exchange.request.extended) for exchange in first] == [(0x605, False)] * 5
+
+
+def test_what_is_kept_goes_when_the_id_format_is_another() -> None:
+    one = node("kst-ext", id_format="auto")
+    assert not isinstance(driver.position(one), Exchange), "it is asked first"
+    for extended in (False, True, False):
+        one.dialect.learn_format(5, extended)
+        for say in QUANTITIES:
+            request = say(one).request
+            assert isinstance(request, CanFrame)
+            assert (request.id, request.extended) == (0x605, extended)
+            assert say(one) is say(one)
+
+
+def test_what_is_kept_does_not_make_the_format_known() -> None:
+    one = node(id_format="auto")
+    assert position_exchange(one) is position_exchange(one)
+    assert not isinstance(driver.position(one), Exchange)
 
 
 def test_the_status_of_the_manual_is_two_raw_bytes_and_a_warning() -> None:

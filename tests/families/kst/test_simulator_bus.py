@@ -241,3 +241,38 @@ def test_a_second_servo_comes_while_the_bus_is_at_work() -> None:
     assert host.say(f"601#{READ}") == ["581#4B02600000000000"] * 2
     with pytest.raises(RequestError, match="no servo has the id 9"):
         host.bus.duplicate(9)
+
+
+# --- who can be reached is known anew after each change ---------------------------------------------------------
+
+
+def test_whoever_changes_is_reached_where_it_is_now() -> None:
+    host = Host(1, 2, 3)
+    assert [len(host.say(f"60{node}#{READ}")) for node in (1, 2, 3)] == [1, 1, 1]
+    host[2].unplug()
+    assert host.say(f"602#{READ}") == []
+    host[2].plug()
+    assert len(host.say(f"602#{READ}")) == 1
+    host[3].node = 4
+    assert (len(host.say(f"603#{READ}")), len(host.say(f"604#{READ}"))) == (0, 1)
+    host.bus.servos[0].bit_rate = 250_000
+    assert host.say(f"601#{READ}") == [ERROR]
+    host.bus.servos[0].bit_rate = 500_000
+    assert len(host.say(f"601#{READ}")) == 1
+    host.bus.duplicate(2)
+    assert len(host.say(f"602#{READ}")) == 1  # both say the same, which is one frame
+    assert host.bus.servos[-1].values is not host[2].values
+
+
+def test_the_next_report_is_known_anew_when_somebody_begins_stops_or_changes_its_interval() -> None:
+    host = Host(1, 2, nmt="standard")
+    assert host.bus.due() is None
+    first, second = host.bus.servos
+    host.bus.receive(CanFrame(0, bytes((1, 0))), 10.0)
+    assert host.bus.due() == first.report_due() == pytest.approx(10.02)
+    second.report_every(0.003, 10.005)
+    assert host.bus.due() == pytest.approx(10.008)
+    second.unplug()
+    assert host.bus.due() == first.report_due()
+    first.unplug()
+    assert host.bus.due() is None

@@ -71,6 +71,22 @@ def test_a_value_comes_out_as_it_went_in(
     assert wire.decode_reply(frame.data) == wire.SdoReply("upload", index, subindex, data, size=len(data))
 
 
+@given(INDEXES, SUBINDEXES, DATA)
+def test_a_value_usually_begins_with_its_length_and_its_object(
+    index: int, subindex: int, data: bytes
+) -> None:
+    head = wire.usual_head(index, subindex, len(data))
+    assert (head + data).ljust(wire.LENGTH, b"\0") == wire.encode_upload_reply(1, index, subindex, data).data
+    said = wire.decode_reply(head + data.ljust(4, b"\xff"))
+    assert said == wire.SdoReply("upload", index, subindex, data, size=len(data))
+
+
+def test_a_value_that_no_reply_carries_begins_with_nothing() -> None:
+    assert [wire.usual_head(0x6002, 0, size).hex() for size in range(6)] == [
+        *("", "4f026000", "4b026000", "47026000", "43026000", "")
+    ]
+
+
 @given(NODES, INDEXES, SUBINDEXES, st.one_of(st.none(), st.integers(0, 0xFFFF_FFFF)))
 def test_an_announcement_comes_out_as_it_went_in(
     node: int, index: int, subindex: int, size: int | None
@@ -160,6 +176,7 @@ IMPOSSIBLE: dict[str, Callable[[], object]] = {
     "reply of 0": lambda: wire.encode_download_reply(0, 0x6003, 0),
     "reply of 128": lambda: wire.encode_upload_reply(128, 0x6002, 0, b"\0\0"),
     "reply without data": lambda: wire.encode_upload_reply(1, 0x6002, 0, b""),
+    "value of an impossible object": lambda: wire.usual_head(0x10000, 0, 2),
     "reply of five bytes": lambda: wire.encode_upload_reply(1, 0x6002, 0, bytes(5)),
     "size beyond 32 bits": lambda: wire.encode_upload_start(1, 0x100A, 0, 1 << 32),
     "segment of eight bytes": lambda: wire.encode_segment_reply(1, 0, bytes(8), True),

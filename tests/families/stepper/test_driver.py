@@ -9,10 +9,11 @@ import pytest
 
 import motorbus
 from motorbus.core.family import Found
-from motorbus.core.operation import Exchange, Timeout
+from motorbus.core.operation import Answer, Exchange, Reply, Timeout
 from motorbus.errors import FramingError, OutcomeUnknown, RequestError, UnexpectedReply
 from motorbus.families.stepper import FAMILY, AsyncController, Controller, Program, Sends, driver
 from motorbus.families.stepper.driver import Node, presence, vote
+from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.table import TABLE
 from tests.families.stepper.bench import Bench, Tampering, bench
 from tests.families.stepper.vectors import DUMP_A, DUMP_B
@@ -152,10 +153,43 @@ def test_an_input_is_read() -> None:
         there.simulated.set_input(2, True)
         assert [there.device.read_input(port) for port in range(1, 6)] == [False, True, False, False, False]
         there.sent()
-        for port in (0, 6):
+        for port in (0, 6, 1.0):
             with pytest.raises(RequestError, match="no input"):
-                there.device.read_input(port)
+                there.device.read_input(port)  # type: ignore[arg-type]  # 1.0 is what is wrong with it
         assert there.sent() == []
+
+
+def test_an_input_is_read_by_one_exchange_that_is_kept() -> None:
+    one, other = Node(), Node()
+    kept = [driver.read_input(one, port) for port in range(1, 6)]
+    assert [driver.read_input(one, port) for port in range(1, 6)] == kept
+    assert [shown(exchange)[6:14] for exchange in kept] == [f"00 0B 0{port}" for port in range(1, 6)]
+    assert driver.read_input(other, 1) is not kept[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "came", "says"),
+    [
+        ("read_input", {"port": 2}, "FFAA000B0202", "byte 5 (step or level) is 02, 00 is due"),
+        ("read_input", {"port": 2}, "FFAA000B02", "5 bytes came, 6 are due"),
+        (
+            "set_project_loop",
+            {"project_loop": 9},
+            "FFAA8E050000",
+            "byte 3 is 05, a project from 01 to 04 is due",
+        ),
+        ("stop_motor", {}, "FFAA030D0001", "byte 5 (step or level) is 01, 00 is due"),
+    ],
+)
+def test_a_reply_that_is_not_due_is_told_byte_by_byte(
+    name: str, values: dict[str, Any], came: str, says: str
+) -> None:
+    exchange = command(Node(), name, bytes, **values)
+    assert exchange.read is not None
+    with pytest.raises(UnexpectedReply) as raised:
+        exchange.read(Answer((Reply(0, (), bytes.fromhex(came)),), (), 1.0))
+    assert raised.value.summary == f"the reply to {name} is not the one that is due: {says}"
+    assert (raised.value.sent, raised.value.received) == (exchange.request, bytes.fromhex(came))
 
 
 # --- who is there -------------------------------------------------------------------------------------------

@@ -125,6 +125,40 @@ def test_the_level_of_an_input_is_free() -> None:
         assert (wire.difference(request, b"\xff\xaa\0\x0b\x02" + bytes((level,))) == "") is (level < 2)
 
 
+@st.composite
+def replies(draw: st.DrawFn) -> tuple[bytes, bytes]:
+    """A request, and what may come back: the reply to it, that with other bytes in a place or two, or anything."""
+    name, values = draw(orders())
+    request = wire.encode(name, motor=draw(st.sampled_from([1, 3, 0xFF])), **values)
+    image = bytes(220) if name == "read_project" else b""
+    project, level = draw(st.integers(0, 5)), draw(st.integers(0, 2))
+    came = bytearray(wire.encode_reply(request, project=project, level=level, image=image))
+    for place in draw(st.lists(st.integers(0, 5), max_size=2)):
+        came[place] = draw(st.integers(0, 255))
+    return request, draw(st.one_of(st.just(bytes(came)), st.just(bytes(came[:5])), st.binary(max_size=7)))
+
+
+@given(replies())
+def test_what_is_due_is_exactly_what_differs_in_nothing(pair: tuple[bytes, bytes]) -> None:
+    request, came = pair
+    assert (came[:6] in wire.replies_due(request)) is (wire.difference(request, came) == "")
+
+
+@given(orders())
+def test_all_that_is_due_has_one_key(order: tuple[str, dict[str, int]]) -> None:
+    request = wire.encode(order[0], **order[1])
+    due = wire.replies_due(request)
+    assert {wire.key_of(reply) for reply in due} == {wire.key_due(request)}
+    assert {len(reply) for reply in due} == {6}
+    many = {"read_input": 2, "set_segment_loop": 4, "set_project_loop": 4}
+    assert len(due) == many.get(order[0], 1)
+
+
+def test_nothing_is_due_to_what_is_no_request() -> None:
+    with pytest.raises(RequestError, match="no reply to what is no request"):
+        wire.replies_due(b"\xff\xaa")
+
+
 def test_a_reply_is_made_only_to_a_request_and_with_the_image_it_needs() -> None:
     with pytest.raises(RequestError):
         wire.encode_reply(b"\xff\xaa")

@@ -220,3 +220,17 @@ class Leases(RuleBasedStateMachine):
 
 
 TestLeases = Leases.TestCase
+
+
+@pytest.mark.parametrize("needed", [True, False])
+def test_whether_it_lets_anything_move_is_what_its_check_says(needed: bool) -> None:
+    lease = Lease(0.5, needed=needed)
+    assert lease.lets_move(0.0) is not needed
+    lease.take("me", 0.0)
+    for now in (0.5, 0.6, 0.7):
+        passed = True
+        try:
+            lease.check(now)
+        except Refused:
+            passed = False
+        assert lease.lets_move(now) is passed is (now == 0.5)

@@ -36,6 +36,8 @@ from motorbus.families.feetech.driver import (
     Protection,
     Recovery,
     Servo,
+    States,
+    SyncWriter,
     TorqueLimit,
     Zero,
     action_all,
@@ -49,8 +51,11 @@ from motorbus.families.feetech.driver import (
     scan,
     sync_read,
     sync_read_positions,
+    sync_read_raw,
+    sync_read_states,
     sync_write,
     sync_write_positions,
+    sync_writer,
 )
 from motorbus.families.feetech.driver.assured import ASSURANCE
 from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
@@ -68,6 +73,8 @@ __all__ = [
     "Protection",
     "Recovery",
     "Servo",
+    "States",
+    "SyncWriter",
     "TorqueLimit",
     "Zero",
     "action_all",
@@ -79,8 +86,11 @@ __all__ = [
     "scan",
     "sync_read",
     "sync_read_positions",
+    "sync_read_raw",
+    "sync_read_states",
     "sync_write",
     "sync_write_positions",
+    "sync_writer",
 ]
 
 _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
@@ -131,6 +141,7 @@ class Feetech:
     @cached_property
     def link(self) -> LinkNeeds:
         from motorbus.families.feetech.simulator import OPTIONS
+        from motorbus.families.feetech.wire.recording import CAPTURES
 
         usual = BAUD_CODES[0]
         options = (
@@ -147,6 +158,7 @@ class Feetech:
             (*options, *OPTIONS),
             _SETTINGS,
             stops=("torque_off", "hold"),
+            captures=CAPTURES,
         )
 
     def configured(self, **settings: object) -> Feetech:

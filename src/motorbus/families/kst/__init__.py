@@ -127,8 +127,18 @@ class Kst:
     @cached_property
     def link(self) -> LinkNeeds:
         from motorbus.families.kst.simulator import OPTIONS
+        from motorbus.families.kst.wire.recording import CAPTURES
 
-        return LinkNeeds("frames", DEFAULT_RATE, RATES, OPTIONS, _SETTINGS, self._window, stops=("hold",))
+        return LinkNeeds(
+            "frames",
+            DEFAULT_RATE,
+            RATES,
+            OPTIONS,
+            _SETTINGS,
+            self._window,
+            stops=("hold",),
+            captures=CAPTURES,
+        )
 
     def configured(self, **settings: object) -> Kst:
         unknown = settings.keys() - {option.name for option in _SETTINGS}

@@ -149,8 +149,11 @@ class Stepper:
     @cached_property
     def link(self) -> LinkNeeds:
         from motorbus.families.stepper.simulator import OPTIONS
+        from motorbus.families.stepper.wire.recording import CAPTURES
 
-        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True)
+        return LinkNeeds(
+            "bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True, captures=CAPTURES
+        )
 
     def configured(self, **settings: object) -> Stepper:
         for name in settings.keys() - {"motor", "dump_order"}:

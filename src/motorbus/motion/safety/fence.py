@@ -57,7 +57,8 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
 
 
 def _watched(bus: BusFace, gate: Gate) -> None:
-    gate.watch(bus.turns.known.seen, bus.link.now, bus.turns.known.stops, bus.turns.known.accepts)
+    known = bus.turns.known
+    gate.watch(known.seen, bus.link.now, known.stops, known.accepts, bus.turns.tell)
     bus.turns.look = gate.look
     bus.turns.anew += (gate.forget,)
     bus.readdressed = partial(follow, bus, gate)

@@ -21,6 +21,7 @@ from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, 
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.guard import ENDLESS, PLACES, Guard, untold
 from motorbus.motion.safety.lease import Lease
+from motorbus.motion.safety.refusing import nobody_stops, nothing_known, stopped_since
 from motorbus.motion.safety.track import FRESH
 from motorbus.motion.safety.turning import Turning
 from motorbus.motion.safety.waiting import Handed, Waiting
@@ -51,6 +52,7 @@ class Gate:
         self._waiting = Waiting()
         self._stops: Stops = _none
         self._seen: Seen = {}
+        self._tell: Callable[[], None] = _nothing
         self._now: Callable[[], float] = _never
         self._answer: Answer | None = None
         self._places: Mapping[int, float] = {}
@@ -61,9 +63,12 @@ class Gate:
         now: Callable[[], float],
         stops: Stops | None = None,
         accepted: Stops | None = None,
+        tell: Callable[[], None] | None = None,
     ) -> None:
         """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s), `stops`
-        how many stops have left for a node, `accepted` how many it has accepted."""
+        how many stops have left for a node, `accepted` how many it has accepted. `tell` is called before anybody looks,
+        to have there what was heard last."""
+        self._tell = tell or self._tell
         self._seen, self._now, self._stops = seen, now, stops or self._stops
         self.turning.accepted = accepted or self.turning.accepted
 
@@ -100,6 +105,7 @@ class Gate:
             return []
         if not self.guards or exchange.rank is Rank.STOP:
             return []
+        self._tell()
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
         if not everyone and self._are_known(goals, now):
@@ -114,6 +120,26 @@ class Gate:
             if goal.node not in found and guard.track.why_not(now):
                 found[goal.node] = guard.ask()
         return list(found.values())
+
+    def passes(self, exchange: Exchange[Any]) -> bool:
+        """Whether this may surely leave: then it is noted as given. Else nothing is, and whoever asks looks closely.
+
+        It is the quick way of the orders of a control loop, which says the same as `look` and a call of the gate.
+        """
+        if not exchange.sure or self.faults:
+            return False
+        if self.lease is not None and not self.lease.lets_move(self._now() - self.origin):
+            return False
+        if not self.guards:
+            return not self.attended
+        self._tell()
+        goals = exchange.goals
+        if not self._are_fine(goals, self._now()):
+            return False
+        if self._tells:
+            for goal in goals:
+                self.guards[goal[0]].ordered(True)
+        return True
 
     def __call__(self, exchange: Exchange[Any]) -> None:
         later = exchange.later
@@ -132,6 +158,7 @@ class Gate:
 
     def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
         """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
+        self._tell()
         if (
             obeyed
             and goals
@@ -220,11 +247,11 @@ class Gate:
             return exchange.goals
         found = self._waiting.of(later)
         if found is None:
-            raise _nothing_known(later)
+            raise nothing_known(later)
         for one in found:
             node = one.later.node
             if node is not None and one.goals and self._stops(node) > one.stops:
-                raise _stopped_since(node)
+                raise stopped_since(node)
         return _goals(found)
 
     # -- whether anything may move -----------------------------------------------------------------------------------
@@ -251,7 +278,7 @@ class Gate:
         if endless and goal.value:
             self._check_attended(goal, now)
             if self.attended and (guard is None or guard.ordered is untold):
-                raise _nobody_stops(goal)
+                raise nobody_stops(goal)
         if guard is None:
             return
         if goal.quantity in ("velocity", "speed"):
@@ -305,19 +332,13 @@ def _paced(node: int, goals: Iterable[Goal]) -> bool:
     return "speed" in told and "time" not in told
 
 
-def _nobody_stops(goal: Goal) -> Refused:
-    return Refused(
-        f"node {goal.node}: goal {goal.quantity} has no end of its own, and it is no axis that is open",
-        reason="unattended",
-        cause="only axes that are open are stopped when the machine is left, or its lease is lost",
-        advice="open the machine with it as an axis, or its bus by its address; nothing was sent",
-        node=goal.node,
-    )
-
-
 def _none(_: int) -> int:
     """The stops of a gate that was not told where they are counted."""
     return 0
+
+
+def _nothing() -> None:
+    """What is to be told to a gate that knows all."""
 
 
 def _never() -> float:
@@ -337,28 +358,6 @@ def _named(exchange: Exchange[Any], goals: tuple[Goal, ...]) -> set[int]:
 
 def _goals(handed: Iterable[Handed] | None) -> tuple[Goal, ...]:
     return tuple(goal for one in handed or () for goal in one.goals)
-
-
-def _nothing_known(later: Later) -> Refused:
-    whom = "anybody on this bus" if later.node is None else f"node {later.node}"
-    return Refused(
-        f"nothing is known to wait in {whom}, so nobody can tell what would begin",
-        reason="unknown",
-        expected="something that was handed over since this bus was opened",
-        cause="it was carried out already, or an earlier program handed it over",
-        advice="hand it over again, which replaces what waits, then let it begin; nothing was sent",
-        node=later.node,
-    )
-
-
-def _stopped_since(node: int) -> Refused:
-    return Refused(
-        f"node {node} was stopped after something had been handed over to it, which waits there still and would begin",
-        reason="stopped",
-        expected="no stop between the two",
-        advice="hand it over again, which replaces what waits; nothing was sent",
-        node=node,
-    )
 
 
 def _check(goal: Goal) -> None:

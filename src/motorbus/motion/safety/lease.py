@@ -86,6 +86,11 @@ class Lease:
         )
         return error
 
+    def lets_move(self, now: float) -> bool:
+        """Whether `check` has nothing against it."""
+        standing = self.standing(now)
+        return standing is Standing.HELD or (standing is Standing.FREE and not self.needed)
+
     def is_attended(self, now: float) -> bool:
         """Whether it is held, and its holder attends."""
         return self.standing(now) is Standing.HELD and self._attended

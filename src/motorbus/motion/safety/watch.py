@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Final
 
@@ -136,7 +135,7 @@ class Watch:
             return
         state = told.state
         if state.position is None and node in places:
-            state = replace(state, position=places[node])
+            state = state._replace(position=places[node])
         verdict = strain.take(state, goals.get(node))
         if verdict in (Verdict.OVERLOADED, Verdict.HOT):
             raise _overloaded(axis, strain, state.at)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.families.feetech.simulator.effects import concerned
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.simulator.host import CALIBRATE, CLEAR_TURNS, RESTORE, Host, packet, word
 from tests.families.feetech.simulator.test_maps import LOCK, USUAL, host_of
@@ -109,3 +110,16 @@ def test_0x06_gives_back_the_rate_that_it_shipped_with() -> None:
     assert host.say(packet(1, RESTORE)) == ACK
     host.wait(2.0)
     assert host.bus.nodes[1].baud_rate == 115_200
+
+
+def test_what_a_write_concerns_is_what_its_rows_decide() -> None:
+    nothing = concerned(frozenset())
+    assert not any(nothing)
+    assert concerned(frozenset({"goal_position", "goal_velocity"})) == nothing._replace(
+        goal=True, motion=True
+    )
+    assert concerned(frozenset({"second_id"})) == nothing._replace(identity=True)
+    assert concerned(frozenset({"torque_enable"})) == nothing._replace(torque=True, motion=True)
+    assert concerned(frozenset({"phase"})) == nothing._replace(faces=True, motion=True)
+    assert concerned(frozenset({"homing_offset"})) == nothing._replace(counts=True, motion=True)
+    assert concerned(frozenset({"min_position_limit"})) == nothing._replace(limits=True, motion=True)

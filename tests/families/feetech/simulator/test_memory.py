@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
+from motorbus.core.entry import Coding, Storage
 from motorbus.families.feetech.simulator.flash import Commit, Flash
 from motorbus.families.feetech.simulator.memory import Layout, Memory, Written, code
-from motorbus.families.feetech.table import STS
+from motorbus.families.feetech.table import STS, TABLES
 
 
 @pytest.fixture
@@ -147,3 +150,58 @@ def test_a_restore_of_the_factory_values_takes_its_time_too() -> None:
     assert {commit.address for commit in slow.memory.commits} == set(range(6, 40))
     slow.now = 2.0
     assert (slow.memory.stored[13], slow.memory.commits) == (70, [])
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_write_does_the_same_as_one_row_by_row(name: str) -> None:
+    chance = random.Random(name)
+    layout = Layout(TABLES[name], {})
+    quick = Memory(layout)
+    live = bytearray(quick.live)
+    for _ in range(3000):
+        address, data = chance.randrange(256), chance.randbytes(chance.randrange(12))
+        locked = chance.random() < 0.5
+        names, stored = set(), False
+        for row in layout.touched(address, len(data)):
+            if row.writable and row.storage is not Storage.FACTORY:
+                names.add(row.name)
+                stored |= row.storage is Storage.EEPROM and not locked
+                for place in range(row.address, row.address + row.size):
+                    if address <= place < address + len(data):
+                        live[place] = data[place - address]
+        assert quick.write(address, data, locked=locked) == Written(frozenset(names), stored)
+        assert quick.live == live
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_row_is_read_and_told_as_its_coding_says(name: str) -> None:
+    chance = random.Random(name)
+    memory = Memory(Layout(TABLES[name], {}))
+    for row in TABLES[name].values():
+        for raw in (0, 1, -1, 255, 256, -256, 0x7FFF, 0x8000, 1 << 20, chance.randrange(-40000, 40000)):
+            memory[row.name] = raw
+            span = slice(row.address, row.address + row.size)
+            assert bytes(memory.live[span]) == code(row, raw)
+            memory.live[span] = chance.randbytes(row.size)
+            assert memory[row.name] == row.decode(bytes(memory.live[span]))
+    assert any(row.coding is Coding.SIGN_MAGNITUDE for row in TABLES[name].values())
+
+
+def test_whoever_works_with_the_registers_learns_of_every_change() -> None:
+    memory = Memory(Layout(STS, {}))
+    changes = [
+        lambda: memory.write(40, b"\1", locked=True),
+        lambda: memory.write(33, b"\0", locked=True, strict=True),
+        lambda: memory.__setitem__("torque_enable", 0),
+        lambda: memory.restore_factory(frozenset()),
+        memory.power_up,
+        memory.restart,
+    ]
+    for change in changes:
+        memory.settled = True
+        change()
+        assert not memory.settled
+    memory.settled = True
+    memory.tell("present_position", 5)
+    assert memory.settled
+    assert memory["present_position"] == 5

@@ -55,6 +55,7 @@ from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
 from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
+from motorbus.families.feetech.driver.states import States, sync_read_raw, sync_read_states
 from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
 from motorbus.families.feetech.driver.train import Train, limits, train
 from motorbus.families.feetech.driver.tuning import (
@@ -69,6 +70,7 @@ from motorbus.families.feetech.driver.tuning import (
     torque_limit,
 )
 from motorbus.families.feetech.driver.turns import clear_turns
+from motorbus.families.feetech.driver.writer import SyncWriter, sync_writer
 
 __all__ = [
     "GLANCE",
@@ -88,7 +90,9 @@ __all__ = [
     "ServoVerbs",
     "Settings",
     "Skipped",
+    "States",
     "Suspicion",
+    "SyncWriter",
     "TorqueLimit",
     "Train",
     "Zero",
@@ -146,8 +150,11 @@ __all__ = [
     "stop",
     "sync_read",
     "sync_read_positions",
+    "sync_read_raw",
+    "sync_read_states",
     "sync_write",
     "sync_write_positions",
+    "sync_writer",
     "telemetry",
     "temperature",
     "torque_limit",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from operator import attrgetter
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus import errors
@@ -24,6 +25,7 @@ from motorbus.core.operation import (
     Refusal,
     Stops,
     Timeout,
+    Whole,
 )
 from motorbus.errors import (
     MotorbusError,
@@ -43,8 +45,12 @@ PRESENT: Final = 56
 """Where feedback begins in every map: the present position."""
 LAST: Final = 255
 """The highest address of a register."""
+MOST: Final = 253
+"""Bytes of data in a status packet at most."""
 ACKNOWLEDGED: Final = wire.OVERHEAD
 """Bytes of a status packet without parameters, which answers PING and every write."""
+settings_of_now: Final = attrgetter("settings")
+"""What is known of a servo at present."""
 DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
 """Ways in which a write can fail that leave open whether it was heard."""
 
@@ -72,10 +78,12 @@ def read_block(
     *,
     rank: Rank = Rank.POLL,
     timeout: Timeout = Timeout.REPLY,
+    whole: Callable[[int], Whole[T] | None] = lambda _: None,
 ) -> Exchange[T]:
     """READ `count` bytes from `address` on; the value is what `take` makes of them.
 
     Its other form reads one byte more and leaves it unused: the length is all in a reply that tells it from the last.
+    One that is kept says by `whole` what a packet with so many bytes of data comes to; see `Exchange`.
     """
 
     def read(answer: Answer) -> T:
@@ -94,6 +102,7 @@ def read_block(
             repeatable=True,
             tells_position=told_by({node.node: node}, address, count),
             other=lambda: exchange(other, count),
+            whole=whole(count),
         )
 
     return exchange(count, another(address, count))
@@ -128,8 +137,8 @@ def places(nodes: Mapping[int, Node], answer: Answer) -> dict[int, float]:
 
 
 def another(address: int, count: int) -> int:
-    """One byte more than `count`, or less where the table of a servo ends."""
-    return count + 1 if address + count <= LAST else count - 1
+    """One byte more than `count`, or less where the table of a servo, or what a packet can carry, ends."""
+    return count + 1 if address + count <= LAST and count < MOST else count - 1
 
 
 def acknowledged(
@@ -174,8 +183,11 @@ def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Refusal:
     """Refuses an order for these servos once one has other settings than those, or than now (None): in another mode,
     with other limits or another zero it would mean something else. What is not known any more counts as other."""
     under = [(node, settings or node.settings) for node, settings in made]
+    nodes, as_made = [node for node, _ in under], [settings for _, settings in under]
 
     def refusal(_: Stops) -> MotorbusError | None:
+        if list(map(settings_of_now, nodes)) == as_made:
+            return None
         for node, settings in under:
             if node.settings is not settings and node.settings != settings:
                 return outdated(node)

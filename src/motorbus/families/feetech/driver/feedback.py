@@ -15,6 +15,7 @@ from motorbus.core.family import State
 from motorbus.core.operation import Exchange, Operation, Runnable
 from motorbus.errors import DeviceError
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
+from motorbus.families.feetech.driver.gauge import quantity
 from motorbus.families.feetech.driver.identity import known, unknown_map
 from motorbus.families.feetech.driver.node import Node
 
@@ -83,6 +84,9 @@ def position(node: Node, *, confirmed: bool = False) -> Runnable[float]:
     `confirmed` reads until two readings in a row are the same, for a shaft at rest: the sum of a reply has 8 bits only.
     Raises DeviceError when the register map is not known, VerificationFailed when no two of eight are the same.
     """
+    kept = node.kept.get("present_position")
+    if kept is not None and kept[0] is node.settings and not confirmed:
+        return kept[1]
     if confirmed:
         return agreed(lambda: _quantity(node, "present_position"), node=node.node, what="position")
     return _quantity(node, "present_position")
@@ -117,7 +121,10 @@ def temperature(node: Node) -> Runnable[float]:
 
 
 def _quantity(node: Node, name: str) -> Runnable[float]:
-    """One row: an exchange when the servo is known, else an operation that asks it first."""
+    """One row: an exchange when the servo is known, which is kept, else an operation that asks it first."""
+    kept = node.kept.get(name)
+    if kept is not None and kept[0] is node.settings:
+        return kept[1]
     if node.table is None or node.settings is None:
         return _after(node, lambda same: _quantity(same, name))
     if name not in node.table or not node.table[name].unit:
@@ -127,7 +134,9 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
     def take(data: bytes) -> float:
         return float(node.value(row, row.decode(data)))
 
-    return read_block(node, row.address, row.size, take)
+    exchange = read_block(node, row.address, row.size, take, whole=lambda count: quantity(node, row, count))
+    node.kept[name] = node.settings, exchange
+    return exchange
 
 
 def _untold(node: Node, what: str) -> DeviceError:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, outcome
+from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, Whole, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -22,6 +22,7 @@ from motorbus.families.feetech.driver.exchanges import (
     told_by,
     unanswered,
 )
+from motorbus.families.feetech.driver.gauge import blocks
 from motorbus.families.feetech.driver.identity import learn, unknown_map
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
@@ -105,14 +106,19 @@ def _sync_read_span(
             raws[id].update(decode(span, data))
 
 
-def block_of_each(nodes: Sequence[Node], address: int, count: int) -> Exchange[dict[int, bytes]]:
-    """SYNC READ one block of each; the value holds the bytes of those who answered."""
+def block_of_each(
+    nodes: Sequence[Node], address: int, count: int, *, kept: bool = False
+) -> Exchange[dict[int, bytes]]:
+    """SYNC READ one block of each; the value holds the bytes of those who answered. `kept`: it is run again."""
 
     def read(answer: Answer) -> dict[int, bytes]:
         return {id: data[:count] for id, data in _heard(by_id, answer)}
 
+    def whole(size: int) -> Whole[dict[int, bytes]] | None:
+        return blocks(nodes, count, size) if kept and size > 0 else None
+
     by_id = {node.node: node for node in nodes}
-    return sync_exchange(nodes, address, count, read)
+    return sync_exchange(nodes, address, count, read, whole=whole)
 
 
 def sync_exchange(
@@ -121,25 +127,30 @@ def sync_exchange(
     count: int,
     read: Callable[[Answer], T],
     places: Callable[[Answer], Mapping[int, float]] | None = None,
+    whole: Callable[[int], Whole[T] | None] = lambda _: None,
 ) -> Exchange[T]:
-    """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`).
+    """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`), where
+    there is one more to read.
 
-    `read` must make do with either, and so must `places`, which says where they are by what was read last.
+    `read` must make do with either, and so must `places`, which says where they are by what was read last. `whole` as
+    for `read_block`.
     """
     by_id = {node.node: node for node in nodes}
     ids = list(by_id)
 
-    def exchange(count: int, other: int) -> Exchange[T]:
+    def exchange(count: int, other: int | None) -> Exchange[T]:
         return Exchange(
             wire.sync_read(address, count, ids),
             tuple(Due(id, id, wire.OVERHEAD + count) for id in ids),
             read,
             repeatable=True,
             tells_position=places or told_by(by_id, address, count),
-            other=lambda: exchange(other, count),
+            other=None if other is None else lambda: exchange(other, count),
+            whole=whole(count),
         )
 
-    return exchange(count, another(address, count))
+    more = another(address, count)
+    return exchange(count, more if more > count else None)
 
 
 def collected(
@@ -227,9 +238,9 @@ def sync_write(
     errors = yield from prepare_all(nodes, rate=rate, air=air)
     if errors:
         raise next(iter(errors.values()))
-    _refuse_other_names(nodes, list(values.values()))
+    refuse_other_names(nodes, list(values.values()))
     blocks = [
-        _block(node, orders)._replace(under=node.settings)
+        block_of(node, orders)._replace(under=node.settings)
         for node, orders in zip(nodes, values.values(), strict=True)
     ]
     yield from written_all(list(sync_writes(nodes, blocks)))
@@ -276,7 +287,8 @@ def _parts(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[list[tupl
             yield group[start : start + capacity]
 
 
-def _refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Value]]) -> None:
+def refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Value]]) -> None:
+    """Raise RequestError where one is to get other registers than the first."""
     for node, orders in zip(nodes, values, strict=True):
         if set(orders) != set(values[0]):
             raise RequestError(
@@ -287,7 +299,8 @@ def _refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Val
             )
 
 
-def _block(node: Node, values: Mapping[str, Value]) -> Block:
+def block_of(node: Node, values: Mapping[str, Value]) -> Block:
+    """What these values come to in the registers of a servo that is known. Raises as `sync_write`."""
     if not node.writable:
         raise unknown_map(node, "refuses to write to it")
     assert node.table is not None

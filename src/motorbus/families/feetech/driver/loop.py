@@ -6,15 +6,16 @@ orders may be mixed: present and goal position have the same place and size in a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set, Sized
 from functools import partial
 from typing import Final, Literal
 
-from motorbus.core.entry import Entry
+from motorbus.core.entry import Entry, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Answer, Exchange, Operation, outcome
+from motorbus.core.operation import UNLIKE, Answer, Exchange, Operation, Unlike, Whole, outcome
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block
+from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block, settings_of_now
+from motorbus.families.feetech.driver.gauge import Packets, measure
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
 from motorbus.families.feetech.driver.node import Node, Settings
@@ -32,8 +33,7 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
     nodes = distinct(servos)
     rows = {node.node: known_row(node, "present_position") for node in nodes}
     for node in nodes:
-        if not node.control.sync_read:
-            raise _no_sync_read(node)
+        refuse_without_sync_read(node)
     row = next(iter(rows.values()))
     if len(list(trains(nodes, row.size, rate, air))) > 1:
         raise RequestError(
@@ -42,7 +42,7 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
             advice="divide the servos, or give a greater `air`; nothing was sent",
         )
     gauges = _Gauges({node.node: _Gauge(node, rows[node.node]) for node in nodes})
-    return sync_exchange(nodes, row.address, row.size, gauges.read, gauges.places)
+    return sync_exchange(nodes, row.address, row.size, gauges.read, gauges.places, gauges.whole)
 
 
 def position_reads(
@@ -91,8 +91,11 @@ def _alone(node: Node) -> Exchange[Positions]:
     return read_block(node, row.address, row.size, take)
 
 
-def _no_sync_read(node: Node) -> RequestError:
-    return RequestError(
+def refuse_without_sync_read(node: Node) -> None:
+    """Raise RequestError for a servo that knows no SYNC READ."""
+    if node.control.sync_read:
+        return
+    raise RequestError(
         f"node {node.node} knows no SYNC READ, so one packet cannot bring its position",
         expected="servos of another map than scs and scs2",
         advice="use read_positions(), which asks such servos one by one; nothing was sent",
@@ -119,14 +122,18 @@ class _Gauge:
         self.settings: Settings | None = None
         self._factor = 0.0
 
+    def settle(self, settings: Settings) -> None:
+        """Make of them what is needed."""
+        self._factor = settings.factors["present_position"]
+        self.settings = settings
+
     def value(self, data: bytes) -> float:
         """In rad. Raises RequestError when its settings have been written and not read since."""
         settings = self.node.settings
         if settings is None:
             raise _unsettled(self.node)
         if settings is not self.settings:
-            self._factor = settings.factors["present_position"]
-            self.settings = settings
+            self.settle(settings)
         raw = int.from_bytes(data, self._order)
         if raw >= self._plain:
             raw = self.row.decode(data)
@@ -152,7 +159,9 @@ class _Gauges:
 
     def __init__(self, gauges: Mapping[int, _Gauge]) -> None:
         self._gauges = gauges
-        self._last: tuple[Answer, dict[int, float]] | None = None
+        self._last: tuple[Answer | float, dict[int, float]] | None = (
+            None  # which one or when, and what it said
+        )
         self._places = partial(places, {id: gauge.node for id, gauge in gauges.items()})
 
     def read(self, answer: Answer) -> Positions:
@@ -170,14 +179,42 @@ class _Gauges:
     def places(self, answer: Answer) -> Mapping[int, float]:
         """The same as `Exchange.tells_position` says it: by the settings that they have now, where those are known."""
         last = self._last
-        if last is not None and last[0] is answer and self._settled():
+        if last is not None and (last[0] is answer or last[0] is answer.at) and self._settled():
             return last[1]
         return self._places(answer)
+
+    def whole(self, count: int) -> Whole[Positions] | None:
+        """`read` for status packets with so many bytes of data, by the settings that the servos have now."""
+        found = [measure(gauge.node, gauge.row) for gauge in self._gauges.values()]
+        how = [one for one in found if one is not None]
+        if len(how) < len(found) or len({one.order for one in how}) > 1:
+            return None
+        nodes, made_by = [one.node for one in how], [one.settings for one in how]
+        for gauge, settings in zip(self._gauges.values(), made_by, strict=True):
+            gauge.settle(settings)
+        packets = Packets([node.node for node in nodes], count, how[0].order)
+        are_sound, unpack, plain = packets.are_sound, packets.unpack, min(one.plain for one in how)
+        scales = [(one.node.node, one.scale, one.factor) for one in how]
+
+        def whole(data: bytes, at: float) -> Positions | Unlike:
+            if not are_sound(data) or list(map(settings_of_now, nodes)) != made_by:
+                return UNLIKE
+            raws = unpack(data)
+            if max(raws) >= plain:
+                return UNLIKE
+            values = {id: raw * scale * factor for (id, scale, factor), raw in zip(scales, raws, strict=True)}
+            for node in nodes:
+                node.at = at
+                node.alarm = ()
+            self._last = at, values.copy()
+            return Positions(values, (), at)
+
+        return whole
 
     def _settled(self) -> bool:
         """Whether all have the settings by which they were read last."""
         for gauge in self._gauges.values():
-            if gauge.node.settings is not gauge.settings:
+            if gauge.node.settings is not gauge.settings and gauge.node.settings != gauge.settings:
                 return False
         return True
 
@@ -190,16 +227,34 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
     gate judges the limits.
     """
     nodes = distinct(servos)
+    check_ordered(positions)
     if len(positions) != len(nodes):
         raise RequestError(f"{len(positions)} positions for {len(nodes)} servos", advice="nothing was sent")
     blocks = [_goal(node, to) for node, to in zip(nodes, positions, strict=True)]
-    exchanges = list(sync_writes(nodes, blocks))
+    return one_packet(list(sync_writes(nodes, blocks)), len(nodes))
+
+
+def one_packet(exchanges: Sequence[Exchange[None]], servos: int) -> Exchange[None]:
+    """The only one of these. Raises RequestError where it took several."""
     if len(exchanges) > 1:
         raise RequestError(
-            f"one packet cannot carry the goals of {len(nodes)} servos",
+            f"one packet cannot carry the goals of {servos} servos",
             advice="divide them; nothing was sent",
         )
     return exchanges[0]
+
+
+def check_ordered(values: object) -> None:
+    """Raise RequestError for what has no order, as a mapping by id, and for what is no collection."""
+    if isinstance(values, list | tuple):
+        return
+    unordered = isinstance(values, Mapping | Set | str | bytes)
+    if unordered or not (isinstance(values, Iterable) and isinstance(values, Sized)):
+        raise RequestError(
+            f"{shown(values)} is no row of values, one for each servo",
+            expected="a list, in the order of the servos",
+            advice="name each servo with its values in sync_write(); nothing was sent",
+        )
 
 
 def _goal(node: Node, to: float) -> Block:

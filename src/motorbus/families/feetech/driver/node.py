@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cache
 from math import inf
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
-from motorbus.core.operation import Due, Goal
+from motorbus.core.operation import Due, Exchange, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import (
@@ -34,8 +34,8 @@ MANY_TURNS: Final = 30719
 """Counts to either side when both limits are 0 (7.5 turns). Source: STS3215 memory table V3.6."""
 
 _UNKNOWN: Final = Control()
-_PRESENT: Final = "present_position"
-_POSITIONS: Final = (_PRESENT, "goal_position", "goal_position_echo")
+PRESENT_POSITION: Final = "present_position"
+_POSITIONS: Final = (PRESENT_POSITION, "goal_position", "goal_position_echo")
 _LIMITS: Final = ("min_position_limit", "max_position_limit")
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
 SCALED: Final = frozenset((*_POSITIONS, *_LIMITS, *_VELOCITIES))
@@ -101,7 +101,8 @@ class Node:
     `pending` the goals that wait in it for an ACTION, None when none from here do. `bound` is the raw bound of the
     current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
     those (rad) that were given up to make a motor of it, where limits decide about that. `questions` are packets that
-    were made to read it, with the reply due, by address and count. `unsure` are the EEPROM cells that were written and
+    were made to read it, with the reply due, by address and count; `kept` are exchanges that bring one quantity, each
+    with the settings under which it was made. `unsure` are the EEPROM cells that were written and
     may not be kept: what came in between may have closed the lock, behind which a write is obeyed and soon gone.
     """
 
@@ -117,6 +118,7 @@ class Node:
         self.former_limits: tuple[float, float] | None = None
         self.unsure: set[int] = set()
         self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Due, ...]]]] = {}
+        self.kept: Final[dict[str, tuple[Settings, Exchange[Any]]]] = {}
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -156,7 +158,7 @@ class Node:
         settings = self.settings
         if settings is None or row.name not in settings.factors:
             return row.to_value(raw)
-        if settings.shift and row.name == _PRESENT:
+        if settings.shift and row.name == PRESENT_POSITION:
             raw = settings.compensated(raw)
         return row.to_value(raw) * settings.factors[row.name]
 

@@ -245,12 +245,12 @@ def _block(node: Node, group: Sequence[Order]) -> Block:
         group[0].row.address,
         b"".join(row.encode(raw) for row, raw in group),
         max(row.effect for row, _ in group),
-        tuple(goal for row, raw in group for goal in _goals(node, row, raw)),
+        tuple(goal for row, raw in group for goal in goals_of(node, row, raw)),
         repeatable=not any(row.name == "goal_position" and node.known_mode is Mode.STEP for row, _ in group),
     )
 
 
-def _goals(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
+def goals_of(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
     """What this value of this row orders, in the operating mode the servo is in."""
     value = node.value(row, raw)
     if row.name == "goal_position" and node.known_mode is Mode.STEP:

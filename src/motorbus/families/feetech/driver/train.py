@@ -9,11 +9,11 @@ others. Goal and present position have the same place in every map, so one packe
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
-from motorbus.core.entry import Entry, is_number, shown
+from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Effect, Exchange, Goal, Operation, outcome
+from motorbus.core.operation import Effect, Exchange, Operation, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
@@ -21,6 +21,7 @@ from motorbus.families.feetech.driver.group import AIR, distinct, prepare_all
 from motorbus.families.feetech.driver.identity import writable
 from motorbus.families.feetech.driver.loop import known_row, position_reads
 from motorbus.families.feetech.driver.motion import enable_torque
+from motorbus.families.feetech.driver.mould import mould
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import Order, blocks, no_limits, position_goal
 from motorbus.families.feetech.driver.pace import speed_at_least
@@ -145,37 +146,16 @@ def _check_speed(node: Node, speed: float) -> None:
 # -- goals ---------------------------------------------------------------------------------------------------
 
 
-_HEAD: Final = 7
-"""Bytes of a SYNC WRITE in front of its first item."""
-
-
-class _Seat(NamedTuple):
-    """What a goal of one servo is reckoned by; `lowest` and `highest` are what its register can say, in rad.
-
-    `known` are the raw goals that were reckoned before: what each orders, and its bytes in the packet.
-    """
-
-    id: int
-    node: Node
-    row: Entry
-    factor: float
-    scale: float
-    lowest: float
-    highest: float
-    low: float
-    high: float
-    known: dict[int, tuple[Goal, bytes]]
-
-
 class _Packet:
-    """One SYNC WRITE of goal positions, of which all is known but the goals."""
+    """One SYNC WRITE of goal positions to servos in whose maps the goal has the same place."""
 
-    def __init__(self, address: int, seats: Sequence[_Seat]) -> None:
-        still = [(seat.id, bytes(seat.row.size)) for seat in seats]
-        self._head = wire.sync_write(address, still)[:_HEAD]
-        self._seats = seats
-        self._under = [(seat.node, seat.node.settings) for seat in seats]
-        self._refusal = changed_since(self._under)
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        self._nodes = nodes
+        self._rows = [known_row(node, "goal_position") for node in nodes]
+        for node, row in zip(nodes, self._rows, strict=True):
+            position_goal(node, row, 0.0)  # raises where it heeds no goal position
+        self._under = [(node, node.settings) for node in nodes]
+        self._mould = mould(nodes, [[row] for row in self._rows])
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
@@ -186,42 +166,28 @@ class _Packet:
 
     def exchange(self, to: Mapping[int, float]) -> Exchange[None]:
         """The packet with these goals (rad)."""
-        goals, parts = [], [self._head]
-        for id, node, row, factor, scale, lowest, highest, low, high, known in self._seats:
-            value = to[id]
-            if type(value) is float and lowest <= value <= highest:
-                raw = round(value / factor / scale)
-            else:  # a whole number, or what is none: as `position_goal` says
-                raw, _ = position_goal(node, row, value)
-            found = known.get(raw)
-            if found is None:
-                goal = Goal(id, "position", raw * scale * factor, low, high)
-                found = known[raw] = goal, bytes((id,)) + row.encode(raw)
-            goals.append(found[0])
-            parts.append(found[1])
-        packet = b"".join(parts)
-        request = packet + bytes((wire.checksum(packet[2:]),))
-        return unanswered(request, Effect.MOTION, tuple(goals), refusal=self._refusal)
+        goals = [to[node.node] for node in self._nodes]
+        cast = None if self._mould is None else self._mould.cast(goals)
+        return cast or self._judged(goals)
+
+    def _judged(self, goals: Sequence[float]) -> Exchange[None]:
+        """The same, as `position_goal` says: a whole number, what is none, or a goal outside the limits."""
+        items, orders = [], []
+        for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
+            raw, order = position_goal(node, row, goal)
+            items.append((node.node, row.encode(raw)))
+            orders.append(order)
+        request = wire.sync_write(self._rows[0].address, items)
+        return unanswered(request, Effect.MOTION, tuple(orders), refusal=changed_since(self._under))
 
 
 def _packets(nodes: Sequence[Node]) -> Iterator[_Packet]:
     """As few packets as can carry a goal for each of these."""
-    places: dict[tuple[int, int], list[_Seat]] = {}
+    places: dict[tuple[int, int], list[Node]] = {}
     for node in nodes:
-        seat = _seat(node)
-        places.setdefault((seat.row.address, seat.row.size), []).append(seat)
-    for (address, size), seats in places.items():
+        row = known_row(node, "goal_position")
+        places.setdefault((row.address, row.size), []).append(node)
+    for (_, size), group in places.items():
         capacity = wire.sync_write_capacity(size)
-        for start in range(0, len(seats), capacity):
-            yield _Packet(address, seats[start : start + capacity])
-
-
-def _seat(node: Node) -> _Seat:
-    row = known_row(node, "goal_position")
-    _, goal = position_goal(node, row, 0.0)  # raises where it heeds no goal position
-    assert node.settings is not None
-    assert goal.low is not None
-    assert goal.high is not None
-    lowest, highest = float(node.value(row, row.low)), float(node.value(row, row.high))
-    factor = node.settings.factors[row.name]
-    return _Seat(node.node, node, row, factor, row.scale, lowest, highest, goal.low, goal.high, {})
+        for start in range(0, len(group), capacity):
+            yield _Packet(group[start : start + capacity])

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import inf
+from typing import Final
 
 from motorbus.core.plant import Drive, Motion, rest
 from motorbus.families.feetech.simulator.effort import Load, World, carried_out, loads
@@ -20,6 +21,8 @@ from motorbus.families.feetech.simulator.motor import Settings
 from motorbus.families.feetech.simulator.protection import OVERLOAD, Protection
 from motorbus.families.feetech.simulator.switches import Switches
 
+_NOTHING: Final = World()
+
 
 class Body(ABC):
     """What a servo is apart from what it is told.
@@ -29,6 +32,22 @@ class Body(ABC):
     `protection`  what it has tripped over
     `threshold`   the supply below which it starts anew, in V; 0: none
     """
+
+    __slots__ = (
+        "__dict__",  # costs nothing until a test puts a method of its own in
+        *("model", "switches", "memory", "motion", "push", "plugged", "threshold", "protection", "_now"),
+        *(
+            "_voltage",
+            "_told_voltage",
+            "_world",
+            "_given",
+            "_again",
+            "_cut_at",
+            "_cut_after",
+            "_expect",
+            "_sag",
+        ),
+    )
 
     def __init__(
         self, model: Model, layout: Layout, switches: Switches, now: Callable[[], float], position: float
@@ -43,7 +62,8 @@ class Body(ABC):
         self.threshold = 0.0
         self._now = now
         self._voltage = model.voltage
-        self._world = World()
+        self._told_voltage = round(model.voltage * 10)
+        self._world = _NOTHING
         self._given = 0.0
         self._again = self._cut_at = self._cut_after = inf
         self._expect: Callable[[float], None] | None = None
@@ -80,7 +100,7 @@ class Body(ABC):
     @voltage.setter
     def voltage(self, volts: float) -> None:
         """Set what it is when nobody draws a current."""
-        self._voltage = volts
+        self._voltage, self._told_voltage = volts, round(volts * 10)
         self.move(self._now())
 
     @property
@@ -138,7 +158,7 @@ class Body(ABC):
 
     def storing(self, at: float) -> float:
         """How much later (s) it acknowledges anything because its EEPROM is at work."""
-        if self.switches.eeprom_commit == "after_ack":
+        if not self.memory.flash.works or self.switches.eeprom_commit == "after_ack":
             return 0.0
         return max(0.0, self.memory.flash.busy_until - at)
 

@@ -87,14 +87,15 @@ class FeetechBus:
         kinds = [model] * len(numbers) if isinstance(model, Model) else list(model)
         distinct = {id(kind): kind for kind in kinds}
         layouts = {key: Layout(kind.table, kind.defaults) for key, kind in distinct.items()}
+        clock, renamed = self._clock, self._forget_ids
         self.servos = tuple(
             Servo(
                 _checked(number),
                 kind,
                 layouts[id(kind)],
                 self.switches,
-                lambda: self.now,
-                self._forget_ids,
+                clock,
+                renamed,
                 position.get(number) if isinstance(position, Mapping) else position,
             )
             for number, kind in zip(numbers, kinds, strict=True)
@@ -117,9 +118,8 @@ class FeetechBus:
         if id not in self._ids():
             raise RequestError(f"no servo has the id {id}")
         first = self._ids()[id][0]
-        twin = Servo(
-            id, first.model, first.memory.layout, self.switches, lambda: self.now, self._forget_ids, None
-        )
+        layout, switches = first.memory.layout, self.switches
+        twin = Servo(id, first.model, layout, switches, self._clock, self._forget_ids, None)
         twin.memory["baud_rate"] = twin.memory.stored[twin.memory.layout.table["baud_rate"].address] = (
             first.memory["baud_rate"]
         )
@@ -178,6 +178,9 @@ class FeetechBus:
             self._fate.live(to, self.now, self._tell)
         self.now = max(self.now, to)
 
+    def _clock(self) -> float:
+        return self.now
+
     def _tell(self, moment: float) -> None:
         self.now = moment
 
@@ -226,24 +229,29 @@ class FeetechBus:
         order = decode_sync_write(packet.parameters)
         if order is None or packet.id != BROADCAST or not order.length:
             return
+        address, rate = order.address, self.rate
         for id, data in order.items:
-            named = self._ids().get(id, _NOBODY)
-            for servo in self._hearing([*named, *self._by_second.get(id, _NOBODY)], at):
-                effects.write(servo, order.address, data, at)
+            named: Sequence[Servo] = self._ids().get(id, _NOBODY)
+            if id in self._by_second:
+                named = [*named, *self._by_second[id]]
+            if len(named) == 1:  # most are like that
+                if named[0].hears(rate, at):
+                    effects.write(named[0], address, data, at)
+                continue
+            for servo in self._hearing(named, at):
+                effects.write(servo, address, data, at)
 
     def _sync_read(self, packet: InstructionPacket, at: float) -> None:
         """One packet per listed servo, back to back, in the order of the list (FTServo_Linux, FTServo_Python)."""
         order = decode_sync_read(packet.parameters)
         if order is None or packet.id != BROADCAST or order.length > MOST:
             return
-        moment = at
+        moment, ids, rate, read = at, self._ids(), self.rate, OBEY[Instruction.READ]
+        asked = bytes((order.address, order.length))
         for id in order.ids:
-            listed = self._hearing(self._ids().get(id, _NOBODY), at)
-            servos = [servo for servo in listed if self._syncs(servo)]
+            servos = [one for one in ids.get(id, _NOBODY) if one.hears(rate, at) and self._syncs(one)]
             if servos:
-                asked = bytes((order.address, order.length))
-                answers = [(servo, OBEY[Instruction.READ](servo, asked, at) or Answer()) for servo in servos]
-                moment = self._at_once(answers, moment)
+                moment = self._at_once([(one, read(one, asked, at) or Answer()) for one in servos], moment)
             elif self.switches.sync_read_missing == "silent":
                 return
             elif self.switches.sync_read_missing == "wait":
@@ -259,11 +267,13 @@ class FeetechBus:
         for one in sorted(speaking, key=lambda pair: pair[0].id):
             at = self._at_once([one], at)
 
-    def _at_once(self, speaking: Iterable[tuple[Servo, Answer]], at: float) -> float:
+    def _at_once(self, speaking: Sequence[tuple[Servo, Answer]], at: float) -> float:
         """Each begins when its return delay is over; those who overlap garble each other. Gives the last end."""
+        if len(speaking) == 1:
+            return self._alone(*speaking[0], at)
         end = at
-        spoken = list(self._spoken(speaking, at))
-        for together in overlapping(spoken) if len(spoken) > 1 else [spoken] * len(spoken):
+        spoken = [Speech(*self._said(servo, answer, at), servo) for servo, answer in speaking]
+        for together in overlapping(spoken):
             servo = together[0].servo
             data = heard(
                 together, self._byte_time(None) / BITS, drop_unframed=self.switches.framing == "drop"
@@ -273,20 +283,27 @@ class FeetechBus:
             end = max(end, *(one.end for one in together))
         return end
 
-    def _spoken(self, speaking: Iterable[tuple[Servo, Answer]], at: float) -> Iterable[Speech[Servo]]:
-        for servo, answer in speaking:
-            id = servo.id if answer.id is None else answer.id
-            later = answer.later
-            if self.switches.reply_jitter:
-                later += self.switches.reply_jitter * self._chance.draw()
-            data = frame(id, servo.error, answer.parameters)
-            yield Speech(at + servo.return_delay + later, data, self._byte_time(servo) / BITS, servo)
+    def _alone(self, servo: Servo, answer: Answer, at: float) -> float:
+        """Nobody speaks with it, so that every byte is heard as it was sent. Gives its end."""
+        start, data, bit = self._said(servo, answer, at)
+        heappush(self._voices, Voice(start, next(self._order), data, servo, servo.lives))
+        return max(at, start + BITS * bit * len(data))
+
+    def _said(self, servo: Servo, answer: Answer, at: float) -> tuple[float, bytes, float]:
+        """When it begins, what it sends, and for how long each bit of that (s)."""
+        parameters, id, later = answer
+        if id is None:
+            id = servo.memory["id"]
+        if self.switches.reply_jitter:
+            later += self.switches.reply_jitter * self._chance.draw()
+        data = frame(id, servo.error, parameters)
+        return at + servo.return_delay + later, data, self._byte_time(servo) / BITS
 
     def _byte_time(self, servo: Servo | None) -> float:
         """Seconds of a byte on the wire: ten bits."""
         return 10 / (self.rate or (servo and servo.baud_rate) or _USUAL_RATE)
 
-    def _hearing(self, servos: Iterable[Servo], at: float) -> Iterable[Servo]:
+    def _hearing(self, servos: Iterable[Servo], at: float) -> list[Servo]:
         return [servo for servo in servos if servo.hears(self.rate, at)]
 
     def _ids(self) -> dict[int, list[Servo]]:

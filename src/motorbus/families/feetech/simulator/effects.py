@@ -5,7 +5,8 @@ Each function takes the servo and the moment. Who observed it is said with each;
 
 from __future__ import annotations
 
-from typing import Final
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.settings import DECIDES_MOTION
@@ -15,6 +16,32 @@ _CALIBRATE: Final = 128
 _COUNTS: Final = frozenset({"operating_mode", "homing_offset"})
 _FACES: Final = frozenset({"phase", "angular_resolution"})
 _LIMITS: Final = frozenset({"min_position_limit", "max_position_limit"})
+
+
+class Concerned(NamedTuple):
+    """What a write of some rows has to do with: these are looked at in this order, whatever was written."""
+
+    identity: bool
+    torque: bool
+    faces: bool
+    counts: bool
+    limits: bool
+    goal: bool
+    motion: bool
+
+
+@lru_cache(maxsize=1024)
+def concerned(names: frozenset[str]) -> Concerned:
+    """What a write of these rows concerns; hosts write the same ones again and again."""
+    return Concerned(
+        identity="id" in names or "second_id" in names,
+        torque="torque_enable" in names,
+        faces=bool(names & _FACES),
+        counts=bool(names & _COUNTS),
+        limits=bool(names & _LIMITS),
+        goal="goal_position" in names,
+        motion=bool(names & DECIDES_MOTION),
+    )
 
 
 def write(servo: Servo, address: int, data: bytes, at: float) -> float:
@@ -44,29 +71,29 @@ def action(servo: Servo, at: float) -> float:
 
 def _react(servo: Servo, names: frozenset[str], torque: int, at: float) -> None:
     """Do what a write of these rows orders; `torque` is the torque switch before it."""
-    memory, control = servo.memory, servo.model.control
-    if "id" in names or "second_id" in names:
+    memory, control, about = servo.memory, servo.model.control, concerned(names)
+    if about.identity:
         servo.renamed()
     if (
-        "torque_enable" in names
+        about.torque
         and memory["torque_enable"] == _CALIBRATE
         and control.middle is Middle.SWITCH  # elsewhere 128 is a number that means nothing
     ):
         memory["torque_enable"] = torque  # an order and no state; what 40 reads afterwards is not known
         calibrate(servo, control.turn // 2, at)
         return
-    if "torque_enable" in names and not memory["torque_enable"]:
+    if about.torque and not memory["torque_enable"]:
         servo.protection.torque_off()
-    if names & _FACES:
+    if about.faces:
         servo.face(at)
-    if names & _COUNTS or (names & _LIMITS and not control.modes):  # there the limits decide about the mode
+    if about.counts or (about.limits and not control.modes):  # there the limits decide about the mode
         servo.count_anew(at)
-    ordered = "goal_position" in names and servo.mode in (Mode.POSITION, Mode.STEP)
-    if ordered and _goal_enables(servo):
+    mode = servo.mode if about.goal else None
+    if mode in (Mode.POSITION, Mode.STEP) and memory["torque_enable"] != 1 and _goal_enables(servo):
         memory["torque_enable"] = 1
-    if ordered and servo.mode is Mode.STEP:
+    if mode is Mode.STEP:
         servo.step(at)
-    elif names & DECIDES_MOTION:
+    elif about.motion:
         servo.move(at)
 
 

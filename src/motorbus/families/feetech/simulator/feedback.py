@@ -15,10 +15,6 @@ from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.table import AMPERE, tells_current
 
 
-def _position(servo: Servo, at: float) -> int:
-    return servo.position(at)
-
-
 def _velocity(servo: Servo, at: float) -> int:
     return round(servo.facing * servo.motion.velocity(at) / servo.asked.unit)
 
@@ -63,7 +59,7 @@ def _current(servo: Servo, at: float) -> int:
 
 FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(
     {
-        "present_position": _position,
+        "present_position": Servo.position,
         "present_velocity": _velocity,
         "present_load": _load,
         "present_voltage": _voltage,
@@ -80,7 +76,12 @@ FEEDBACK: Final[Mapping[str, Callable[[Servo, float], int]]] = MappingProxyType(
 
 def read(servo: Servo, address: int, count: int, at: float) -> bytes:
     """The bytes a READ gets."""
-    for row in servo.memory.layout.touched(address, count):
-        if row.name in FEEDBACK:
-            servo.memory[row.name] = FEEDBACK[row.name](servo, at)
-    return servo.memory.read(address, count)
+    memory = servo.memory
+    asked = memory.layout.told.get((address, count))
+    if asked is None:
+        rows = [row.name for row in memory.layout.touched(address, count)]
+        asked = tuple((name, FEEDBACK[name]) for name in rows if name in FEEDBACK)
+        memory.layout.told[address, count] = asked
+    for name, tell in asked:
+        memory.tell(name, tell(servo, at))
+    return memory.read(address, count)

@@ -8,7 +8,7 @@ recovery tool for STS3215); how these are shared among its cells was not: here t
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
 from math import inf
 from typing import Final, NamedTuple
@@ -32,6 +32,8 @@ class Flash:
     `torn`   what a cell holds whose commit was cut: "old", "new" or "erased"
     """
 
+    __slots__ = ("_begun_at", "_cells", "_clock", "_done", "_waiting", "_wear", "time", "torn")
+
     def __init__(
         self,
         cells: bytes,
@@ -44,7 +46,7 @@ class Flash:
         self.torn = torn
         self._cells = bytearray(cells)
         self._wear: Counter[int] = Counter()
-        self._waiting: deque[Commit] = deque()
+        self._waiting: list[Commit] = []
         self._done = 0
         self._begun_at = -inf  # when the first of those that wait began, or the last of all was done
         self._clock = clock
@@ -60,6 +62,11 @@ class Flash:
         """How often each cell has been programmed."""
         self._settle()
         return self._wear
+
+    @property
+    def works(self) -> bool:
+        """Whether anything may still be to come: False is certain."""
+        return bool(self._waiting)
 
     @property
     def commits(self) -> list[Commit]:
@@ -128,7 +135,7 @@ class Flash:
     def _settle(self) -> None:
         now = self._clock()
         while self._waiting and self._waiting[0].moment <= now:
-            commit = self._waiting.popleft()
+            commit = self._waiting.pop(0)
             self._cells[commit.address] = commit.value
             self._wear[commit.address] += 1
             self._begun_at = commit.moment

@@ -29,6 +29,8 @@ class Answer(NamedTuple):
 
 def _busy(servo: Servo, at: float) -> float:
     """How much later (s) it answers because its EEPROM is at work (feetech-cli: a burst follows)."""
+    if not servo.memory.flash.works:
+        return 0.0
     return servo.storing(at) if servo.switches.while_storing == "buffer" else 0.0
 
 
@@ -39,7 +41,7 @@ def _ping(servo: Servo, parameters: bytes, at: float) -> Answer | None:
 def _read(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) != 2 or parameters[1] > MOST:
         return None
-    return Answer(feedback.read(servo, parameters[0], parameters[1], at), later=_busy(servo, at))
+    return Answer(feedback.read(servo, parameters[0], parameters[1], at), None, _busy(servo, at))
 
 
 def _write(servo: Servo, parameters: bytes, at: float) -> Answer | None:

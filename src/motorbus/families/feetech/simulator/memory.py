@@ -9,16 +9,49 @@ written is dropped without a word. What is stored is stored cell by cell and tak
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
 
 from motorbus.core.entry import Coding, Entry, Storage, Table
 from motorbus.families.feetech.simulator.flash import Commit, Flash
 from motorbus.families.feetech.table import BAUD_CODES
 
 SIZE = 256
+Tell: TypeAlias = Callable[[Any, float], int]
+"""Works out what a row says of a servo at a moment."""
 _IDS = 254
 """0 to 253; 254 means all and 255 is the head of a packet."""
+
+
+class Written(NamedTuple):
+    """What a write did: the names of the rows it changed or repeated, and whether it goes to the EEPROM."""
+
+    names: frozenset[str]
+    stored: bool
+
+
+class Span(NamedTuple):
+    """What a write of some bytes in a row can do, whatever they are.
+
+    `pieces`  from which address on, and which of the bytes: of those from `begin` to before `end`
+    `cells`   the addresses of those that belong to the EEPROM, in order
+    `lives`   what is told of it when nothing of it is stored
+    `keeps`   what is told of it when its cells are stored
+    """
+
+    pieces: tuple[tuple[int, int, int], ...]
+    cells: tuple[int, ...]
+    lives: Written
+    keeps: Written
+
+
+class Word(NamedTuple):
+    """Where the low and the high byte of a row of two bytes are, and which bits are its magnitude and its sign."""
+
+    low: int
+    high: int
+    magnitude: int
+    sign: int
 
 
 class Layout:
@@ -27,6 +60,10 @@ class Layout:
     def __init__(self, table: Table, defaults: Mapping[str, int]) -> None:
         self.table = table
         self._touched: dict[tuple[int, int], tuple[Entry, ...]] = {}
+        self._spans: dict[tuple[int, int], Span] = {}
+        self.told: dict[
+            tuple[int, int], tuple[tuple[str, Tell], ...]
+        ] = {}  # `feedback` keeps its answers here
         self.rows: list[Entry | None] = [None] * SIZE
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
@@ -36,7 +73,10 @@ class Layout:
             for entry in table.values()
             if entry.size == 1 and entry.coding is Coding.UNSIGNED
         }
+        self.words = {entry.name: _word(entry) for entry in table.values() if _is_word(entry)}
+        self.scales = {entry.name: entry.scale for entry in table.values()}
         self.factory = bytes(_image(table, defaults))
+        self._lasting = [address for address in range(SIZE) if self.keeps(address)]
 
     def keeps(self, address: int) -> bool:
         """Whether this byte survives a power cycle."""
@@ -51,26 +91,38 @@ class Layout:
             known = self._touched[address, count] = tuple(self.table[name] for name in found)
         return known
 
+    def span(self, address: int, count: int) -> Span:
+        """What a write of so many bytes to this address can do."""
+        known = self._spans.get((address, count))  # hosts write to the same ranges again and again
+        if known is None:
+            known = self._spans[address, count] = _span(self.touched(address, count), address, count)
+        return known
 
-class Written(NamedTuple):
-    """What a write did: the names of the rows it changed or repeated, and whether it goes to the EEPROM."""
-
-    names: frozenset[str]
-    stored: bool
+    def begun(self, stored: bytearray) -> bytearray:
+        """The live bytes when the supply comes: what lasts as it is stored, the rest as at first."""
+        live = bytearray(self.factory)
+        for address in self._lasting:
+            live[address] = stored[address]
+        return live
 
 
 class Memory:
-    """256 bytes, live and stored.
+    """256 bytes, live and stored; there are as many of these as servos, so each is kept small.
 
     `flash`        the cells of the EEPROM; without one of them storing takes no time
+    `settled`      nothing but feedback has changed since whoever works with the registers has set this
     `lock_drops`   closing the lock drops what is not committed yet; else it is finished, since it was accepted
     """
+
+    # With "__dict__", which costs nothing until then, a test may put a method of its own in.
+    __slots__ = ("__dict__", "flash", "layout", "live", "lock_drops", "settled")
 
     def __init__(self, layout: Layout, flash: Flash | None = None, *, lock_drops: bool = False) -> None:
         self.layout = layout
         self.live = bytearray(layout.factory)
         self.flash = flash or Flash(layout.factory)
         self.lock_drops = lock_drops
+        self.settled = False
 
     @property
     def stored(self) -> bytearray:
@@ -89,29 +141,62 @@ class Memory:
 
     def __getitem__(self, name: str) -> int:
         """The raw value of a row."""
-        plain = self.layout.plain.get(name)  # most rows are one byte, and each packet asks for ten of them
+        layout, live = self.layout, self.live
+        plain = layout.plain.get(name)  # most rows are one byte, and each packet asks for ten of them
         if plain is not None:
-            return self.live[plain]
-        entry = self.layout.table[name]
+            return live[plain]
+        word = layout.words.get(name)
+        if word is not None:
+            low, high, magnitude, sign = word
+            code = live[low] | live[high] << 8
+            return -(code & magnitude) if code & sign else code & magnitude
+        entry = layout.table[name]
         return entry.decode(bytes(self.live[entry.address : entry.address + entry.size]))
 
     def __setitem__(self, name: str, raw: int) -> None:
         """Set the live value as the servo itself does: no lock, no access right; what does not fit is cut."""
-        entry = self.layout.table[name]
+        self.settled = False
+        self.tell(name, raw)
+
+    def tell(self, name: str, raw: int) -> None:
+        """The same for feedback, which nothing that the servo does depends on."""
+        layout = self.layout
+        word, plain = layout.words.get(name), layout.plain.get(name)
+        if word is not None and 0 <= raw <= word.magnitude:
+            self.live[word.low], self.live[word.high] = raw & 0xFF, raw >> 8
+            return
+        if plain is not None and 0 <= raw <= 0xFF:
+            self.live[plain] = raw
+            return
+        entry = layout.table[name]
         self.live[entry.address : entry.address + entry.size] = code(entry, raw)
 
     def read(self, address: int, count: int) -> bytes:
         """Live bytes; where no register is, and beyond the last address, there are zeros."""
-        return bytes(self.live[address : address + count]).ljust(count, b"\0")
+        found = bytes(self.live[address : address + count])
+        return found if len(found) == count else found.ljust(count, b"\0")
 
     def write(self, address: int, data: bytes, *, locked: bool, strict: bool = False) -> Written:
         """Write what may be written. `strict` drops values outside the range of their row."""
+        self.settled = False
+        if strict:
+            return self._write_fitting(address, data, locked)
+        span, live = self.layout.span(address, len(data)), self.live
+        for place, begin, end in span.pieces:
+            live[place : place + end - begin] = data[begin:end]
+        stored = bool(span.cells) and not locked
+        if stored:
+            self.flash.program([(cell, live[cell]) for cell in span.cells])
+        if self.lock_drops:
+            self._close(span.lives.names)
+        return span.keeps if stored else span.lives
+
+    def _write_fitting(self, address: int, data: bytes, locked: bool) -> Written:
+        """Row by row, without those whose value is outside its range."""
         names = []
         cells: list[tuple[int, int]] = []
         for entry in self.layout.touched(address, len(data)):
-            if not entry.writable or entry.storage is Storage.FACTORY:
-                continue
-            if strict and not self._fits(entry, address, data):
+            if not _takes(entry) or not self._fits(entry, address, data):
                 continue
             names.append(entry.name)
             changed = self._put(entry, address, data)
@@ -119,9 +204,14 @@ class Memory:
                 cells += changed
         if cells:
             self.flash.program(cells)
-        if self.lock_drops and "lock" in names and self["lock"]:
-            self.flash.drop()
+        if self.lock_drops:
+            self._close(frozenset(names))
         return Written(frozenset(names), bool(cells))
+
+    def _close(self, names: frozenset[str]) -> None:
+        """A lock that was closed by a write of these drops what is not committed yet."""
+        if "lock" in names and self["lock"]:
+            self.flash.drop()
 
     def store(self, name: str) -> None:
         """Make the live value of a row survive a power cycle."""
@@ -146,6 +236,7 @@ class Memory:
 
     def restore_factory(self, keep: frozenset[str], time: float = 0.0) -> None:
         """Everything as shipped but the rows named; storing that takes so many seconds."""
+        self.settled = False
         cells: list[tuple[int, int]] = []
         for entry in self.layout.table.values():
             if entry.name in keep or entry.storage is Storage.FACTORY:
@@ -157,9 +248,8 @@ class Memory:
         self.flash.program(cells, time)
 
     def _begin(self, stored: bytearray) -> None:
-        for address in range(SIZE):
-            keeps = self.layout.keeps(address)
-            self.live[address] = stored[address] if keeps else self.layout.factory[address]
+        self.settled = False
+        self.live[:] = self.layout.begun(stored)
 
     def _cells(self, entry: Entry) -> list[tuple[int, int]]:
         return [(place, self.live[place]) for place in range(entry.address, entry.address + entry.size)]
@@ -177,6 +267,40 @@ class Memory:
         return (
             entry.low <= entry.decode(bytes(after[entry.address : entry.address + entry.size])) <= entry.high
         )
+
+
+def _takes(entry: Entry) -> bool:
+    """Whether a host can write this row."""
+    return entry.writable and entry.storage is not Storage.FACTORY
+
+
+def _span(rows: tuple[Entry, ...], address: int, count: int) -> Span:
+    pieces: list[tuple[int, int, int]] = []
+    cells: list[int] = []
+    names = frozenset(row.name for row in rows if _takes(row))
+    for row in rows:
+        if row.name not in names:
+            continue
+        first, behind = max(row.address, address), min(row.address + row.size, address + count)
+        if row.storage is Storage.EEPROM:
+            cells += range(first, behind)
+        if pieces and pieces[-1][0] - pieces[-1][1] + pieces[-1][2] == first:
+            first = pieces.pop()[0]  # it goes on where the last one ends
+        pieces.append((first, first - address, behind - address))
+    return Span(tuple(pieces), tuple(cells), Written(names, False), Written(names, True))
+
+
+def _is_word(entry: Entry) -> bool:
+    return entry.size == 2 and entry.coding is not Coding.TWOS_COMPLEMENT
+
+
+def _word(entry: Entry) -> Word:
+    low, high = entry.address, entry.address + 1
+    if entry.order != "little":
+        low, high = high, low
+    if entry.coding is Coding.SIGN_MAGNITUDE and entry.sign_bit is not None:
+        return Word(low, high, (1 << entry.sign_bit) - 1, 1 << entry.sign_bit)
+    return Word(low, high, 0xFFFF, 0)
 
 
 def code(entry: Entry, raw: int) -> bytes:

@@ -27,8 +27,9 @@ class Settings(NamedTuple):
     """What the registers ask for, in counts and seconds.
 
     `torque`        share of the stall torque that the motor may give; `burden` what the outside takes of it
-    `mode`          None: a number that nobody explains
     `goal`          raw, as written; `low` and `high` bound it unless `endless`; `turns`: whether over many turns
+    `zero`          the place of the encoder that reads 0; one turn has `turn` counts
+    `mode`          None: a number that nobody explains
     `duty`          share of the supply, signed, positive towards greater counts
     `current`       the goal of constant current mode as a share of the stall current, signed
     `velocity`      goal velocity, signed; `fastest`: a velocity of 0 means as fast as it can
@@ -41,8 +42,9 @@ class Settings(NamedTuple):
 
     torque: float = 0.0
     burden: float = 0.0
-    mode: Mode | None = Mode.POSITION
     goal: int = 0
+    zero: int = 0
+    mode: Mode | None = Mode.POSITION
     low: int = 0
     high: int = 4095
     endless: bool = False
@@ -55,9 +57,13 @@ class Settings(NamedTuple):
     acceleration: float = 25_400.0
     runs_away: bool = False
     told: bool = False
-    zero: int = 0
     turn: int = 4096
     fold: int = 1
+
+
+def settings(asked: Settings, torque: float, burden: float, goal: int, zero: int) -> Settings:
+    """What the registers ask for, with what changes from one movement to the next in the place of the first four."""
+    return Settings._make((torque, burden, goal, zero, *asked[4:]))
 
 
 def reading(encoder: float, zero: int, told: bool, turn: int, fold: int = 1) -> int:
@@ -87,7 +93,7 @@ def mirrored(motion: Motion) -> Motion:
 
 def plan(settings: Settings, motion: Motion, at: float, drive: Drive, switches: Switches) -> Motion:
     """The movement these settings ask for from this moment on, taking over from `motion`."""
-    encoder, velocity = motion.position(at), motion.velocity(at)
+    encoder, velocity, _ = motion.state(at)
     mode = settings.mode
     if settings.torque < FEEBLE or mode is None:
         return rest(at, encoder)  # limp: a gear of 1:345 holds by its friction

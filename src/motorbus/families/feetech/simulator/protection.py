@@ -35,6 +35,8 @@ _NOTHING: Final = (Load(-inf, inf, 0.0, 0.0, 0.0, 0.0),)
 class Watch:
     """A limit that must be exceeded for some time without a break; `since` is when that began, None when it is kept."""
 
+    __slots__ = ("since",)
+
     def __init__(self) -> None:
         self.since: float | None = None
 
@@ -93,6 +95,12 @@ class Protection:
     `error` has the alarm bits of that: overload and current are latched, heat lasts until it has cooled. `next` is the
     moment to call `fire` at.
     """
+
+    __slots__ = (
+        "__dict__",  # costs nothing until a test puts a method of its own in
+        *("error", "next", "_memory", "_switches", "_ambient", "_degrees", "_start", "_loads", "_quiet"),
+        *("_by_duty", "_watches", "_has"),
+    )
 
     def __init__(self, memory: Memory, switches: Switches) -> None:
         self.error = 0
@@ -161,6 +169,8 @@ class Protection:
     def changed(self, at: float, loads: Iterable[Load] | None) -> None:
         """From this moment on the motor does this; None: nothing that heats it or that it could trip over."""
         self._roll(at)
+        if loads is None and self._quiet and not self.error & HEAT:
+            return  # it was so before
         self._loads = [] if loads is None else list(loads)
         if not self._loads:
             self._keep_limits()
@@ -186,7 +196,7 @@ class Protection:
         if not self._by_duty or not self._has[OVERLOAD]:
             return True
         limit = self._number("overload_torque") * drive.top_speed
-        return not limit or all(abs(stretch.velocity) <= limit for stretch in motion.stretches())
+        return not limit or motion.peak <= limit
 
     def _roll(self, at: float) -> None:
         """Bring everything that has a history to this moment."""
@@ -244,4 +254,4 @@ class Protection:
 
     def _number(self, name: str) -> float:
         """The value of a row in its unit."""
-        return self._memory[name] * self._memory.layout.table[name].scale
+        return self._memory[name] * self._memory.layout.scales[name]

@@ -19,7 +19,7 @@ from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.protection import OVERLOAD
 from motorbus.families.feetech.simulator.settings import Asked, Registers
 from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, Mode, alarms
+from motorbus.families.feetech.table import Mode, alarms
 
 _VOLTAGE = 0x01
 
@@ -39,6 +39,11 @@ class Servo(Body):
                    `fold` counts of the encoder make one of a position
     `deaf_until`   it hears nothing before this moment
     """
+
+    __slots__ = (
+        *("lives", "pending", "zero", "facing", "fold", "deaf_until", "renamed"),
+        *("_registers", "_alarm", "_may_be_blind"),
+    )
 
     def __init__(
         self,
@@ -60,8 +65,7 @@ class Servo(Body):
         self.deaf_until = -inf
         self.renamed = renamed
         self._alarm = 0
-        self._all_codes = switches.baud_codes == "all"
-        self._delays = "return_delay" in model.table and switches.return_delay == "heed"
+        self._may_be_blind = switches.wrong_bridge == "blind"
         # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
         for name in ("id", "second_id"):
             if name in model.table:
@@ -184,20 +188,12 @@ class Servo(Body):
     @property
     def baud_rate(self) -> int | None:
         """The rate it is set to, in bit/s; None for a code that means nothing: it hears nobody."""
-        code = self.memory["baud_rate"]
-        return (
-            BAUD_CODES.get(code) if self._all_codes or code in BAUD_CODES_OF[self.model.table.name] else None
-        )
+        return self._registers.asked.rate
 
     @property
     def return_delay(self) -> float:
-        """Seconds between the end of a request and the beginning of the reply: register 7 in 2 µs.
-
-        SMS: values below 50 act as 50 (FEETECH page on SMS servos). HLS has its second id there, and no delay.
-        """
-        if self._delays:
-            return max(self.memory["return_delay"] * 2e-6, self.model.personality.least_delay)
-        return self.model.personality.least_delay
+        """Seconds between the end of a request and the beginning of the reply."""
+        return self._registers.asked.delay
 
     @property
     def locked(self) -> bool:
@@ -207,20 +203,22 @@ class Servo(Body):
     @property
     def told_voltage(self) -> int:
         """What register 62 says of its supply, in 0.1 V."""
-        return 0 if self.switches.wrong_bridge == "blind" and self.asked.blind else round(self.voltage * 10)
+        if self._may_be_blind and self.asked.blind:
+            return 0
+        return round(self.voltage * 10) if self._sag else self._told_voltage
 
     @property
     def error(self) -> int:
         """The error byte of its status packets, which register 65 repeats: alarms and nothing else."""
-        memory, bits = self.memory, self._alarm | self.protection.error
-        if not memory["min_voltage"] <= self.told_voltage <= memory["max_voltage"]:
-            bits |= _VOLTAGE
-        return bits
+        least, most = self._registers.asked.volts
+        bits = self._alarm | self.protection.error
+        return bits if least <= self.told_voltage <= most else bits | _VOLTAGE
 
     def hears(self, rate: int | None, at: float) -> bool:
         """Whether it is there, awake and set to this rate (None: whichever it is)."""
-        awake = self.plugged and at >= self.deaf_until and self.fed(at)
-        return awake and (rate is None or rate == self.baud_rate)
+        if not self.plugged or at < self.deaf_until or (self._sag and not self.fed(at)):
+            return False
+        return rate is None or rate == self._registers.asked.rate
 
     # What it does.
 
@@ -240,12 +238,18 @@ class Servo(Body):
 
         Supply, torque on, no alarm that unloads it, torque limit and current cap: this is the one place for them.
         """
-        memory, unloading = self.memory, self.error
+        return self._available(self.asked.limit)
+
+    def _available(self, limit: float) -> float:
+        """The same, by the share that the registers allow."""
+        if not self.plugged or self.memory["torque_enable"] != 1:
+            return 0.0
+        unloading = self.error
+        if not unloading:
+            return min(limit, 1.0)
         if self.tripped and not self._alarm & OVERLOAD:
             unloading &= ~OVERLOAD  # it leaves a part of the torque
-        if not self.plugged or memory["torque_enable"] != 1 or unloading & memory["unload_mask"]:
-            return 0.0
-        return min(self.asked.limit, self.protection.left)
+        return 0.0 if unloading & self.memory["unload_mask"] else min(limit, self.protection.left)
 
     @property
     def strong(self) -> bool:
@@ -255,7 +259,9 @@ class Servo(Body):
     @property
     def burden(self) -> float:
         """What the outside takes of the stall torque just now: nothing of a limp servo."""
-        available = self.available if self.torque else 0.0
+        if not self._world.torque:
+            return 0.0
+        available = self.available
         return max(-available, min(available, self.torque)) if available >= motor.FEEBLE else 0.0
 
     def encoder(self, at: float) -> float:
@@ -264,9 +270,9 @@ class Servo(Body):
 
     def position(self, at: float) -> int:
         """The present position in counts, as it says it."""
-        return motor.reading(
-            self.encoder(at), self.zero, self.asked.settings.told, self.model.turn, self.fold
-        )
+        settings = self._registers.asked.settings
+        encoder = self.facing * self.motion.state(at)[0]
+        return motor.reading(encoder, self.zero, settings.told, settings.turn, self.fold)
 
     def arrived(self, at: float) -> bool:
         """Whether it is where its goal is, within the dead band of its position."""
@@ -283,7 +289,7 @@ class Servo(Body):
 
     def _go(self, planned: motor.Planner, at: float) -> None:
         self.protection.weigh(at)
-        wanted, motion = self._wanted(), self.motion
+        wanted, motion = self._wanted(self.asked), self.motion
         if self.facing > 0:
             self.bear(lambda drive: planned(wanted, motion, at, drive, self.switches), wanted, at)
         else:
@@ -295,12 +301,10 @@ class Servo(Body):
                 lambda drive: motor.mirrored(planned(wanted, before, at, drive, self.switches)), turned, at
             )
 
-    def _wanted(self) -> motor.Settings:
-        return self.asked.settings._replace(
-            torque=self.available,
-            burden=self.facing * self.burden,
-            goal=self.memory["goal_position"],
-            zero=self.zero,
+    def _wanted(self, asked: Asked) -> motor.Settings:
+        goal = self.memory["goal_position"]
+        return motor.settings(
+            asked.settings, self._available(asked.limit), self.facing * self.burden, goal, self.zero
         )
 
     def face(self, at: float) -> None:

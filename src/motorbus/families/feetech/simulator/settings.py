@@ -13,7 +13,15 @@ from motorbus.families.feetech.simulator.memory import Memory
 from motorbus.families.feetech.simulator.model import Model
 from motorbus.families.feetech.simulator.motor import Settings
 from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.table import AMPERE, Mode, mode_of, velocity_scale, zero_is_maximum
+from motorbus.families.feetech.table import (
+    AMPERE,
+    BAUD_CODES,
+    BAUD_CODES_OF,
+    Mode,
+    mode_of,
+    velocity_scale,
+    zero_is_maximum,
+)
 from motorbus.families.feetech.table.phase import many_turns_are_told
 
 DECIDES_MOTION: Final = frozenset(
@@ -38,6 +46,9 @@ class Asked(NamedTuple):
     `unit`      counts/s for one unit of its velocity registers
     `limit`     the share of the stall torque that they allow
     `settings`  all of that for its motor; what is not in registers is left as it is
+    `rate`      bit/s; None for a code that means nothing: it hears nobody
+    `delay`     s between the end of a request and the beginning of the reply
+    `volts`     the least and the greatest supply that are no alarm, in 0.1 V
     """
 
     mode: Mode | None
@@ -47,30 +58,38 @@ class Asked(NamedTuple):
     unit: int
     limit: float
     settings: Settings
+    rate: int | None
+    delay: float
+    volts: tuple[int, int]
 
 
 class Registers:
     """The registers of one servo, as something that asks for movements."""
+
+    __slots__ = ("_after", "_asked", "_before", "_memory", "_model", "_seen", "_steps", "_switches")
 
     def __init__(self, model: Model, memory: Memory, switches: Switches) -> None:
         goal, readings = model.table["goal_position"], model.table["present_position"]
         self._model, self._memory, self._switches = model, memory, switches
         self._before = slice(goal.address)
         self._after = slice(goal.address + goal.size, readings.address)
-        self._steps = round(model.table["goal_velocity"].scale / goal.scale)  # 1, and 50 on HLS
         self._seen = bytearray(), bytearray()
+        self._steps = round(model.table["goal_velocity"].scale / goal.scale)  # 1, and 50 on HLS
         self._asked = self._work_out()
 
     @property
     def asked(self) -> Asked:
         """What they ask for at present."""
-        live = self._memory.live
-        seen = live[self._before], live[self._after]
-        if seen != self._seen:  # hosts write goals and little else, so this is rare
-            self._seen, self._asked = seen, self._work_out()
+        memory = self._memory
+        if not memory.settled:
+            live, (before, after) = memory.live, self._seen
+            if not (live.startswith(before) and live.startswith(after, self._after.start)):
+                self._asked = self._work_out()  # hosts write goals and little else, so this is rare
+            memory.settled = True
         return self._asked
 
     def _work_out(self) -> Asked:
+        self._seen = self._memory.live[self._before], self._memory.live[self._after]
         memory, switches, model = self._memory, self._switches, self._model
         phase, name = memory["phase"], model.table.name
         low, high = self._limits()
@@ -95,7 +114,23 @@ class Registers:
             turn=model.turn,
             fold=fold,
         )
-        return Asked(mode, facing, fold, self._blind(), unit, self._limit(mode), settings)
+        limit, volts = self._limit(mode), (memory["min_voltage"], memory["max_voltage"])
+        blind, rate, delay = self._blind(), self._rate(), self._delay()
+        return Asked(mode, facing, fold, blind, unit, limit, settings, rate, delay, volts)
+
+    def _rate(self) -> int | None:
+        code, known = self._memory["baud_rate"], BAUD_CODES_OF[self._model.table.name]
+        return BAUD_CODES.get(code) if self._switches.baud_codes == "all" or code in known else None
+
+    def _delay(self) -> float:
+        """Register 7 in 2 µs.
+
+        SMS: values below 50 act as 50 (FEETECH page on SMS servos). HLS has its second id there, and no delay.
+        """
+        least = self._model.personality.least_delay
+        if "return_delay" in self._model.table and self._switches.return_delay == "heed":
+            return max(self._memory["return_delay"] * 2e-6, least)
+        return least
 
     def _mode(self) -> Mode | None:
         control, switches = self._model.control, self._switches

@@ -7,12 +7,17 @@ is not lost. What may still become a packet waits (at most 258 bytes); `flush` s
 Each byte ends in exactly one event. Noise is "checksum" for the bytes of a whole packet whose checksum is
 wrong, else "framing". How the stream was cut changes neither packets nor these words, only whether a run of
 noise comes in one piece.
+
+Much at once, as a capture has it, is not walked through packet by packet: `tiles` cuts all of it, and only where a
+tile is no sound packet the search begins, which gives the same events.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
-from typing import Generic, Literal, TypeAlias, TypeVar
+from itertools import accumulate
+from typing import Final, Generic, Literal, TypeAlias, TypeVar
 
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
 from motorbus.families.feetech.wire.packets import (
@@ -25,10 +30,15 @@ from motorbus.families.feetech.wire.packets import (
     StatusPacket,
     is_sound,
 )
+from motorbus.families.feetech.wire.tiles import sound_until, tiles
 
 P = TypeVar("P")
 Direction: TypeAlias = Literal["status", "instruction"]
 Packet: TypeAlias = StatusPacket | InstructionPacket
+Run: TypeAlias = "list[bytes] | Noise"
+"""Whole packets in a row, or what lies between two of them."""
+MUCH: Final = 512
+"""Bytes; a bus that is spoken to never has so many at once, and what is prepared for many costs more for few."""
 
 
 class Stream(Generic[P]):
@@ -52,8 +62,8 @@ class Stream(Generic[P]):
         if self._rest:
             data = self._rest + data
         events: list[P | Noise] = []
-        if self._suspect:
-            return self._split(data, events, more=True)
+        if self._suspect or len(data) >= MUCH:
+            return self._made(self._cut(data, more=True))
         start, end, make, top = 0, len(data), self._make, self._top
         while end - start >= OVERHEAD:
             stop = start + data[start + 3] + 4
@@ -67,15 +77,54 @@ class Stream(Generic[P]):
         if start == end:
             self._rest = b""
             return events
-        return self._split(data[start:], events, more=True)
+        return events + self._made(self._cut(data[start:], more=True))
 
     def flush(self) -> list[P | Noise]:
         """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
-        return self._split(self._rest, [], more=False) if self._rest else []
+        return self._made(self.rest())
 
-    def _split(self, data: bytes, events: list[P | Noise], more: bool) -> list[P | Noise]:
-        """Search for packets, and tell what is found behind the `events` before."""
-        noise = position = 0  # what lies between the two is noise, not yet told
+    def runs(self, data: bytes) -> list[Run]:
+        """As `feed`, but packets as they are and all that follow one another in one list: for much at once."""
+        return self._cut(self._rest + data if self._rest else data, more=True)
+
+    def rest(self) -> list[Run]:
+        """As `flush`, in runs."""
+        return self._cut(self._rest, more=False)
+
+    def _made(self, runs: list[Run]) -> list[P | Noise]:
+        events: list[P | Noise] = []
+        for run in runs:
+            if isinstance(run, Noise):
+                events.append(run)
+            else:
+                events += map(self._make, run)
+        return events
+
+    def _cut(self, data: bytes, more: bool) -> list[Run]:
+        """Take the tiles that are sound packets as they are, and search where one is not until one is again."""
+        pieces = tiles(data, self._top) if len(data) >= MUCH else []
+        until = sound_until(pieces)
+        index = 0 if self._suspect else until(0)
+        if index and index == len(pieces):
+            self._rest = b""
+            return [pieces]
+        starts = [*accumulate(map(len, pieces), initial=0)]
+        runs: list[Run] = [pieces[:index]] if index else []
+        position = starts[index]
+        while (start := self._search(data, position, runs, more)) >= 0:
+            position, index = start, bisect_left(starts, start)
+            end = until(index) if starts[index : index + 1] == [start] else index
+            if end > index:
+                runs.append(pieces[index:end])
+                position = starts[end]
+            else:
+                position += data[start + 3] + 4
+                runs.append([data[start:position]])
+        return runs
+
+    def _search(self, data: bytes, position: int, runs: list[Run], more: bool) -> int:
+        """Where the next packet begins, all before it told; -1 when there is none, what may become one kept."""
+        noise = position  # what lies between the two is noise, not yet told
         end = len(data)
         while (start := data.find(HEADER, position)) >= 0:
             size = self._size(data, start)
@@ -85,18 +134,16 @@ class Stream(Generic[P]):
             position = start + 1 if size else _behind(data, start)
             if not size or start + size > end:
                 continue
-            if is_sound(packet := data[start : start + size]):
-                self._tell(events, data[noise:start])
-                events.append(self._make(packet))
+            if is_sound(data[start : start + size]):
+                self._tell(runs, data[noise:start])
                 self._suspect = 0
-                noise = position = start + size
-            else:
-                noise = self._doubt(events, data, noise, start, size)
+                return start
+            noise = self._doubt(runs, data, noise, start, size)
         else:
             position = end - 1 if more and position < end and data[-1] == 0xFF else end
-        self._tell(events, data[noise:position])
+        self._tell(runs, data[noise:position])
         self._rest = data[position:]
-        return events
+        return -1
 
     def _size(self, data: bytes, start: int) -> int:
         """How many bytes the packet at this header has (at least, when unknown yet); 0: it is none."""
@@ -107,20 +154,20 @@ class Stream(Generic[P]):
             return data[start + 3] + 4 if data[start + 3] >= 2 else 0
         return OVERHEAD
 
-    def _doubt(self, events: list[P | Noise], data: bytes, noise: int, start: int, size: int) -> int:
+    def _doubt(self, runs: list[Run], data: bytes, noise: int, start: int, size: int) -> int:
         """A whole packet with a wrong checksum: from where on noise is not yet told."""
         if start - noise >= self._suspect:
-            self._tell(events, data[noise:start])
+            self._tell(runs, data[noise:start])
             noise = start
         self._suspect = max(self._suspect, start + size - noise)
         return noise
 
-    def _tell(self, events: list[P | Noise], noise: bytes) -> None:
+    def _tell(self, runs: list[Run], noise: bytes) -> None:
         bad, stray = noise[: self._suspect], noise[self._suspect :]
         if bad:
-            events.append(Noise(bad, "checksum"))
+            runs.append(Noise(bad, "checksum"))
         if stray:
-            events.append(Noise(stray, "framing"))
+            runs.append(Noise(stray, "framing"))
         self._suspect -= len(bad)
 
 

@@ -157,6 +157,11 @@ class Ear:
         self._formats = formats
         self._memory = memory
 
+    @property
+    def held(self) -> int:
+        """A frame is an event, so nothing ever waits."""
+        return self._receiver.held
+
     def feed(self, data: Data, /) -> list[Event]:
         """Take one frame; give what it is."""
         events = self._receiver.feed(data)

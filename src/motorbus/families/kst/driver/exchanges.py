@@ -70,6 +70,18 @@ def upload(
     def read(answer: Answer) -> T:
         return take(told(node, answer, index, subindex))
 
+    return _upload(node, index, subindex, read, rank, timeout, tells_position)
+
+
+def _upload(
+    node: Node,
+    index: int,
+    subindex: int,
+    read: Callable[[Answer], T],
+    rank: Rank = Rank.POLL,
+    timeout: Timeout = Timeout.REPLY,
+    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
+) -> Exchange[T]:
     return Exchange(
         wire.encode_upload(node.node, index, subindex, extended=node.dialect.extended(node.node)),
         (wire.upload_due(node.node, index, subindex),),
@@ -85,10 +97,19 @@ def upload(
 def upload_row(
     node: Node, row: Entry, take: Callable[[int], T], *, tells_position: bool = False
 ) -> Exchange[T]:
-    """Read a row of the table; the value is what `take` makes of its raw value."""
+    """Read a row of the table; the value is what `take` makes of its raw value.
 
-    def decode(reply: SdoReply) -> T:
-        return take(row.decode(sized(node, row, reply)))
+    A reply that states the length of the row is read as it is; every other one is taken apart, which gives the same.
+    """
+    index, subindex = row.address, row.subindex or 0
+    head, end = wire.usual_head(index, subindex, row.size), 4 + row.size
+
+    def read(answer: Answer) -> T:
+        data = answer.replies[0].data
+        if data[:4] == head and len(data) == wire.LENGTH:
+            node.at = answer.at
+            return take(row.decode(data[4:end]))
+        return take(row.decode(sized(node, row, told(node, answer, index, subindex))))
 
     def places(answer: Answer) -> dict[int, float]:
         reply = wire.decode_reply(answer.replies[0].data)
@@ -96,8 +117,7 @@ def upload_row(
             return {}
         return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
 
-    where = tells_position and places
-    return upload(node, row.address, row.subindex or 0, decode, tells_position=where)
+    return _upload(node, index, subindex, read, tells_position=tells_position and places)
 
 
 def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:

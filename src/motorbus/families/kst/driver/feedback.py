@@ -6,7 +6,8 @@ elsewhere. So by the profile `kst` a status is two bytes that nothing decodes, a
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import State
@@ -16,6 +17,8 @@ from motorbus.families.kst.driver.exchanges import decided, ready, upload, uploa
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.refusals import lacking
 from motorbus.families.kst.wire import SdoReply
+
+T = TypeVar("T")
 
 SAME_FRAME: Final = (
     "the manual's command 7 is the same frame as its command 6, read position: this device may be returning the "
@@ -45,17 +48,34 @@ def position(node: Node) -> Runnable[float]:
 
 def position_exchange(node: Node) -> Exchange[float]:
     """As `position`, of a servo whose id format is known: one exchange that can be kept and run again."""
+    return kept(node, "position", _position)
+
+
+def _position(node: Node) -> Exchange[float]:
     row = node.table["present_position"]
     return upload_row(node, row, lambda raw: float(row.to_value(raw)), tells_position=True)
 
 
+def kept(node: Node, name: str, make: Callable[[Node], Exchange[T]]) -> Exchange[T]:
+    """The exchange that brings this quantity: made once, and anew when the node is asked in another id format."""
+    extended = node.dialect.extended(node.node)
+    found = node.kept.get(name)
+    if found is None or found[0] is not extended:
+        found = node.kept[name] = extended, make(node)
+    return found[1]
+
+
 def status(node: Node) -> Runnable[RawStatus | Status]:
     """By the profile `kst` the two raw bytes of command 7, with a warning; else current (A) and temperature (°C)."""
-    return ready(node, raw_status if node.profile.status_row is None else _status)
+    return ready(node, raw_status if node.profile.status_row is None else _felt)
 
 
 def raw_status(node: Node) -> Exchange[RawStatus]:
     """The manual's command 7, whatever the profile: the bytes may be a position."""
+    return kept(node, "raw_status", _raw_status)
+
+
+def _raw_status(node: Node) -> Exchange[RawStatus]:
     row = node.table["present_position"]
 
     def take(reply: SdoReply) -> RawStatus:
@@ -67,13 +87,13 @@ def raw_status(node: Node) -> Exchange[RawStatus]:
 def current(node: Node) -> Runnable[float]:
     """Supply current, A. Raises RequestError where the profile has no status object."""
     _status_row(node)
-    return ready(node, lambda same: _part(same, "current"))
+    return ready(node, lambda same: kept(same, "current", _current))
 
 
 def temperature(node: Node) -> Runnable[float]:
     """Temperature inside, °C. Raises RequestError where the profile has no status object."""
     _status_row(node)
-    return ready(node, lambda same: _part(same, "temperature"))
+    return ready(node, lambda same: kept(same, "temperature", _temperature))
 
 
 def telemetry(node: Node) -> Operation[State]:
@@ -86,8 +106,12 @@ def telemetry(node: Node) -> Operation[State]:
     at = node.at
     if node.profile.status_row is None:
         return State(at=at, position=here, alarm=node.alarm)
-    felt = yield from _status(node)
+    felt = yield from _felt(node)
     return State(at=at, position=here, current=felt.current, temperature=felt.temperature, alarm=node.alarm)
+
+
+def _felt(node: Node) -> Exchange[Status]:
+    return kept(node, "status", _status)
 
 
 def _status(node: Node) -> Exchange[Status]:
@@ -97,12 +121,12 @@ def _status(node: Node) -> Exchange[Status]:
     return upload_row(node, _status_row(node), take)
 
 
-def _part(node: Node, name: str) -> Exchange[float]:
-    def take(raw: int) -> float:
-        status = Status(table.current(node.profile, raw), float(table.temperature(node.profile, raw)))
-        return float(getattr(status, name))
+def _current(node: Node) -> Exchange[float]:
+    return upload_row(node, _status_row(node), lambda raw: table.current(node.profile, raw))
 
-    return upload_row(node, _status_row(node), take)
+
+def _temperature(node: Node) -> Exchange[float]:
+    return upload_row(node, _status_row(node), lambda raw: float(table.temperature(node.profile, raw)))
 
 
 def _status_row(node: Node) -> Entry:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from motorbus.core.entry import Entry, Table, Value
+from motorbus.core.operation import Exchange
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
@@ -21,6 +22,7 @@ class Node:
 
     `at` is the arrival of its last answer on the link's clock (s); `limits` its travel limits in rad as last read,
     None when not read yet. `unsaved` names the rows that were written here and are not known to have been saved.
+    `kept` are exchanges that bring one quantity, each with the id format (True: 29 bits) in which it asks.
     """
 
     def __init__(self, node: int, dialect: Dialect = PLAIN) -> None:
@@ -29,6 +31,7 @@ class Node:
         self.limits: tuple[float, float] | None = None
         self.at = -inf
         self.unsaved: set[str] = set()
+        self.kept: Final[dict[str, tuple[bool, Exchange[Any]]]] = {}
 
     @property
     def profile(self) -> Profile:

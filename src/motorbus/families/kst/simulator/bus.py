@@ -43,6 +43,18 @@ class Voice(NamedTuple):
     life: int
 
 
+class Roster(NamedTuple):
+    """Who hears the host, in order and by id, who is there but set to another rate, and whether none hears it.
+
+    It is made anew when anybody changes, not for each frame: on a full bus of 127 that is all there would be time for.
+    """
+
+    hearing: list[Servo]
+    by_node: dict[int, list[Servo]]
+    mistuned: list[Servo]
+    alone: bool
+
+
 class KstBus:
     """A `motorbus.core.family.Simulator` of KST CAN servos.
 
@@ -68,6 +80,10 @@ class KstBus:
             servo.delay = switches.duplicate_delay
         self._awake = not switches.reports_ms
         self._asked = False
+        self._known: Roster | None = None
+        self._report_at: float | None = None
+        for servo in self.servos:
+            servo.changed = self._forget
 
     @property
     def nodes(self) -> Mapping[int, Servo]:
@@ -89,10 +105,13 @@ class KstBus:
         twin.delay = self.switches.duplicate_delay
         twin.bit_rate = first.bit_rate
         self.servos = (*self.servos, twin)
+        twin.changed = self._forget
+        self._forget()
 
     def tune(self, rate: int) -> None:
         """The host's rate in bit/s; servos set to another one neither hear nor are heard. 0: whichever they have."""
         self.rate = rate or None
+        self._forget()
 
     def receive(self, data: Data, at: float) -> None:
         """A frame of the host; what is no CAN frame is ignored."""
@@ -103,15 +122,12 @@ class KstBus:
         self._disturb(self.now)
         if data.id & REMOTE_FLAG:
             return
-        hearing = [servo for servo in self.servos if servo.hears(self.rate) and servo.takes(data.extended)]
         if (order := wire.decode_start(data)) is not None:
-            for servo in hearing:
-                if order.node in (wire.EVERYONE, servo.node):
-                    servo.obey_start(order, self.now)
+            for servo in self._addressed(order.node, data.extended):
+                servo.obey_start(order, self.now)
         elif (request := wire.decode_request(data)) is not None:
-            for servo in hearing:
-                if request.node in (wire.EVERYONE, servo.node):
-                    servo.obey(request, self.now)
+            for servo in self._addressed(request.node, data.extended):
+                servo.obey(request, self.now)
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
         """Every frame that begins up to this moment, with its own, in order."""
@@ -128,11 +144,10 @@ class KstBus:
         if not self._awake:
             return None if self._asked else _BEFORE_ALL_CLOCKS
         due = self._voices[0].when if self._voices else None
-        for servo in self.servos:
-            report = servo.report_due()
-            if report is not None and (due is None or report < due):
-                due = report
-        return due
+        if self._known is None:
+            self._roster()
+        report = self._report_at
+        return due if report is None or (due is not None and due <= report) else report
 
     obeys_at_once = False
 
@@ -158,6 +173,31 @@ class KstBus:
             for servo in self.servos:
                 servo.wake(at)
 
+    def _forget(self) -> None:
+        self._known = None
+
+    def _roster(self) -> Roster:
+        if self._known is None:
+            there = [servo for servo in self.servos if servo.plugged]
+            hearing = [servo for servo in there if servo.hears(self.rate)]
+            mistuned = [servo for servo in there if not servo.hears(self.rate)]
+            by_node: dict[int, list[Servo]] = {}
+            for servo in hearing:
+                by_node.setdefault(servo.node, []).append(servo)
+            self._known = Roster(hearing, by_node, mistuned, len(mistuned) == len(there))
+            self._find_report()
+        return self._known
+
+    def _find_report(self) -> None:
+        moments = [servo.report_due() for servo in self.servos]
+        self._report_at = min((moment for moment in moments if moment is not None), default=None)
+
+    def _addressed(self, node: int, extended: bool) -> list[Servo]:
+        """Whoever hears and heeds a frame to this id."""
+        roster = self._roster()
+        named = roster.hearing if node == wire.EVERYONE else roster.by_node.get(node, [])
+        return [servo for servo in named if servo.takes(extended)]
+
     def _say(self, servo: Servo | None, when: float, frame: CanFrame) -> None:
         heappush(self._voices, Voice(when, next(self._order), frame, servo, servo.lives if servo else 0))
 
@@ -182,9 +222,11 @@ class KstBus:
             voice = heappop(self._voices)
             if voice.servo is None or voice.servo.lives == voice.life:
                 begun.append((voice.servo, voice.frame))
-        for servo in self.servos:
-            if servo.report_due() == moment:
-                begun += [(servo, frame) for frame in servo.report(moment)]
+        if self._report_at == moment:
+            for servo in self.servos:
+                if servo.report_due() == moment:
+                    begun += [(servo, frame) for frame in servo.report(moment)]
+            self._find_report()
         return begun
 
     def _arbitrated(self, speaking: list[tuple[Servo, CanFrame]], moment: float) -> list[CanFrame]:
@@ -221,10 +263,8 @@ class KstBus:
         """The host speaks: to a servo at another rate that is a broken frame, which it breaks for all to see."""
         if self.rate is None:
             return
-        there = [servo for servo in self.servos if servo.plugged]
-        mistuned = [servo for servo in there if not servo.hears(self.rate)]
+        _, _, mistuned, alone = self._roster()  # alone: then nobody acknowledges the frame either
         active = [servo for servo in mistuned if servo.errors < PASSIVE]
-        alone = len(mistuned) == len(there)  # then nobody acknowledges the frame either
         for servo in mistuned:
             servo.errors += 1
         if active or (mistuned and alone):

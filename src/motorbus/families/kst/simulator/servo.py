@@ -37,6 +37,7 @@ class Servo:
     `started`   whether a start was heard, `plugged` whether its cable is in; `lives` counts its supply's comings
     `delay`     s that it answers later than the others; `busy_until` is when its last answer began
     `extended`  whether it was last asked with a 29-bit identifier: what it says unasked has the same form
+    `changed`   is called when it may be others who can reach it, or when its next report may be at another moment
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Servo:
         now: Callable[[], float],
         say: Callable[[Servo, float, CanFrame], None],
     ) -> None:
+        self.changed: Callable[[], None] = _nothing
         self.unit = unit
         self.profile = profile
         self.switches = switches
@@ -56,7 +58,7 @@ class Servo:
         self.errors = 0
         self.lives = 0
         self.started = False
-        self.plugged = True
+        self._plugged = True
         self.extended = switches.id_format == "ext"
         self._now = now
         self._say = say
@@ -70,7 +72,7 @@ class Servo:
         speed, acceleration = switches.speed * per_radian, switches.acceleration * per_radian
         self.shaft = Shaft(now(), switches.position, speed=speed, acceleration=acceleration)
         self.values = Memory(_factory(node, profile, switches))
-        self.node, self.bit_rate = node, switches.bit_rate
+        self._node, self._bit_rate = node, switches.bit_rate
         self._power_up(now())
         self.values["goal_position"] = switches.position
 
@@ -81,13 +83,43 @@ class Servo:
         """The raw value of every row at this moment."""
         return _Memory(self, self._now)
 
+    @property
+    def node(self) -> int:
+        """The id it answers to."""
+        return self._node
+
+    @node.setter
+    def node(self, node: int) -> None:
+        self._node = node
+        self.changed()
+
+    @property
+    def bit_rate(self) -> int:
+        """The rate it is set to, bit/s."""
+        return self._bit_rate
+
+    @bit_rate.setter
+    def bit_rate(self, rate: int) -> None:
+        self._bit_rate = rate
+        self.changed()
+
+    @property
+    def plugged(self) -> bool:
+        """Whether its cable is in."""
+        return self._plugged
+
+    @plugged.setter
+    def plugged(self, yes: bool) -> None:
+        self._plugged = yes
+        self.changed()
+
     def unplug(self) -> None:
         """Pull its cable, bus and supply in one. The shaft stays; an answer on its way is lost."""
         self.shaft.halt(self._now())
         self.values.lose_supply(self._now(), cut=self.switches.flash_cut)
-        self.plugged = False
         self.lives += 1
         self._reports_from = inf
+        self.plugged = False
 
     def plug(self) -> None:
         """Put its cable back: it powers up. Does nothing when it is in."""
@@ -220,6 +252,7 @@ class Servo:
     def report_every(self, seconds: float, at: float) -> None:
         """Another interval between reports from this moment on; 0: none."""
         self._interval = seconds
+        self.changed()
         if self._reports_from < inf:
             self._report(True, at)
 
@@ -244,6 +277,7 @@ class Servo:
 
     def _report(self, on: bool, at: float) -> None:
         self._reports_from, self._reported = (at if on else inf), 0
+        self.changed()
 
     # -- what it is --------------------------------------------------------------------------------------------
 
@@ -289,6 +323,10 @@ class Servo:
     @property
     def _interval_as_shipped(self) -> int:
         return self.values.get("report_interval", objects.INTERVAL)
+
+
+def _nothing() -> None:
+    """Nobody goes by it."""
 
 
 class _Memory(Mapping[str, int]):

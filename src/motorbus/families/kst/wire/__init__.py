@@ -56,6 +56,7 @@ from motorbus.families.kst.wire.sdo import (
     encode_segment_reply,
     encode_upload_reply,
     encode_upload_start,
+    usual_head,
 )
 
 __all__ = [
@@ -101,4 +102,5 @@ __all__ = [
     "says_boot",
     "segment_due",
     "upload_due",
+    "usual_head",
 ]

@@ -29,6 +29,11 @@ class FrameReceiver:
     def __init__(self, formats: frozenset[bool] = STANDARD) -> None:
         self._formats = formats
 
+    @property
+    def held(self) -> int:
+        """A frame is an event, so nothing ever waits."""
+        return 0
+
     def feed(self, data: Data) -> list[Event]:
         """Take one frame; give what it is. Never raises."""
         if not isinstance(data, CanFrame):

@@ -120,6 +120,17 @@ def reply_kind(specifier: int) -> str:
     return "" if what else "segment"
 
 
+def usual_head(index: int, subindex: int, size: int) -> bytes:
+    """The first four bytes of an upload of so many bytes that states its length, and has no reserved bit set.
+
+    That is how a value comes that is not refused. None of a size that one reply does not carry comes so: b"".
+    """
+    if not 1 <= size <= EXPEDITED:
+        return b""
+    specifier = 0x40 | (EXPEDITED - size) << 2 | _E | _S
+    return bytes((specifier,)) + multiplexer(index, subindex)
+
+
 def decode_reply(data: bytes) -> SdoReply | None:
     """The data of a reply taken apart; None when they are not 8 bytes or the specifier is no reply's."""
     kind = reply_kind(data[0]) if len(data) == LENGTH else ""
@@ -153,8 +164,7 @@ def encode_upload_reply(
         raise RequestError(
             f"{len(data)} bytes do not fit one reply", expected="1 to 4 bytes", advice="send segments"
         )
-    specifier = 0x40 | (EXPEDITED - len(data)) << 2 | _E | _S
-    return _reply(node, bytes((specifier,)) + multiplexer(index, subindex) + data, extended)
+    return _reply(node, usual_head(index, subindex, len(data)) + data, extended)
 
 
 def encode_upload_start(

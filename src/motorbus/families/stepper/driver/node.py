@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.entry import Entry, Table, Value
+from motorbus.core.operation import Exchange
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.memory import Memory
@@ -19,7 +20,7 @@ class Node:
     """The controller of a line. Raises RequestError for another id.
 
     `motor` is the number that motor commands name, `order` says which byte of a number comes first in its dumps,
-    `memory` is what was said to it on this bus.
+    `memory` is what was said to it on this bus, `kept` are the exchanges that read its inputs, by port.
     """
 
     def __init__(
@@ -33,6 +34,7 @@ class Node:
         self.motor: Final = checked_motor(motor)
         self.order: Final[Order] = checked_order(order)
         self.memory: Final = memory if memory is not None else Memory()
+        self.kept: Final[dict[int, Exchange[bool]]] = {}
 
     @property
     def alarm(self) -> tuple[str, ...]:

@@ -131,6 +131,9 @@ def read_input(node: Node, port: int) -> Exchange[bool]:
 
     One reading, and nothing vouches for its one bit; `inputs` reads until two agree.
     """
-    if port not in range(1, INPUTS + 1):
+    if not isinstance(port, int) or port not in range(1, INPUTS + 1):
         raise RequestError(f"there is no input {port}", expected=f"1 to {INPUTS}", advice="nothing was sent")
-    return command(node, "read_input", lambda reply: bool(reply[5]), port=port)
+    kept = node.kept.get(port)
+    if kept is None:
+        kept = node.kept[port] = command(node, "read_input", lambda reply: bool(reply[5]), port=port)
+    return kept

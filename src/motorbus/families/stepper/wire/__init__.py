@@ -40,6 +40,7 @@ from motorbus.families.stepper.wire.frames import (
     key_due,
     key_of,
     named,
+    replies_due,
     reply_fault,
     reply_length,
 )
@@ -87,6 +88,7 @@ __all__ = [
     "key_of",
     "looks_like_echo",
     "named",
+    "replies_due",
     "reply_fault",
     "reply_length",
 ]

@@ -133,9 +133,17 @@ def key_of(reply: bytes) -> Key:
 
 def key_due(request: bytes) -> Key:
     """The key of the reply that is due to this request. Raises RequestError when it is none."""
-    asked = decode_request(request)
-    image = bytes(IMAGE_LENGTH) if asked is not None and asked.command is DUMP else b""
-    return key_of(encode_reply(request, image=image))
+    return key_of(next(iter(replies_due(request))))
+
+
+def replies_due(request: bytes) -> frozenset[bytes]:
+    """The first six bytes of each reply in which `difference` finds none: two for an input, four where the selected
+    project is repeated, else one. Their keys are all the same. Raises RequestError when `request` is none.
+    """
+    asked = _asked(request)
+    projects = range(1, HIGHEST_PROJECT + 1) if _unnamed(asked) else (0,)
+    levels = (0, 1) if asked.command.echo == "level" else (0,)
+    return frozenset(_head(asked, request, project, level) for project in projects for level in levels)
 
 
 def encode_reply(request: bytes, *, project: int = 0, level: int = 0, image: bytes = b"") -> bytes:
@@ -145,9 +153,21 @@ def encode_reply(request: bytes, *, project: int = 0, level: int = 0, image: byt
     that of the input asked for; `image` are the 220 bytes of a dump. Raises RequestError when `request` is none, or
     `image` is not what its reply holds.
     """
+    asked = _asked(request)
+    head = _head(asked, request, project, level)
+    if len(image) != (IMAGE_LENGTH if asked.command is DUMP else 0):
+        raise RequestError(f"{len(image)} bytes do not follow the reply to {asked.command.name}")
+    return head + image
+
+
+def _asked(request: bytes) -> Request:
     asked = decode_request(request)
     if asked is None:
         raise RequestError("there is no reply to what is no request", sent=request)
+    return asked
+
+
+def _head(asked: Request, request: bytes, project: int, level: int) -> bytes:
     command, values = asked.command, asked.values
     reply = bytearray(HEADER + request[2:4] + b"\0\0")
     if command.kind == SYSTEM:
@@ -157,9 +177,12 @@ def encode_reply(request: bytes, *, project: int = 0, level: int = 0, image: byt
     elif command.echo in ("port", "level"):
         reply[4] = values["port"]
         reply[5] = level if command.echo == "level" else 0
-    if len(image) != (IMAGE_LENGTH if command is DUMP else 0):
-        raise RequestError(f"{len(image)} bytes do not follow the reply to {command.name}")
-    return bytes(reply) + image
+    return bytes(reply)
+
+
+def _unnamed(asked: Request) -> bool:
+    """Its reply repeats a project that the request does not name."""
+    return asked.command.echo == "project" and "project" not in asked.values
 
 
 def reply_fault(data: bytes) -> str:
@@ -213,12 +236,10 @@ def difference(request: bytes, reply: bytes, *, project: int | None = None) -> s
     if len(reply) < REPLY_LENGTH:
         return f"{len(reply)} bytes came, {REPLY_LENGTH} are due"
     selected = project if project is not None else reply[3]
-    unnamed = asked.command.echo == "project" and "project" not in asked.values
-    if unnamed and not 1 <= selected <= HIGHEST_PROJECT:
+    if _unnamed(asked) and not 1 <= selected <= HIGHEST_PROJECT:
         return f"byte 3 is {reply[3]:02X}, a project from 01 to 04 is due"
     level = reply[5] if reply[5] in (0, 1) else 0
-    image = bytes(IMAGE_LENGTH) if asked.command is DUMP else b""
-    due = encode_reply(request, project=selected, level=level, image=image)
+    due = _head(asked, request, selected, level)
     names = ("header", "header", "class", "command or project", "port", "step or level")
     wrong = [
         f"byte {at} ({names[at]}) is {reply[at]:02X}, {due[at]:02X} is due"

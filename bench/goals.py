@@ -1,0 +1,97 @@
+"""The table of goals: every row that was measured, what it was to be, and whether it is."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator, Sequence
+from types import ModuleType
+
+from bench import rows as package
+from bench.row import Row, Say, met, noted, shown, verdict
+
+COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs", "notes")
+SHORT = 1e-3
+REASONS: dict[str, str] = {
+    "1": "each exchange leaves its nodes in doubt until it is answered, and each goal is judged by the limits of its "
+    "servo; no peer does either",
+    "6": "what the kernel takes to wake two processes is not on the wire: the bare loop of the same round shows it",
+    "7": "waking up is most of it; what is ours of it is in row 1",
+    "8": "every byte is tried as the beginning of a packet; the vendor's SDK gives up what follows a damaged length, "
+    "and is as quick as it is incomplete. In pieces of 4 KiB, as a file is read, ours is twice as quick as in these",
+    "10": "goals come in rad, rad/s and shares, are rounded, and are held against the limits of their servos",
+    "12": "what runs after 25 ms of waiting runs cold; ours sends a probe that no late reply can answer, counts, and "
+    "says what was sent and what to do",
+}
+"""By number of a row: why it misses when it does."""
+
+Measure = Callable[[int, Say], list[Row]]
+
+
+def modules() -> Iterator[ModuleType]:
+    """Whatever lies in `bench/rows`."""
+    for found in pkgutil.iter_modules(package.__path__):
+        yield importlib.import_module(f"{package.__name__}.{found.name}")
+
+
+def wanted(module: ModuleType, numbers: Sequence[str]) -> bool:
+    """Whether one of these rows is measured there; no number asks for all.
+
+    A module may tell its rows by NUMBERS; one that does not is measured to find out.
+    """
+    told: Sequence[str] = getattr(module, "NUMBERS", numbers)
+    return not numbers or bool(set(numbers) & set(told))
+
+
+def measured(
+    rounds: int, say: Say, numbers: Sequence[str] = (), every: Sequence[ModuleType] | None = None
+) -> tuple[list[Row], list[str]]:
+    """The rows asked for in their order, and what could not be measured, in words."""
+    found: list[Row] = []
+    failures: list[str] = []
+    for module in modules() if every is None else every:
+        if wanted(module, numbers):
+            try:
+                found += module.rows(rounds, say)
+            except Exception as failure:  # whatever it is, it is told, and the other rows are worth having
+                said = str(failure).splitlines() or [type(failure).__name__]
+                failures.append(f"{module.__name__}: {said[-1]}")
+    asked = [row for row in found if not numbers or row.number in numbers]
+    return sorted(asked, key=_place), failures
+
+
+def _place(row: Row) -> tuple[int, str]:
+    return (int(row.number), "") if row.number.isdigit() else (99, row.number)
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """One row of the table."""
+    why = "" if met(row) else REASONS.get(row.number, "")
+    return (
+        row.number,
+        row.measure,
+        row.peer,
+        row.goal,
+        row.stretch,
+        shown(row.value, row.unit),
+        f"{row.least:.2f} – {row.greatest:.2f}",
+        verdict(row),
+        _seconds(row),
+        noted(row.note, why),
+    )
+
+
+def _seconds(row: Row) -> str:
+    if row.ours is None or row.theirs is None:
+        return ""
+    unit, factor = ("µs", 1e6) if max(row.ours, row.theirs) < SHORT else ("ms", 1e3)
+    return f"{row.ours * factor:.1f} / {row.theirs * factor:.1f} {unit}"
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """How many are met, in one sentence."""
+    missed = [row for row in rows if not met(row)]
+    told = ", ".join(dict.fromkeys(row.number for row in missed))
+    return f"{len(rows) - len(missed)} of {len(rows)} goals are met." + (
+        f" Missed in rows: {told}." if told else ""
+    )

@@ -1,0 +1,172 @@
+"""Rows 8 and 9: packets out of a noisy capture, by a streaming decoder and by a bulk one, against the vendor's SDK.
+
+One capture (`bench.noisy_stream`) for all, in memory. The streaming decoder gets it in pieces, and gives lists of
+packets and what they say; the bulk decoder gets it whole, and gives arrays, and the bytes of packets once they are
+asked for. The SDK's `rxPacket` reads from a port that hands over what it asks for and never makes it wait. The figure
+is the time that theirs needs for the whole capture by the time that ours needs. Ours must give exactly the packets that
+a search by brute force finds; how many of them the SDK finds is told, for it gives up what follows a damaged length.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from statistics import median
+from time import process_time
+from typing import Any
+
+from bench import apart
+from bench.noisy_stream import capture, decodable, pieces
+from bench.rounds import Failed
+from bench.row import SAMPLES, Row, Say, pairs
+
+NUMBERS = ("8", "9")
+MODULE = "bench.rows.decoding"
+SDK = "feetech-servo-sdk"
+STREAM, BULK, CUT = "streaming", "bulk", "bulk, bytes too"
+JOBS = (
+    apart.Job(STREAM, MODULE, (STREAM,)),
+    apart.Job(BULK, MODULE, (BULK,)),
+    apart.Job(CUT, MODULE, (CUT,)),
+    apart.Job(SDK, MODULE, (SDK,), (SDK, "pyserial")),
+)
+PASSES = 5
+"""Over the whole capture, of each sample."""
+GOALS = {STREAM: ("8", ">= 3.5", ">= 5"), BULK: ("9", ">= 15", ">= 25")}
+
+
+def rows(rounds: int, say: Say) -> list[Row]:
+    """Rows 8 and 9. Raises Failed when a decoder of ours misses a packet or finds one too many."""
+    if not all(job.there for job in JOBS):
+        say(f"{SDK} is not installed: rows 8 and 9 are not measured\n")
+        return []
+    found = apart.rounds(JOBS, max(rounds, SAMPLES), say)
+    return [_row(name, found) for name in GOALS]
+
+
+def _row(name: str, found: Any) -> Row:
+    number, goal, stretch = GOALS[name]
+    ours, theirs = ([one["seconds"] for one in found[who]] for who in (name, SDK))
+    ratio = pairs(theirs, ours)
+    first = found[SDK][0]
+    note = (
+        f"per decodable packet {median(ours) / first['decodable'] * 1e6:.2f} µs of ours, "
+        f"{median(theirs) / first['decodable'] * 1e6:.2f} µs of theirs; the SDK finds "
+        f"{first['found'] / first['decodable']:.1%} of {first['decodable']} packets"
+    )
+    if name == BULK:
+        streamed = pairs([one["seconds"] for one in found[STREAM]], ours)
+        cut = pairs(theirs, [one["seconds"] for one in found[CUT]])
+        note += (
+            f"; places, nodes, codes and faults as arrays, {streamed.median:.1f} times as fast as our streaming decoder"
+            f"; {cut.median:.1f} x with the bytes of each packet cut out as well"
+        )
+    return Row(
+        number,
+        f"{name} decoding of a noisy capture, {first['bytes']} bytes",
+        SDK,
+        "x",
+        *ratio,
+        goal,
+        stretch,
+        median(ours),
+        median(theirs),
+        len(ours),
+        note,
+    )
+
+
+# -- in a process of its own -------------------------------------------------------------------------------------
+
+
+def measured(name: str, packets: int | None = None) -> dict[str, Any]:
+    """One decoder over the capture, once to warm up and then by the clock. Raises Failed for a wrong result."""
+    stream = capture() if packets is None else capture(packets)
+    truth = list(decodable(stream))
+    decode = {STREAM: _streaming, BULK: _bulk, CUT: _cut, SDK: _vendor}[name]()
+    decode(stream)
+    passes = [decode(stream) for _ in range(PASSES)]
+    seconds, places = sum(each for each, _ in passes) / PASSES, passes[-1][1]
+    known = {at for at, _ in truth}
+    if name != SDK and places != [data for _, data in truth]:
+        raise Failed(f"{name}: {len(places)} packets, and not the {len(truth)} that brute force finds")
+    found = sum(at in known for at in places) if name == SDK else len(places)
+    return {"seconds": seconds, "bytes": len(stream), "decodable": len(truth), "found": found}
+
+
+Decoder = Callable[[bytes], tuple[float, Sequence[Any]]]
+"""Processor time for the whole stream, and what was found: packets, or the places of those of the SDK."""
+
+
+def _streaming() -> Decoder:
+    from motorbus.recorder import Decoder
+
+    def decode(stream: bytes) -> tuple[float, list[bytes]]:
+        cut, decoder = pieces(stream), Decoder("feetech", "rx")
+        began = process_time()
+        heard = [decoder.feed(piece) for piece in cut]
+        last = decoder.flush()
+        seconds = process_time() - began
+        found = [data for one in heard for data, fault in zip(one.data, one.fault, strict=True) if not fault]
+        return seconds, found + [packet.data for packet in last if not packet.fault]
+
+    return decode
+
+
+def _bulk(cut: bool = False) -> Decoder:
+    """The columns, as arrays; with `cut` the bytes of each packet as well."""
+    from motorbus.recorder import decode as at_once
+
+    def decode(stream: bytes) -> tuple[float, list[bytes]]:
+        began = process_time()
+        packets = at_once("feetech", stream, "rx")
+        if cut:
+            _ = packets.data
+        seconds = process_time() - began
+        return seconds, [data for data, fault in zip(packets.data, packets.fault, strict=True) if not fault]
+
+    return decode
+
+
+def _cut() -> Decoder:
+    return _bulk(cut=True)
+
+
+class MemoryPort:
+    """Those members of the SDK's PortHandler that its `rxPacket` uses, over a capture in memory."""
+
+    def __init__(self, stream: bytes) -> None:
+        self.is_using = False
+        self.stream = stream
+        self.at = 0
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802 - the SDK's name
+        start = self.at
+        self.at = min(start + max(0, length), len(self.stream))
+        return self.stream[start : self.at]
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802
+        return self.at >= len(self.stream)
+
+
+def _vendor() -> Decoder:
+    import scservo_sdk as sdk  # type: ignore[import-not-found]
+
+    handler = sdk.PacketHandler(0)
+
+    def decode(stream: bytes) -> tuple[float, list[int]]:
+        port, end, found = MemoryPort(stream), len(stream), []
+        began = process_time()
+        while port.at < end:
+            packet, result = handler.rxPacket(port)
+            if result == sdk.COMM_SUCCESS:
+                found.append((port.at, packet))
+        seconds = process_time() - began
+        return seconds, [at - len(packet) for at, packet in found]
+
+    return decode
+
+
+if __name__ == "__main__":
+    json.dump(measured(sys.argv[1], *map(int, sys.argv[2:])), sys.stdout)

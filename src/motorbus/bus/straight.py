@@ -1,0 +1,250 @@
+"""The straight way of an exchange that is run again and again: a control loop does little else.
+
+When the bus is as it was when it was found idle and clean, the request leaves, the whole answer comes at one look, and
+all there is to do is to check it and to say what it means: `fly`. What nobody answers just leaves: `cast`. Whatever is
+otherwise goes the usual way; an answer that is not exactly the one that is due finds a flight in the air like any
+other. A test proves that both ways give the same.
+
+Here microseconds count, so what elsewhere would be three functions is one.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from threading import get_ident
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from motorbus.bus.course import Course
+from motorbus.bus.run import taken
+from motorbus.bus.ticket import Flight
+from motorbus.core.operation import UNLIKE, Answer, Data, Exchange, Rank, Unlike
+from motorbus.errors import LinkError, MotorbusError
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+    from motorbus.bus.turns import Turns
+    from motorbus.link.base import Link
+
+T = TypeVar("T")
+
+
+def charted(turns: Turns, exchange: Exchange[Any]) -> Course | None:
+    """What is known of this exchange on this bus, in both its forms; None where there is no straight way for it."""
+    if exchange.whole is None or exchange.rank is Rank.STOP or exchange.effect or not exchange.replies:
+        return None
+    with turns.lock:
+        course = Course(turns, exchange, exchange.whole)
+        other = None if exchange.other is None else exchange.other()
+        if other is not None and other.whole is None:  # it could not take turns with its other form
+            return None
+        if other is not None and other.whole is not None:
+            course.twin = Course(turns, other, other.whole, course)
+    exchange.course = course
+    return course
+
+
+def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> T | Unlike:
+    """Carry this out and return its value; `UNLIKE` when nothing was sent, and it must go the usual way.
+
+    `ahead` is what nobody answers and leaves in the same write, in front of it. Raises what `Bus.run` does.
+    """
+    turns, lock = bus.turns, bus.turns.lock
+    course: Course | None = exchange.course
+    if course is None or course.turns is not turns:
+        try:
+            course = charted(turns, exchange)
+        except BaseException:
+            bus.relay.recover()
+            raise
+        if course is None:
+            return UNLIKE
+    launched = None
+    try:
+        launched = _launched(bus, course, ahead)
+        if launched is None:
+            return UNLIKE
+        course = launched
+        arrived = bus.link.read(course.deadline)
+        if len(arrived) == 1:
+            lock.acquire()  # let go of it below, or where the flight falls: behind an inner `try` a line would be bare
+            at = bus.link.now()
+            if at > course.deadline:  # a host that was held up takes it in late
+                at = course.deadline
+            if turns.aloft is course and at - course.sent_at >= course.least:
+                value: T | Unlike = course.whole(arrived[0], at)
+                if value is not UNLIKE:
+                    course.lands(arrived[0], at)
+                    bus.relay.pumper = None
+                    lock.release()
+                    return value
+            lock.release()
+        _astray(bus, course, arrived)
+    except BaseException as error:
+        _fallen(bus, launched, error)
+        raise
+    answer: Any = course.result()
+    return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
+
+
+def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course | None:
+    """The course, or its twin, that has left just now; None when nothing has."""
+    turns, link, lock = course.turns, bus.link, course.lock
+    lock.acquire()
+    try:
+        if turns.flying or turns.chores or turns.trace.subscriptions or course.holder.course is not course:
+            return None
+        if turns.group is not course.group:
+            turns.regroup(course)
+        first = course.first
+        if first.length == course.length and first.run >= course.most:
+            course = course.twin
+        if course.era != lock.era and not course.fits():
+            return None
+        now, free = link.now(), turns.free_at
+        if bus.relay.pumper is not None or (free > now and turns.takes_time) or _stale(turns, link):
+            return None
+        start, request = free if free > now else now, course.request
+        if ahead is not None:
+            if not _may_leave(turns, ahead, now):
+                return None
+            turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
+            request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
+        course.sent_at, course.deadline = now, start + course.wait
+        lock.owing, bus.relay.pumper = True, get_ident()
+        turns.aloft = turns.flying[course.lane] = course
+        turns.echo.recent.append(course.request)  # type: ignore[arg-type]
+        link.write(request)
+        return course
+    finally:
+        lock.release()
+
+
+def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
+    """Send what nobody answers; `UNLIKE` when nothing was sent, and it must go the usual way. Raises as `Bus.run`."""
+    lock = bus.turns.lock
+    if exchange.replies != ():
+        return UNLIKE
+    try:
+        lock.acquire()
+        moment = _thrown(bus, exchange)
+        lock.release()
+    except BaseException as error:
+        _fallen(bus, None, error)
+        raise
+    if moment is None:
+        return UNLIKE
+    answer: Any = Answer((), (), moment)
+    value: T = answer if exchange.read is None else exchange.read(answer)
+    return value
+
+
+def _thrown(bus: Bus, exchange: Exchange[Any]) -> float | None:
+    """When this has left, just now (s); None where it has not."""
+    turns, link = bus.turns, bus.link
+    if turns.calm_since != turns.lock.era and not turns.is_calm():
+        return None
+    if bus.relay.pumper is not None or turns.flying or turns.trace.subscriptions or turns.chores:
+        return None
+    now, free = link.now(), turns.free_at
+    if (free > now and turns.takes_time) or not _may_leave(turns, exchange, now):
+        return None
+    turns.free_at = (free if free > now else now) + turns.family.air_time(exchange, turns.rate)
+    link.write(exchange.request)
+    return now
+
+
+def usual(bus: Bus, exchange: Exchange[T]) -> T:
+    """The usual way of one exchange, which needs no run."""
+    flight, relay = Flight(exchange), bus.relay
+    try:
+        relay.start(flight)
+        while not flight.done:
+            relay.turn()
+    except BaseException:
+        relay.recover()
+        with bus.turns.lock:
+            bus.turns.abandon(flight)
+        raise
+    value: T = taken(bus.turns, exchange, flight.result())
+    return value
+
+
+def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
+    """Note that this leaves, which nobody answers; False where it must not, or something has to be asked before."""
+    if exchange.effect or exchange.goals or exchange.later is not None:
+        if not _is_sure(turns, exchange) and not _admitted(turns, exchange):
+            return False
+        if exchange.aim in turns.aims:
+            turns.aims[exchange.aim] = now
+        else:
+            turns.orders(exchange, now)
+    turns.statistics.other["sent"] += 1
+    turns.echo.recent.append(exchange.request)  # type: ignore[arg-type]  # bytes, as the bus is calm
+    return True
+
+
+def _is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
+    if turns.passes is None or not exchange.sure:
+        return False
+    return (exchange.refusal is None or exchange.refusal(turns.known.stops) is None) and turns.passes(
+        exchange
+    )
+
+
+def _admitted(turns: Turns, exchange: Exchange[Any]) -> bool:
+    if turns.look is not None and turns.look(exchange):
+        return False
+    try:
+        turns.admitted(exchange)
+    except MotorbusError:  # who goes the usual way is told why
+        return False
+    return True
+
+
+def _stale(turns: Turns, link: Link) -> bool:
+    """What has already arrived cannot answer a request that has not left: take it in first. Was there anything?"""
+    arrived = link.read(-inf)
+    if arrived:
+        with turns.lock:
+            turns.feed(arrived, link.now())
+    return bool(arrived)
+
+
+def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:
+    """The answer is not yet here, or is not as it usually is: it is taken in as that of any other flight."""
+    relay, turns = bus.relay, course.turns
+    with turns.lock:  # whatever came is taken in: where others have settled this by now, it is theirs
+        turns.feed(arrived, bus.link.now(), course.sent_at)
+    relay.hand_over()
+    course.wake = relay.wake
+    while not course.done:
+        relay.turn()
+
+
+def _fallen(bus: Bus, launched: Course | None, error: BaseException) -> None:
+    """The flight has ended by this: where the link is lost all learn it, and whatever happens the bus is let go."""
+    course = _mine(bus, launched)
+    try:
+        if isinstance(error, LinkError):
+            with bus.turns.lock:
+                bus.turns.lost(error)
+            if bus.relay.pumper == get_ident():
+                bus.relay.hand_over()
+            course = None  # settled like all the others
+    finally:
+        _cut_short(bus, course)
+
+
+def _mine(bus: Bus, launched: Course | None) -> Course | None:
+    """What this thread has in the air; where others have made a usual flight of it, it is not flown again."""
+    if bus.relay.pumper == get_ident():
+        return bus.turns.aloft or launched
+    return launched if launched is not None and launched.is_detached else None
+
+
+def _cut_short(bus: Bus, course: Course | None) -> None:
+    """Whoever waits for this waits no more; in the air it stays until it lands, or its time is over."""
+    bus.relay.recover()
+    if course is not None:
+        with course.lock:
+            course.turns.abandon(course)

@@ -1,0 +1,171 @@
+"""A SYNC WRITE of which all is known but the values: what a control loop writes again and again.
+
+Who, where, how a value becomes a raw one, how the packet begins: that is found out once. The mould takes what is plain,
+numbers whose goals lie within the limits of their servos; whatever is unusual about a value it leaves to those who say
+in words what is wrong with it. Both make the same bytes and the same goals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from struct import Struct
+from typing import Final, NamedTuple
+from zlib import adler32
+
+from motorbus.core.aimed import Aim, Aimed
+from motorbus.core.entry import Entry
+from motorbus.core.operation import Goal
+from motorbus.families.feetech import wire
+from motorbus.families.feetech.driver.exchanges import changed_since, settings_of_now
+from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.orders import goals_of
+from motorbus.families.feetech.table import Mode
+
+HEAD: Final = 7
+"""Bytes of a SYNC WRITE in front of its first item."""
+FLOATS: Final = {float}
+BYTES: Final = tuple(bytes((value,)) for value in range(256))
+
+
+class Cell(NamedTuple):
+    """How a value of one row of one servo becomes its raw value, and which raw values are plain: their bytes are just
+    the number, and what they order lies within the limits. `whole`: without a unit, only whole numbers are values."""
+
+    factor: float
+    scale: float
+    low: int
+    high: int
+    whole: bool
+
+
+class Mould:
+    """The packet for these rows, which adjoin and have the same place for all of these nodes. Made by `mould`."""
+
+    def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]) -> None:
+        first, count = rows[0], len(rows[0])
+        size = sum(row.size for row in first)
+        item = "B" + "".join("BH"[row.size - 1] for row in first)
+        self.ids: Final = tuple(node.node for node in nodes)
+        self._nodes: Final = list(nodes)
+        self._made_by: Final = [node.settings for node in nodes]
+        as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
+        self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
+        self._cells: Final = cells
+        self._columns: Final = [_column(cells[place::count], place, count) for place in range(count)]
+        self._items: Final = [part for id in self.ids for part in (id, *[0] * count)]
+        self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
+        self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
+        self._sum: Final = sum(self._head[2:])
+        self._aim: Final = Aim(self.ids, self._goals, changed_since((node, node.settings) for node in nodes))
+        self._plain: Final = all(cell.factor == 1 for cell in cells)
+        self._scales: Final = [cell.scale for cell in cells]
+        self._places: Final = _places(nodes, rows, cells)
+
+    def holds(self) -> bool:
+        """Whether the settings of all are those that it was made by."""
+        return list(map(settings_of_now, self._nodes)) == self._made_by
+
+    def cast(self, values: Sequence[float]) -> Aimed | None:
+        """The packet with these values, those of one servo behind those of the one before; None where one of them is
+        not plain, or they are not as many as it takes."""
+        if {*map(type, values)} != FLOATS or len(values) != len(self._cells):
+            return None
+        try:
+            if self._plain:
+                raws = [round(value / scale) for value, scale in zip(values, self._scales, strict=True)]
+            else:
+                raws = [
+                    round(value / cell[0] / cell[1]) for value, cell in zip(values, self._cells, strict=True)
+                ]
+        except (ValueError, OverflowError):  # not a finite number
+            return None
+        items = self._items.copy()
+        for place, share, low, high, whole in self._columns:
+            column = raws[share]
+            if not (low <= min(column) and max(column) <= high) and not self._are_plain(raws):
+                return None
+            if whole and list(values[share]) != column:
+                return None
+            items[place] = column
+        body = self._pack(*items)
+        check = ~(self._sum + adler32(body) - 1) & 255
+        return Aimed(self._head + body + BYTES[check], self._aim, raws)
+
+    def _are_plain(self, raws: Sequence[int]) -> bool:
+        return all(cell.low <= raw <= cell.high for cell, raw in zip(self._cells, raws, strict=True))
+
+    def _goals(self, raws: Sequence[int]) -> tuple[Goal, ...]:
+        if self._places:
+            return tuple(
+                [
+                    Goal(id, "position", raw * scale * factor, low, high)
+                    for (id, scale, factor, low, high), raw in zip(self._places, raws, strict=True)
+                ]
+            )
+        pairs = zip(self._rows, raws, strict=True)
+        return tuple(goal for (node, row), raw in pairs for goal in goals_of(node, row, raw))
+
+
+def mould(nodes: Sequence[Node], rows: Sequence[Sequence[Entry]]) -> Mould | None:
+    """The one for these servos, each with its rows in the order of their addresses; None where nothing so simple holds:
+    they are not all in position mode, their rows lie elsewhere, or they do not fit into one packet."""
+    places = {tuple((row.address, row.size, row.order) for row in its) for its in rows}
+    if len(places) != 1 or len({row.order for row in rows[0]}) != 1 or not _adjoin(rows[0]):
+        return None
+    if len(nodes) > wire.sync_write_capacity(sum(row.size for row in rows[0])):
+        return None
+    cells = [_cell(node, row) for node, its in zip(nodes, rows, strict=True) for row in its]
+    found = [cell for cell in cells if cell is not None]
+    return Mould(nodes, rows, found) if len(found) == len(cells) else None
+
+
+def _places(
+    nodes: Sequence[Node], rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]
+) -> list[tuple[int, float, float, float, float]]:
+    """What the goals of these are made of, where they are told a place and nothing else: as `goals_of` makes them."""
+    if [row.name for row in rows[0]] != ["goal_position"]:
+        return []
+    its = [(node.node, cell, node.limits) for node, cell in zip(nodes, cells, strict=True)]
+    return [(id, cell.scale, cell.factor, *limits) for id, cell, limits in its if limits is not None]
+
+
+def _column(cells: Sequence[Cell], place: int, count: int) -> tuple[slice, slice, int, int, bool]:
+    """One row of all servos: where its raw values go in the parts of a packet, where they are among all raw values, the
+    bounds within which they are plain for every servo, and whether only whole numbers are values."""
+    low, high = max(cell.low for cell in cells), min(cell.high for cell in cells)
+    return slice(place + 1, None, count + 1), slice(place, None, count), low, high, cells[0].whole
+
+
+def _adjoin(rows: Sequence[Entry]) -> bool:
+    ends = [row.address + row.size for row in rows[:-1]]
+    return ends == [row.address for row in rows[1:]] and all(row.size in (1, 2) for row in rows)
+
+
+def _cell(node: Node, row: Entry) -> Cell | None:
+    settings = node.settings
+    if settings is None or node.known_mode is not Mode.POSITION or row.name not in PLAIN:
+        return None
+    factor = settings.factors.get(row.name, 1.0) if row.unit else 1.0
+    low, high = max(row.low, 0), row.high
+    if row.name == "goal_position":
+        if settings.limits is None:
+            return None
+        least, most = (round(limit / factor / row.scale) for limit in settings.limits)
+        low, high = max(low, least - 1), min(high, most + 1)
+    while low <= high and not _within(node, row, low):
+        low += 1
+    while low <= high and not _within(node, row, high):
+        high -= 1
+    return Cell(factor, row.scale if row.unit else 1.0, low, high, not row.unit)
+
+
+PLAIN: Final = ("goal_position", "goal_time", "goal_velocity")
+"""What a servo in position mode is told of where to go, and in what time or how fast: the more, the more of it."""
+
+
+def _within(node: Node, row: Entry, raw: int) -> bool:
+    for goal in goals_of(node, row, raw):
+        if goal.low is None or goal.high is None or not goal.low <= goal.value <= goal.high:
+            return False
+    return True

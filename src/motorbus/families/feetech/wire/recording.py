@@ -1,0 +1,50 @@
+"""What was recorded of a FEETECH line, packet by packet: those of servos, of a host, or of both in one stream."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from motorbus.core.capture import Captures, Run, Told
+from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.families.feetech.wire.bulk import packets, top
+from motorbus.families.feetech.wire.sides import Sides
+from motorbus.families.feetech.wire.stream import MUCH, Stream
+
+
+class Recording:
+    """Packets of servos ("rx"), of a host ("tx"), or of both (""); see `core.capture.Cutter`."""
+
+    __slots__ = ("_sides", "_stream")
+
+    def __init__(self, way: str = "") -> None:
+        self._stream: Stream[bytes] = Stream(top(way), bytes)
+        self._sides = Sides(way)
+
+    def feed(self, data: Data) -> list[Run]:
+        """Take bytes, cut anywhere; give what is complete."""
+        if isinstance(data, CanFrame):
+            return [Noise(data.data, "foreign")]
+        if self._stream.held + len(data) >= MUCH:
+            return self._stream.runs(data)
+        runs: list[Run] = []
+        for event in self._stream.feed(data):
+            if isinstance(event, Noise):
+                runs.append(event)
+            elif runs and isinstance(runs[-1], list):
+                runs[-1].append(event)
+            else:
+                runs.append([event])
+        return runs
+
+    def flush(self) -> list[Run]:
+        """Nothing more comes: give what can be made of the rest."""
+        return self._stream.rest()
+
+    def tell(self, packets: list[bytes]) -> Told:
+        """Kinds, ids and fifth bytes (instruction, or alarm bits) of the packets that were found next."""
+        return self._sides.tell(packets)
+
+
+CAPTURES: Final = Captures(
+    Recording, packets, "the fifth byte: the instruction of a request, the alarm bits of a reply"
+)

@@ -1,0 +1,135 @@
+"""Packets out of what is being heard on a line, however it is cut.
+
+What a family finds is numbered through, put in order and given its time here. Noise is held until it is known where
+it ends, so that the same bytes give the same packets in whatever pieces they come.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
+from motorbus.core.family import Family
+from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.errors import RequestError
+from motorbus.recorder.heard import captures_of, family_of
+from motorbus.recorder.packets import Heard, Mark
+
+
+class Decoder:
+    """Takes a line of one family apart.
+
+    `way` says which way the bytes went unless `feed` says it: "rx" from the devices, "tx" to them, "" both or unknown.
+    The ways are kept apart, and places are counted over all that is fed. Raises RequestError for an unknown family or
+    way.
+    """
+
+    def __init__(self, family: str | Family, way: str = "") -> None:
+        self.family: Final = family_of(family) if isinstance(family, str) else family
+        self._way: Final = checked(way)
+        self._captures: Final[Captures] = captures_of(self.family)
+        self._frames: Final = self.family.link.kind == "frames"
+        self._lines: Final[dict[str, _Line]] = {}
+        self._taken = 0
+
+    def feed(self, data: Data, at: float | None = None, way: str | None = None) -> Heard:
+        """Take bytes, cut anywhere, or one CAN frame, and when (s) they came; give what is complete.
+
+        Raises RequestError for an unknown way, and for bytes where frames are due or the other way round.
+        """
+        fitting(self._frames, data)
+        way = self._way if way is None else checked(way)
+        line = self._lines.get(way)
+        if line is None:
+            line = self._lines[way] = _Line(self._captures.cutter(way), self._frames)
+        taken, self._taken = self._taken, self._taken + (1 if isinstance(data, CanFrame) else len(data))
+        return line.feed(data, taken, at)
+
+    def flush(self) -> list[Packet]:
+        """Nothing more comes: what can be made of the rest, one way after the other."""
+        return [packet for rest in self.rest() for packet in rest]
+
+    def rest(self) -> list[Heard]:
+        """As `flush`, with the columns of each way by itself."""
+        return [line.flush() for line in self._lines.values()]
+
+
+class _Line:
+    """What went one way."""
+
+    def __init__(self, cutter: Cutter, frames: bool) -> None:
+        self._cutter = cutter
+        self._frames = frames
+        self._taken = 0
+        self._told = 0
+        self._marks: list[Mark] = []
+        self._noise = b""
+        self._fault = ""
+
+    def feed(self, data: Data, place: int, at: float | None) -> Heard:
+        mark = Mark(self._taken, place - self._taken, at)
+        if not self._marks or self._marks[-1][1:] != mark[1:]:
+            self._marks.append(mark)
+        self._taken += 1 if self._frames else len(data)
+        return self._heard(self._cutter.feed(data))
+
+    def flush(self) -> Heard:
+        return self._heard(self._cutter.flush(), last=True)
+
+    def _heard(self, runs: list[Run], last: bool = False) -> Heard:
+        data: list[bytes] = []
+        noise: dict[int, int] = {}
+        sound: list[bytes] = []
+        for run in runs:
+            if isinstance(run, Noise):
+                self._stray(run, data, noise)
+            else:
+                self._silence(data, noise)
+                data += run
+                sound += run
+        if last:
+            self._silence(data, noise)
+        first, marks = self._told, self._marks
+        self._told += len(data) if self._frames else sum(map(len, data))
+        while len(self._marks) > 1 and self._marks[1].own <= self._told:
+            self._marks = self._marks[1:]
+        return Heard(first, marks, data, noise, self._cutter.tell(sound), self._frames)
+
+    def _stray(self, run: Noise, data: list[bytes], noise: dict[int, int]) -> None:
+        """One more piece of what belongs to nobody; a frame is whole by itself."""
+        if run.fault != self._fault or self._frames:
+            self._silence(data, noise)
+        self._noise += run.data
+        self._fault = run.fault
+        if self._frames:
+            self._silence(data, noise)
+        while len(self._noise) >= PIECE:
+            rest, self._noise = self._noise[PIECE:], self._noise[:PIECE]
+            self._silence(data, noise)
+            self._noise = rest
+
+    def _silence(self, data: list[bytes], noise: dict[int, int]) -> None:
+        """The noise has ended: tell it."""
+        if self._noise:
+            noise[len(data)] = FAULTS.index(self._fault)
+            data.append(self._noise)
+            self._noise = b""
+
+
+def checked(way: str) -> str:
+    """This way, if it is one. Raises RequestError for another word."""
+    if way not in WAYS:
+        raise RequestError(
+            f"there is no way {way!r}", expected='"rx" from the devices, "tx" to them, "" both'
+        )
+    return way
+
+
+def fitting(frames: bool, data: object) -> None:
+    """Raise RequestError for bytes from a bus of frames, and for a frame, or anything else, from a line of bytes."""
+    if frames and not isinstance(data, CanFrame):
+        raise RequestError(
+            "these devices are on a CAN bus: there are no bytes, but frames", expected="a CanFrame"
+        )
+    if not frames and not isinstance(data, bytes | bytearray | memoryview):
+        raise RequestError("these devices are on a serial line", expected="bytes")

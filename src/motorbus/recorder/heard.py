@@ -1,0 +1,61 @@
+"""A family that says nothing of its recordings: what its receiver makes of them, as a host would hear it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from motorbus import families
+from motorbus.core.capture import NOBODY, NOTICE, REPLY, Captures, Run, Told
+from motorbus.core.family import Family
+from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice
+
+
+@cache
+def family_of(name: str) -> Family:
+    """The family of this name, looked for once. Raises RequestError when there is none."""
+    return families.load(name)
+
+
+def captures_of(family: Family) -> Captures:
+    """How recordings of this family are taken apart: as it says, else by its receiver, whichever way they went."""
+    return family.link.captures or Captures(lambda way: ByReceiver(family))
+
+
+class ByReceiver:
+    """Replies and notices as the receiver tells them; the node is the lane where each node has its own."""
+
+    def __init__(self, family: Family) -> None:
+        self._receiver = family.receiver()
+        self._frames = family.link.kind == "frames"
+        self._found: list[Event] = []
+
+    def feed(self, data: Data) -> list[Run]:
+        """Take bytes, or one CAN frame; give what is complete."""
+        return self._runs(self._receiver.feed(data), data)
+
+    def flush(self) -> list[Run]:
+        """Nothing more comes: give what can be made of the rest."""
+        return self._runs(self._receiver.flush(), b"")
+
+    def tell(self, packets: list[bytes]) -> Told:
+        """What the receiver said of these, which it has found last."""
+        found, self._found = self._found[: len(packets)], self._found[len(packets) :]
+        kinds = [NOTICE if isinstance(event, Notice) else REPLY for event in found]
+        nodes = [self._node(event) for event in found]
+        return lambda: (kinds, nodes, [NOBODY] * len(found))
+
+    def _node(self, event: Event) -> int:
+        if isinstance(event, Notice):
+            return event.node
+        return event.lane if self._frames and event.lane is not None else NOBODY
+
+    def _runs(self, events: list[Event], data: Data) -> list[Run]:
+        runs: list[Run] = []
+        for event in events:
+            whole = data.flat() if isinstance(data, CanFrame) else event.data
+            if isinstance(event, Noise):
+                runs.append(Noise(whole, event.fault))
+            else:
+                self._found.append(event)
+                runs.append([whole])
+        return runs

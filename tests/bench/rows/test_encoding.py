@@ -1,0 +1,50 @@
+"""Everybody makes the bytes that are due, wrong ones are found out, and the best of the round is who counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bench import apart
+from bench.rounds import Failed
+from bench.rows import encoding
+from bench.rows.encoding import JOBS, OURS, READ, SYNC_WRITE, measured
+
+FEW = {READ: 20, SYNC_WRITE: 20}
+
+
+def test_ours_makes_the_bytes_that_are_due() -> None:
+    assert all(seconds > 0 for seconds in measured(OURS, FEW).values())
+
+
+@pytest.mark.parametrize("job", [job for job in JOBS if job.name != OURS], ids=lambda job: job.name)
+def test_each_peer_makes_the_bytes_that_are_due(job: apart.Job) -> None:
+    assert set(apart.told(job, "20")) == {READ, SYNC_WRITE}
+
+
+def test_wrong_bytes_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    read, sync_write, prepare = encoding.MAKERS[OURS]()
+
+    def wrong() -> tuple[encoding.Encoder, encoding.Encoder, encoding.Encoder]:
+        return read, lambda orders: sync_write(orders)[:-1] + b"\0", prepare
+
+    monkeypatch.setitem(encoding.MAKERS, OURS, wrong)
+    with pytest.raises(Failed, match="where ff ff fe 2e 83 2a 06"):
+        measured(OURS, FEW)
+
+
+def test_the_best_peer_of_each_round_is_who_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    turns = {job.name: iter(range(100)) for job in JOBS}
+
+    def told(job: apart.Job, *more: str) -> dict[str, Any]:
+        first = next(turns[job.name]) % 2 == 0
+        if job.name == OURS:
+            return {READ: 3.0, SYNC_WRITE: 6.0}
+        quick = (job.name == "st3215") == first
+        return {READ: 2.0 if quick else 9.0, SYNC_WRITE: 12.0}
+
+    monkeypatch.setattr(apart.rounds, "__defaults__", (told, 3))
+    read, write = encoding.rows(7, lambda text: None)
+    assert (read.value, read.least, read.greatest) == (1.5, 1.5, 1.5)
+    assert (write.value, write.number, write.samples) == (0.5, "10", 7)

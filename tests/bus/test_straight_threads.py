@@ -1,0 +1,119 @@
+"""Others on the bus while a straight flight is in the air: who polls the same servo, and who stops it."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+
+from motorbus.bus.pump import Bus
+from motorbus.core.operation import Data
+from motorbus.errors import MotorbusError
+from motorbus.link.base import Delivery, Side
+from tests.bus.struck import Struck, kept, order, struck_bus
+
+
+def together(*calls: Any) -> list[BaseException]:
+    """Call these in threads of their own; what went wrong in them."""
+    wrong: list[BaseException] = []
+
+    def carry_out(call: Any) -> None:
+        try:
+            call()
+        except BaseException as error:
+            wrong.append(error)
+
+    threads = [threading.Thread(target=carry_out, args=(call,), daemon=True) for call in calls]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)
+    return wrong
+
+
+def no_silence(bus: Bus) -> None:
+    for ledger in bus.statistics.nodes.values():
+        assert not ledger.errors["silence"]
+        assert ledger.sent == ledger.ok + sum(ledger.errors.values())
+
+
+def test_threads_that_poll_one_servo_get_its_values_and_nobody_is_called_silent(rounds: Any) -> None:
+    bus, _, _ = struck_bus(virtual=False)
+    one, group = kept(1), kept(1, 2, 3)
+    count = rounds(5_000, 100)
+
+    def poll(exchange: Any, expected: Any) -> None:
+        for _ in range(count):
+            assert bus.run(exchange) == expected
+
+    alone: Any = ([(1, 0, 1, 0)], ())
+    all_: Any = ([(node, 0, node, 0) for node in (1, 2, 3)], ())
+    calls = [(one, alone), (one, alone), (kept(1), alone), (group, all_)]
+    wrong = together(*(lambda call=call: poll(*call) for call in calls))
+    assert wrong == []
+    no_silence(bus)
+    assert bus.statistics.nodes[1].ok >= 4 * count
+    bus.close()
+
+
+class Held(Struck):
+    """A line on which the next answer stays until somebody lets it go, or the next request is under way."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.holds = False
+        self.asked = threading.Event()
+        self.stopped = threading.Event()
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.DEVICE and self.holds:
+            self.holds = False
+            self.asked.set()
+            return [Delivery(at + 0.01, Side.HOST, data)]
+        return super().carry(sender, data, at)
+
+
+def test_a_stop_from_another_thread_gets_past_what_is_in_the_air() -> None:
+    bus, simulator, _ = struck_bus(virtual=False)
+    line = bus.link.line = Held()  # type: ignore[attr-defined]
+    exchange = kept(1, 2)
+    bus.run(order())  # from now on there is a stop thread
+    for _ in range(5):
+        bus.run(exchange)
+    stopped: list[Any] = []
+
+    def poll() -> None:
+        line.holds = True
+        bus.run(exchange)
+
+    def stop() -> None:
+        assert line.asked.wait(20)
+        stopped.append(bus.estop())
+
+    wrong = together(poll, stop)
+    (outcome,) = stopped
+    assert set(outcome.acknowledged) == {1, 2, 3, 4, 5, 6}
+    assert outcome.silent == ()
+    assert all(isinstance(error, MotorbusError) for error in wrong)
+    assert bus.relay.pumper is None
+    bus.reset()
+    for node in (1, 2):
+        simulator.memory[node][57] = 99
+    assert bus.run(exchange) == ([(1, 0, 1, 99), (2, 0, 2, 99)], ())
+    bus.close()
+
+
+def test_a_latched_bus_lets_no_order_through_straight() -> None:
+    bus, _, line = struck_bus()
+    exchange = kept(1, 2)
+    for _ in range(3):
+        bus.volley(order(), exchange)
+    bus.estop()
+    line.sent.clear()
+    with pytest.raises(MotorbusError, match="stop"):
+        bus.run(order())
+    with pytest.raises(MotorbusError, match="stop"):
+        bus.volley(order(), exchange)
+    assert line.sent == []
