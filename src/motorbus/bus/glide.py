@@ -58,11 +58,14 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
 def _cut_short(turns: Turns, exchange: Exchange[Any]) -> None:
     """Whoever waits for this waits no more; in the air it stays until it lands, or its time is over."""
     let_go(turns.lock)
-    with turns.lock:
-        for flight in turns.flying.values():
-            if isinstance(flight, Course) and flight.holder is exchange:
-                turns.abandon(flight)
-                return
+    try:
+        with turns.lock:
+            for flight in turns.flying.values():
+                if isinstance(flight, Course) and flight.holder is exchange:
+                    turns.abandon(flight)
+                    return
+    finally:  # a task is cancelled, and the interrupt falls in here
+        let_go(turns.lock)
 
 
 def let_go(lock: TurnsLock) -> None:
