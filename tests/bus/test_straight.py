@@ -206,6 +206,7 @@ def test_an_answer_that_waited_for_a_host_that_was_held_up_is_as_old_on_both_way
         assert straight == found()
 
 
+@pytest.mark.timeout(1800)
 def test_the_same_at_length(rounds: Any) -> None:
     from random import Random
 
