@@ -1,4 +1,4 @@
-"""Wait for bytes without burning the processor, as exactly as the system allows.
+"""Wait for bytes, or for a moment, without burning the processor and as exactly as the system allows.
 
 `select` counts microseconds where `poll` counts milliseconds, and a control loop feels the difference; but it knows
 only the first thousand descriptors of a process.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from select import select
+from time import monotonic, sleep
 
 LIMIT = 1024  # FD_SETSIZE
 LONGEST = 86_400.0  # s; more than some systems accept is cut, and nothing has come by then
@@ -43,3 +44,10 @@ def wait_any(descriptors: Sequence[int], seconds: float) -> list[int]:
     if any(event & POLLNVAL for _, event in found):
         raise ValueError("a descriptor is closed")
     return [descriptor for descriptor, _ in found]
+
+
+def doze(until: float) -> None:
+    """Let time pass until this moment (s on the monotonic clock), whatever arrives meanwhile."""
+    pause = until - monotonic()
+    if pause > 0:
+        sleep(pause)

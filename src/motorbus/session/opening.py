@@ -19,6 +19,8 @@ ADAPTER = "can://"
 
 LATENCY = "latency"
 """The option of every serial port that says for how long its adapter holds bytes back, where the user knows better."""
+SLEEP = "sleep"
+"""The option of every serial port that lets the program sleep until the whole of an answer can be there."""
 RECONNECT = "reconnect"
 """The option of every bus that says whether a port that was lost is looked for."""
 
@@ -45,7 +47,7 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     word = "baud" if family.link.kind == "bytes" else "bitrate"
     rate = _rate(word, merged.pop(word)) if word in merged else 0
     reconnect = _yes(RECONNECT, merged.pop(RECONNECT, True))
-    late = _latency(merged.pop(LATENCY)) if LATENCY in merged and _is_serial(family, spot.port) else {}
+    timing = _timing(merged) if _is_serial(family, spot.port) else {}
     settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
     simulated = spot.port == "sim"
     if FAULTS in merged and not simulated:
@@ -54,12 +56,12 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
-        more = {LATENCY} if _is_serial(family, spot.port) else set()
+        more = {LATENCY, SLEEP} if _is_serial(family, spot.port) else set()
         allowed = {word, RECONNECT, *more, *known, *(option.name for option in family.link.settings)}
         raise RequestError(
             f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
         )
-    return Opening(family.configured(**settings), spot.port, rate, {**rest, **late}, reconnect)
+    return Opening(family.configured(**settings), spot.port, rate, {**rest, **timing}, reconnect)
 
 
 def _is_serial(family: Family, port: str) -> bool:
@@ -67,15 +69,25 @@ def _is_serial(family: Family, port: str) -> bool:
     return family.link.kind == "bytes" and port.partition(":")[0] != "sim"
 
 
-def _latency(said: object) -> dict[str, object]:
-    """The option as the link takes it, in s."""
+def _timing(merged: dict[str, object]) -> dict[str, object]:
+    """What is said of the time that answers take, as the link takes it; nothing of it is left behind."""
+    found: dict[str, object] = {}
+    if LATENCY in merged:
+        found[LATENCY] = _latency(merged.pop(LATENCY))
+    if SLEEP in merged:
+        found[SLEEP] = _yes(SLEEP, merged.pop(SLEEP))
+    return found
+
+
+def _latency(said: object) -> float:
+    """The option in s."""
     seconds = units.parse(str(said), "time")
     if not 0 <= seconds <= LATEST:
         raise RequestError(
             f"{LATENCY}={said}: no adapter holds bytes back for that long",
             expected=f"0 to {LATEST:g} s, as 0, 1ms or 500us; 0 for a line without an adapter",
         )
-    return {LATENCY: seconds}
+    return seconds
 
 
 def _no_faults(address: str, port: str) -> RequestError:
