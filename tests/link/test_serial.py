@@ -7,9 +7,11 @@ import os
 import signal
 import struct
 import termios
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 
 import pytest
 import serialx
@@ -19,7 +21,7 @@ from motorbus.link import serial
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
 from motorbus.link.pty import PtyMaster
-from motorbus.link.serial import SerialLink
+from motorbus.link.serial import SerialLink, is_sharp
 from motorbus.link.waiting import wait_readable
 from tests.link.other import other_process, run
 from tests.link.usb import usb_port
@@ -353,3 +355,12 @@ def test_importing_it_loads_no_serial_library() -> None:
 def test_terminal_settings_are_not_left_cooked(link: SerialLink, master: PtyMaster) -> None:
     local = termios.tcgetattr(master.fileno())[3]
     assert local & (termios.ECHO | termios.ICANON | termios.ISIG) == 0
+
+
+@pytest.mark.parametrize(("resolution", "sharp"), [(1e-9, True), (1e-7, True), (0.0156, False)])
+def test_a_clock_of_coarse_ticks_cannot_tell_how_long_a_frame_took(
+    monkeypatch: pytest.MonkeyPatch, resolution: float, sharp: bool
+) -> None:
+    found = SimpleNamespace(resolution=resolution)
+    monkeypatch.setattr(time, "get_clock_info", lambda name: found)
+    assert is_sharp() is sharp

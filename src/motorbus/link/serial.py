@@ -40,6 +40,7 @@ ASK_AGAIN = 0.001  # s between two looks at a port that has no descriptor
 AGREEING = 0.5  # s for a server that is looked for anew to agree on its options: a few ways there and back
 REMOTE_LATENCY = 0.020  # s for an RFC 2217 server: the network, and whatever adapter is at its other end
 MEMORY_DEVICES = 1  # Linux Documentation/admin-guide/devices.txt
+SHARP = 1e-4  # s; a clock that ticks more slowly cannot tell how long a frame took
 GONE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
 UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
 
@@ -193,7 +194,7 @@ class PolledLink:
             split_address(port)
         self.name = port
         self.rate = rate
-        self.paced = not remote  # what is behind a server cannot be known
+        self.paced = not remote and is_sharp()  # what is behind a server cannot be known
         self.latency = REMOTE_LATENCY if remote else adapters.WINDOWS_LATENCY
         self.warnings: tuple[str, ...] = ()
         self._turn = Lock()
@@ -272,6 +273,12 @@ def open_serial(
 
 
 # -- opening ----------------------------------------------------------------------------------------------------
+
+
+def is_sharp() -> bool:
+    """Whether the clock can tell how long a frame took. That of Windows before Python 3.13 ticks every 15.6 ms: an
+    answer that comes within a tick would seem to have come sooner than it can."""
+    return time.get_clock_info("monotonic").resolution <= SHARP
 
 
 def could_be_a_port(device: str) -> bool:

@@ -44,7 +44,9 @@ def open_link(
     return link
 
 
-def _serial(port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None) -> Dozing:
+def _serial(
+    port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None
+) -> Dozing:
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
 
