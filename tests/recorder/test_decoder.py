@@ -123,6 +123,15 @@ def test_what_does_not_fit_the_line_is_refused_and_changes_nothing(family: str, 
     assert decoder.rest() == []
 
 
+@pytest.mark.parametrize("kind", [bytearray, memoryview])
+def test_bytes_may_be_any_buffer(kind: Any) -> None:
+    """Which is not held on to."""
+    decoder, buffer = Decoder("feetech"), bytearray(b"\x00" + READ[:3])
+    decoder.feed(kind(buffer))
+    buffer[:] = bytes(len(buffer))
+    assert [packet.data for packet in decoder.feed(kind(READ[3:]))] == [b"\x00", READ]
+
+
 def test_an_unknown_way_is_refused() -> None:
     with pytest.raises(RequestError, match="'up'"):
         Decoder("feetech", "up")

@@ -6,6 +6,8 @@ it ends, so that the same bytes give the same packets in whatever pieces they co
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from operator import attrgetter
 from typing import Final
 
 from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
@@ -14,6 +16,9 @@ from motorbus.core.operation import CanFrame, Data, Noise
 from motorbus.errors import RequestError
 from motorbus.recorder.heard import captures_of, family_of
 from motorbus.recorder.packets import Heard, Mark
+
+_OWN: Final = attrgetter("own")
+_NUMBER: Final = {fault: number for number, fault in enumerate(FAULTS)}
 
 
 class Decoder:
@@ -30,6 +35,7 @@ class Decoder:
         self._captures: Final[Captures] = captures_of(self.family)
         self._frames: Final = self.family.link.kind == "frames"
         self._lines: Final[dict[str, _Line]] = {}
+        self._usual: Final[type] = CanFrame if self._frames else bytes
         self._taken = 0
 
     def feed(self, data: Data, at: float | None = None, way: str | None = None) -> Heard:
@@ -37,13 +43,17 @@ class Decoder:
 
         Raises RequestError for an unknown way, and for bytes where frames are due or the other way round.
         """
-        fitting(self._frames, data)
+        if data.__class__ is not self._usual:
+            fitting(self._frames, data)
+            if not self._frames:
+                data = bytes(data)  # type: ignore[arg-type]
         way = self._way if way is None else checked(way)
         line = self._lines.get(way)
         if line is None:
             line = self._lines[way] = _Line(self._captures.cutter(way), self._frames)
-        taken, self._taken = self._taken, self._taken + (1 if isinstance(data, CanFrame) else len(data))
-        return line.feed(data, taken, at)
+        place = self._taken
+        self._taken += 1 if self._frames else len(data)
+        return line.feed(data, place, at)
 
     def flush(self) -> list[Packet]:
         """Nothing more comes: what can be made of the rest, one way after the other."""
@@ -57,20 +67,25 @@ class Decoder:
 class _Line:
     """What went one way."""
 
+    __slots__ = ("_cutter", "_fault", "_frames", "_mark", "_marks", "_noise", "_taken", "_told")
+
     def __init__(self, cutter: Cutter, frames: bool) -> None:
         self._cutter = cutter
         self._frames = frames
         self._taken = 0
         self._told = 0
-        self._marks: list[Mark] = []
+        self._mark: tuple[int, float | None] | None = None
+        self._marks: tuple[Mark, ...] = ()
         self._noise = b""
-        self._fault = ""
+        self._fault = 0
 
     def feed(self, data: Data, place: int, at: float | None) -> Heard:
-        mark = Mark(self._taken, place - self._taken, at)
-        if not self._marks or self._marks[-1][1:] != mark[1:]:
-            self._marks.append(mark)
-        self._taken += 1 if self._frames else len(data)
+        own = self._taken
+        self._taken = own + (1 if self._frames else len(data))
+        mark = place - own, at
+        if self._mark != mark:
+            self._mark = mark
+            self._marks += (Mark(own, *mark),)
         return self._heard(self._cutter.feed(data))
 
     def flush(self) -> Heard:
@@ -80,38 +95,46 @@ class _Line:
         data: list[bytes] = []
         noise: dict[int, int] = {}
         sound: list[bytes] = []
-        for run in runs:
-            if isinstance(run, Noise):
-                self._stray(run, data, noise)
-            else:
-                self._silence(data, noise)
-                data += run
-                sound += run
+        if len(runs) == 1 and isinstance(runs[0], list) and not self._noise:
+            data = sound = runs[0]  # the usual case of a good line
+        else:
+            self._sorted(runs, data, noise, sound)
         if last:
             self._silence(data, noise)
         first, marks = self._told, self._marks
-        self._told += len(data) if self._frames else sum(map(len, data))
-        while len(self._marks) > 1 and self._marks[1].own <= self._told:
-            self._marks = self._marks[1:]
+        self._told = told = first + len(data if self._frames else b"".join(data))
+        if len(marks) > 1:
+            self._marks = marks[max(bisect_right(marks, told, key=_OWN) - 1, 0) :]
         return Heard(first, marks, data, noise, self._cutter.tell(sound), self._frames)
 
-    def _stray(self, run: Noise, data: list[bytes], noise: dict[int, int]) -> None:
-        """One more piece of what belongs to nobody; a frame is whole by itself."""
-        if run.fault != self._fault or self._frames:
-            self._silence(data, noise)
-        self._noise += run.data
-        self._fault = run.fault
-        if self._frames:
-            self._silence(data, noise)
-        while len(self._noise) >= PIECE:
-            rest, self._noise = self._noise[PIECE:], self._noise[:PIECE]
-            self._silence(data, noise)
-            self._noise = rest
+    def _sorted(self, runs: list[Run], data: list[bytes], noise: dict[int, int], sound: list[bytes]) -> None:
+        """All into `data` in order: packets into `sound` as well, and of noise the fault into `noise`, by its place."""
+        stray, fault = self._noise, self._fault
+        for run in runs:
+            if not isinstance(run, Noise):
+                if stray:
+                    noise[len(data)] = fault
+                    data.append(stray)
+                    stray = b""
+                data += run
+                sound += run
+                continue
+            if stray and run.fault != FAULTS[fault]:
+                noise[len(data)] = fault
+                data.append(stray)
+                stray = b""
+            fault = _NUMBER[run.fault]
+            stray += run.data
+            while len(stray) >= PIECE or (stray and self._frames):
+                noise[len(data)] = fault
+                data.append(stray[:PIECE])
+                stray = stray[PIECE:]
+        self._noise, self._fault = stray, fault
 
     def _silence(self, data: list[bytes], noise: dict[int, int]) -> None:
         """The noise has ended: tell it."""
         if self._noise:
-            noise[len(data)] = FAULTS.index(self._fault)
+            noise[len(data)] = self._fault
             data.append(self._noise)
             self._noise = b""
 

@@ -106,7 +106,7 @@ class Heard(Packets):
         frames: bool,
     ) -> None:
         self._first: Final = first
-        self._marks: Final = tuple(marks)
+        self._marks: Final = marks
         self._data: Final = data
         self._noise: Final = noise
         self._told: Final = told

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,8 @@ from motorbus.core.operation import CanFrame, Noise
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.explain import explain
 from motorbus.families.feetech.wire import bulk, stream
-from motorbus.families.feetech.wire import tiles as tiling
 from motorbus.families.feetech.wire.recording import CAPTURES, Recording
 from motorbus.families.feetech.wire.sides import Sides
-from motorbus.families.feetech.wire.tiles import sound_until, tiles
 from tests.families.feetech.test_wire_stream import BROKEN, FRAMES, STREAMS, packets_in
 
 PING, READ, ANSWER = wire.ping(1), wire.read(1, 56, 2), wire.encode_status(1, 0, b"\x18\x05")
@@ -26,11 +26,6 @@ ALARM = wire.encode_status(1, 1, b"")
 
 SHORT = b"\xff\xff\x01\x01\xfd"
 """Too short for a packet, with a sum as a packet has it."""
-
-
-@pytest.fixture(autouse=True)
-def _new_form() -> None:
-    tiling._form.cache_clear()
 
 
 def kinds(*packets: bytes, way: str = "") -> list[int]:
@@ -102,52 +97,90 @@ def test_it_agrees_with_what_is_explained(data: bytes) -> None:
         assert ("the same again" in told.title) == (kind == EITHER)
 
 
-# --- tiles ----------------------------------------------------------------------------------------------------------
-
-
-def test_tiles_hold_all_bytes_and_packets_are_whole() -> None:
-    line = b"\x00\xfd" + ANSWER + b"\xff" + ANSWER + b"\xff\xff\xfe\x02" + READ[:-1]
-    assert tiles(line, 253) == [
-        b"\x00\xfd", ANSWER, b"\xff", ANSWER, b"\xff", b"\xff", b"\xfe\x02", b"\xff", b"\xff", READ[2:-1]
-    ]  # fmt: skip
-    assert tiles(wire.action(), 254) == [wire.action()]
-    assert tiles(wire.action(), 253) != [wire.action()]
-    assert tiles(SHORT, 253) == [b"\xff", b"\xff", SHORT[2:]]
-
-
-def test_only_sound_packets_are_counted_as_such() -> None:
-    bad = ANSWER[:-1] + b"\x00"
-    lucky = b"\xfd"  # sums up as a sound packet does
-    until = sound_until([ANSWER, READ, bad, ANSWER, lucky, ANSWER, b"\xff"])
-    assert [until(index) for index in range(7)] == [2, 2, 2, 4, 4, 6, 6]
-    assert sound_until([])(0) == 0
+# --- much at once -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("parameters", [0, 250, 251, 253])
 def test_long_packets_are_found_whatever_they_hold(parameters: int) -> None:
-    """The longest are no tiles: their sum would wrap."""
+    """Adler-32 would reduce the sum over all of the longest."""
     packet = wire.encode_status(253, 0xFF, b"\xff" * parameters)
-    assert (tiles(packet, 253) == [packet]) == (parameters <= 250)
-    line = ANSWER * 64 + packet + ANSWER
     finder = stream.Stream(253, bytes)
-    assert [len(run) if isinstance(run, list) else run for run in finder.runs(line)] in ([66], [64, 1, 1])
+    assert finder.runs(ANSWER * 64 + packet + ANSWER) == [[*[ANSWER] * 64, packet, ANSWER]]
 
 
-@pytest.mark.parametrize("much", [1, 512])
+@pytest.mark.parametrize("least", range(4))
+def test_the_sum_of_the_longest_is_not_right_by_being_reduced(least: int) -> None:
+    """Of all packets only these have sums, without their headers, that Adler-32 reduces."""
+    packet = bytes((0xFF, 0xFF, 253, 255)) + b"\xff" * 254 + bytes((255 - least,))
+    finder = stream.Stream(253, bytes)
+    assert [*finder.runs(packet + ANSWER), *finder.rest()] == [*_searched(packet + ANSWER)]
+    assert packets_in(packet + ANSWER, 253) == [ANSWER]
+
+
+def test_what_only_sums_up_as_a_packet_is_none() -> None:
+    finder = stream.Stream(253, bytes)
+    for other in (SHORT, b"\xfe\xff" + READ[2:-1] + bytes((READ[-1] + 1,)), wire.action(), b"\xfd" * 257):
+        runs = [*finder.runs(ANSWER + other + PING), *finder.rest()]
+        assert [run for run in runs if isinstance(run, list)] == [[ANSWER], [PING]]
+
+
+def test_a_packet_is_not_taken_before_all_of_it_has_come() -> None:
+    """What there is sums up as a whole one does."""
+    beginning = wire.frame(1, 0, bytes((0x10, 0x20, 0x30)))[:-2]
+    begun = beginning + bytes(((0xFD - sum(beginning)) & 0xFF,))
+    finder = stream.Stream(253, bytes)
+    assert (finder.runs(begun), finder.held) == ([], len(begun))
+
+
+def _searched(data: bytes) -> list[stream.Run]:
+    """What the search alone makes of it."""
+    finder = stream.Stream(253, bytes)
+    return [*finder._hunt(data, more=True), *finder.rest()]
+
+
+def _words(runs: list[stream.Run]) -> list[tuple[bytes, str]]:
+    """Packets and noise, neighbouring noise of one kind made one."""
+    told: list[tuple[bytes, str]] = []
+    for run in runs:
+        if not isinstance(run, Noise):
+            told += [(packet, "") for packet in run]
+        elif told and told[-1][1] == run.fault:
+            told[-1] = told[-1][0] + run.data, run.fault
+        else:
+            told.append((run.data, run.fault))
+    return told
+
+
 @given(data=STREAMS, size=st.integers(1, 900))
-def test_much_at_once_is_as_little_by_little(much: int, data: bytes, size: int) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stream, "MUCH", much)
-        finder = stream.Stream(254, bytes)
-        runs = [run for at in range(0, len(data), size) for run in finder.runs(data[at : at + size])]
-        runs += finder.rest()
-    found = [event for run in runs for event in ([run] if isinstance(run, Noise) else run)]
-    assert [event for event in found if isinstance(event, bytes)] == packets_in(data, 254)
-    assert b"".join(event if isinstance(event, bytes) else event.data for event in found) == data
+def test_much_at_once_is_as_searched(data: bytes, size: int) -> None:
+    finder = stream.Stream(253, bytes)
+    runs = [run for at in range(0, len(data), size) for run in finder.runs(data[at : at + size])]
+    runs += finder.rest()
+    assert _words(runs) == _words(_searched(data))
+    assert [data for data, fault in _words(runs) if not fault] == packets_in(data, 253)
+    assert b"".join(data for data, _ in _words(runs)) == data
+
+
+def test_damage_of_every_kind_is_told_as_the_search_tells_it(rounds: Callable[[int], int]) -> None:
+    chance = Random(20261122)
+    damaged = 0
+    for _ in range(rounds(100_000) // 100):
+        line = bytearray(b"".join(chance.choices((ANSWER, READ, PING, b"\xff", b"\x00\xff\x01"), k=30)))
+        for at in chance.sample(range(len(line)), 6):
+            line[at] = chance.choice((0xFF, 0, 1, 2, 9, 40, 255 - line[at]))
+        runs = _searched(bytes(line))
+        damaged += {run.fault for run in runs if isinstance(run, Noise)} == {"checksum", "framing"}
+        for size in (1, 13, 100, len(line)):
+            finder = stream.Stream(253, bytes)
+            cut = [
+                run for at in range(0, len(line), size) for run in finder.runs(bytes(line[at : at + size]))
+            ]
+            assert _words([*cut, *finder.rest()]) == _words(runs)
+    assert damaged > rounds(100_000) // 200  # else little was tried
 
 
 def test_a_false_start_among_many_packets_costs_its_own_bytes() -> None:
-    """It swallows the beginning of a packet, so that tiles and packets begin at different places for a while."""
+    """It swallows the beginning of a packet, so that a packet is looked for in it."""
     false, many = b"\xff\xff\x01\x0a\x00", [ANSWER] * 70
     finder = stream.Stream(253, bytes)
     runs = finder.runs(b"".join([*many, false, *many, false, PING, PING, *many]))
@@ -165,7 +198,7 @@ def test_what_was_held_is_gone_when_it_has_been_told() -> None:
     assert (finder.held, finder.rest()) == (0, [])
 
 
-def test_doubt_ends_with_the_next_packet_though_it_comes_in_tiles() -> None:
+def test_doubt_ends_with_the_next_packet_though_it_comes_with_many() -> None:
     bad = b"\xff\xff\x02\x05\x00" + ANSWER[:4]  # as a whole a packet with a wrong checksum
     finder = stream.Stream(253, bytes)
     assert finder.runs(ANSWER * 70 + bad) == [[ANSWER] * 70, Noise(bad[:5], "checksum")]

@@ -8,7 +8,7 @@ from motorbus.core.capture import Captures, Run, Told
 from motorbus.core.operation import CanFrame, Data, Noise
 from motorbus.families.feetech.wire.bulk import packets, top
 from motorbus.families.feetech.wire.sides import Sides
-from motorbus.families.feetech.wire.stream import MUCH, Stream
+from motorbus.families.feetech.wire.stream import Stream
 
 
 class Recording:
@@ -24,17 +24,7 @@ class Recording:
         """Take bytes, cut anywhere; give what is complete."""
         if isinstance(data, CanFrame):
             return [Noise(data.data, "foreign")]
-        if self._stream.held + len(data) >= MUCH:
-            return self._stream.runs(data)
-        runs: list[Run] = []
-        for event in self._stream.feed(data):
-            if isinstance(event, Noise):
-                runs.append(event)
-            elif runs and isinstance(runs[-1], list):
-                runs[-1].append(event)
-            else:
-                runs.append([event])
-        return runs
+        return self._stream.runs(data)
 
     def flush(self) -> list[Run]:
         """Nothing more comes: give what can be made of the rest."""

@@ -7,6 +7,7 @@ repeats the last instruction is its echo or an answer, and the others are instru
 
 from __future__ import annotations
 
+from functools import partial
 from operator import itemgetter
 from typing import Final
 
@@ -46,8 +47,10 @@ class Sides:
             and not may_ask(bytes(map(_ID, packets)), bytes(map(_CODE, packets)))
         ):
             kind = REPLY
-        kinds = [kind] * len(packets) if kind is not None else [self._side(packet) for packet in packets]
-        return lambda: (kinds, bytes(map(_ID, packets)), bytes(map(_CODE, packets)))
+        if kind is not None:
+            return partial(_told, packets, kind)
+        kinds = [self._side(packet) for packet in packets]
+        return lambda: (kinds, *_said(packets))
 
     def _side(self, data: bytes) -> int:
         id, code, parameters = data[ID], data[CODE], data[5:-1]
@@ -59,6 +62,15 @@ class Sides:
         self._last = data
         self._owed.update(_due(id, code, parameters))
         return REQUEST
+
+
+def _told(packets: list[bytes], kind: int) -> tuple[list[int], bytes, bytes]:
+    """Packets that are all of this kind."""
+    return [kind] * len(packets), *_said(packets)
+
+
+def _said(packets: list[bytes]) -> tuple[bytes, bytes]:
+    return bytes(map(_ID, packets)), bytes(map(_CODE, packets))
 
 
 def may_ask(ids: bytes, codes: bytes) -> bool:

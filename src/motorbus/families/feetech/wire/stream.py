@@ -8,46 +8,48 @@ Each byte ends in exactly one event. Noise is "checksum" for the bytes of a whol
 wrong, else "framing". How the stream was cut changes neither packets nor these words, only whether a run of
 noise comes in one piece.
 
-Much at once, as a capture has it, is not walked through packet by packet: `tiles` cuts all of it, and only where a
-tile is no sound packet the search begins, which gives the same events.
+Packets in a row are taken one by one where each is expected, and so is a packet with nothing wrong but its checksum in
+which no other can begin; only elsewhere the search begins, which gives the same events.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable
-from itertools import accumulate
 from typing import Final, Generic, Literal, TypeAlias, TypeVar
+from zlib import adler32
 
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
 from motorbus.families.feetech.wire.packets import (
     BROADCAST,
     HEADER,
     MAX_ID,
+    MAX_LENGTH,
     OVERHEAD,
     SOUND,
     InstructionPacket,
     StatusPacket,
     is_sound,
 )
-from motorbus.families.feetech.wire.tiles import sound_until, tiles
 
 P = TypeVar("P")
 Direction: TypeAlias = Literal["status", "instruction"]
 Packet: TypeAlias = StatusPacket | InstructionPacket
 Run: TypeAlias = "list[bytes] | Noise"
 """Whole packets in a row, or what lies between two of them."""
-MUCH: Final = 512
-"""Bytes; a bus that is spoken to never has so many at once, and what is prepared for many costs more for few."""
+HEADLESS: Final = 65011
+"""Where Adler-32 begins so that its low half is the sum without the header; that of a sound packet is never reduced."""
+_SIZES: Final = (0, 0, *range(OVERHEAD, MAX_LENGTH + 5))
+"""Bytes of a packet by its length field; 0 for none."""
 
 
 class Stream(Generic[P]):
     """Finds packets with an id up to `top` and hands each whole one to `make`."""
 
-    __slots__ = ("_make", "_rest", "_suspect", "_top")
+    __slots__ = ("_above", "_make", "_rest", "_suspect", "_top")
 
     def __init__(self, top: int, make: Callable[[bytes], P]) -> None:
         self._top = top
+        self._above = HEADER + bytes((top + 1,))
         self._make = make
         self._rest = b""
         self._suspect = 0  # so many bytes of the rest belong to a packet whose checksum was wrong
@@ -62,8 +64,8 @@ class Stream(Generic[P]):
         if self._rest:
             data = self._rest + data
         events: list[P | Noise] = []
-        if self._suspect or len(data) >= MUCH:
-            return self._made(self._cut(data, more=True))
+        if self._suspect:
+            return self._made(self._hunt(data, more=True))
         start, end, make, top = 0, len(data), self._make, self._top
         while end - start >= OVERHEAD:
             stop = start + data[start + 3] + 4
@@ -77,7 +79,7 @@ class Stream(Generic[P]):
         if start == end:
             self._rest = b""
             return events
-        return events + self._made(self._cut(data[start:], more=True))
+        return events + self._made(self._hunt(data[start:], more=True))
 
     def flush(self) -> list[P | Noise]:
         """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
@@ -85,11 +87,16 @@ class Stream(Generic[P]):
 
     def runs(self, data: bytes) -> list[Run]:
         """As `feed`, but packets as they are and all that follow one another in one list: for much at once."""
-        return self._cut(self._rest + data if self._rest else data, more=True)
+        if held := self._rest:
+            data = held + data
+            if len(held) > 3 and len(data) < held[3] + 4:
+                self._rest = data
+                return []
+        return self._cut(data)
 
     def rest(self) -> list[Run]:
         """As `flush`, in runs."""
-        return self._cut(self._rest, more=False)
+        return self._hunt(self._rest, more=False)
 
     def _made(self, runs: list[Run]) -> list[P | Noise]:
         events: list[P | Noise] = []
@@ -100,26 +107,54 @@ class Stream(Generic[P]):
                 events += map(self._make, run)
         return events
 
-    def _cut(self, data: bytes, more: bool) -> list[Run]:
-        """Take the tiles that are sound packets as they are, and search where one is not until one is again."""
-        pieces = tiles(data, self._top) if len(data) >= MUCH else []
-        until = sound_until(pieces)
-        index = 0 if self._suspect else until(0)
-        if index and index == len(pieces):
-            self._rest = b""
-            return [pieces]
-        starts = [*accumulate(map(len, pieces), initial=0)]
-        runs: list[Run] = [pieces[:index]] if index else []
-        position = starts[index]
+    def _cut(self, data: bytes) -> list[Run]:
+        """All that is complete: what can be told where it is expected to begin, and the rest searched."""
+        runs: list[Run] = []
+        run: list[bytes] = []
+        above, sizes, end = self._above, _SIZES, len(data)
+        start, last = 0, end - 4
+        if self._suspect and (start := self._search(data, 0, runs, more=True)) < 0:
+            return runs
+        while start <= last:
+            stop = start + sizes[data[start + 3]]
+            packet = data[start:stop]
+            if adler32(packet, HEADLESS) & 0xFF == 0xFF and stop <= end and HEADER <= packet < above:
+                run.append(packet)
+                start = stop
+                continue
+            if run:
+                runs.append(run)
+                run = []
+            headed = HEADER <= packet < above
+            if headed and stop > end:
+                break
+            if headed and packet[-1] != 0xFF and packet.find(HEADER, 2) < 0:
+                runs.append(Noise(packet, "checksum"))
+                start = stop
+            elif packet < HEADER and (stop := data.find(HEADER, start + 1)) > 0:
+                runs.append(Noise(data[start:stop], "framing"))
+                start = stop
+            elif (start := self._search(data, start, runs, more=True)) < 0:
+                return runs
+        if run:
+            runs.append(run)
+        self._keep(data[start:], runs)
+        return runs
+
+    def _keep(self, data: bytes, runs: list[Run]) -> None:
+        """What is not complete, if it can become a packet."""
+        if not data or HEADER <= data < self._above:
+            self._rest = data
+        else:
+            self._search(data, 0, runs, more=True)
+
+    def _hunt(self, data: bytes, more: bool) -> list[Run]:
+        """All of this searched."""
+        runs: list[Run] = []
+        position = 0
         while (start := self._search(data, position, runs, more)) >= 0:
-            position, index = start, bisect_left(starts, start)
-            end = until(index) if starts[index : index + 1] == [start] else index
-            if end > index:
-                runs.append(pieces[index:end])
-                position = starts[end]
-            else:
-                position += data[start + 3] + 4
-                runs.append([data[start:position]])
+            position = start + data[start + 3] + 4
+            runs.append([data[start:position]])
         return runs
 
     def _search(self, data: bytes, position: int, runs: list[Run], more: bool) -> int:
