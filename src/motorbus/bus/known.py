@@ -97,10 +97,14 @@ class Known(dict[int, Answer | None]):
 
     def moves(self, nodes: Iterable[int]) -> None:
         """These may be anywhere from now on, and what they said last was not about this order."""
+        self.follow(nodes)
+        self.update(dict.fromkeys(self.keys() & nodes))
+
+    def follow(self, nodes: Iterable[int]) -> None:
+        """These were ordered something that they did not answer; where they are is about to be told anyway."""
         for said in (self._said, self._given):
             for node in nodes if said else ():
                 said.pop(node, None)
-        self.update(dict.fromkeys(self.keys() & nodes))
 
     def forget(self) -> None:
         """Whoever is there may have started anew: where they are and what they said last counts no more."""

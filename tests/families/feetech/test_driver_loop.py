@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import ANY, Answer, Effect, Goal, Rank, Reply
+from motorbus.core.operation import ANY, UNLIKE, Answer, Effect, Goal, Rank, Reply
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver import (
     Node,
@@ -58,6 +58,23 @@ def test_where_they_are_is_told_by_the_settings_that_they_have_when_it_is_asked(
     assert tells(answer) == {1: fresh[1], 2: pytest.approx(2048 * COUNT * 2)}
     one.forget_settings()
     assert tells(answer) == {2: pytest.approx(2048 * COUNT * 2)}
+
+
+def test_settings_that_were_read_once_more_and_are_the_same_count_as_the_same() -> None:
+    one, other = prepared(1), prepared(2)
+    exchange: Any = sync_read_positions([one, other])
+    data = packet(1, 0, *low_high(1304)) + packet(2, 0, *low_high(8))
+    frames = tuple(Reply(0, id, packet(id, 0, *low_high(raw))) for id, raw in ((1, 1304), (2, 8)))
+    for at in (1.0, 2.0, 3.0):
+        found = exchange.whole(data, at)
+        assert found.values == {1: 1304 * COUNT, 2: 8 * COUNT}
+        assert exchange.tells_position(Answer(frames, (), found.at)) == found.values
+        one.settings = prepared(1).settings
+    other.settings = prepared(2, at_30=2).settings
+    assert exchange.tells_position(Answer(frames, (), found.at)) == {1: 1304 * COUNT, 2: 2 * 8 * COUNT}
+    assert exchange.whole(data, 4.0) is UNLIKE
+    one.forget_settings()
+    assert exchange.whole(data, 5.0) is UNLIKE
 
 
 def test_a_missing_position_is_missing_and_never_replaced() -> None:

@@ -155,15 +155,19 @@ class Part:
 
         There is nothing to clean up, so an interruption is raised at once.
         """
+        link, begins = self.link, moment + self.origin
         if (watch := self.watch) is not None:
-            now = self.link.now()
-            if watch.due(now, moment + self.origin - now) is not None:
+            now = link.now()
+            if watch.due(now, begins - now) is not None:
                 bus.run(self._asked(watch, moment))
-        for pause in self._wait(moment + self.origin):
-            bus.run(iter(pause))
-        self.began = self.link.now() - self.origin
+        now = link.now()
+        if now < begins:  # else there is nothing to wait for
+            for pause in self._wait(begins):
+                bus.run(iter(pause))
+            now = link.now()
+        self.began = now - self.origin
         told = volley(bus, (*orders, *self.reads), LOST, together=self.exactly)
-        self.ended = self.link.now() - self.origin
+        self.ended = link.now() - self.origin
         return told
 
     def _wait(self, moment: float) -> Iterator[Pause]:

@@ -19,6 +19,7 @@ from typing import Any, Final
 from motorbus.core.goal import Later, Stays
 from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
 from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.flock import Flocks
 from motorbus.motion.safety.guard import ENDLESS, PLACES, Guard, untold
 from motorbus.motion.safety.lease import Lease
 from motorbus.motion.safety.refusing import nobody_stops, nothing_known, stopped_since
@@ -50,6 +51,7 @@ class Gate:
         self.turning = Turning()
         self._tells = True
         self._waiting = Waiting()
+        self._flocks: Final = Flocks()
         self._stops: Stops = _none
         self._seen: Seen = {}
         self._tell: Callable[[], None] = _nothing
@@ -133,8 +135,13 @@ class Gate:
         if not self.guards:
             return not self.attended
         self._tell()
-        goals = exchange.goals
-        if not self._are_fine(goals, self._now()):
+        goals, now = exchange.goals, self._now()
+        flock = self._flocks.of(exchange.aim, self.guards)
+        if flock is not None and flock.are_fine(goals, self._seen, self._told_by, now):
+            if self._tells:
+                flock.tell()
+            return True
+        if not self._are_fine(goals, now):
             return False
         if self._tells:
             for goal in goals:
@@ -309,15 +316,19 @@ class Gate:
         if found is None or guard.track is None or found[1] is guard.answer:
             return
         exchange, answer = found
-        if answer is not self._answer:
-            where = exchange.tells_position
-            self._places = {} if isinstance(where, bool) else where(answer)
-            self._answer = answer
-        place = self._places.get(node)
+        place = self._told_by(exchange, answer).get(node)
         if place is not None:
             guard.track.take(place, answer.at)
         # last, so that an interrupt between these lines leaves it to be taken in once more
         guard.answer = answer
+
+    def _told_by(self, exchange: Exchange[Any], answer: Answer) -> Mapping[int, float]:
+        """Where those are (rad) whom this answer tells of; that of the last one is kept."""
+        if answer is not self._answer:
+            where = exchange.tells_position
+            self._places = {} if isinstance(where, bool) else where(answer)
+            self._answer = answer
+        return self._places
 
 
 def _stays(goal: Goal) -> bool:

@@ -119,6 +119,11 @@ class Guard:
             and abs(to - sample.value) <= self._near
         )
 
+    @property
+    def reach(self) -> tuple[float, float, float]:
+        """By what `is_fine` goes: the least and the greatest place (rad), and how far that may be from where it is."""
+        return self._low, self._high, self._near
+
     def check_known(self, node: int, now: float) -> None:
         """Raise Refused unless it is known where the device is, by a reading that is fresh and can be believed."""
         if self.track is None or not (why := self.track.why_not(now)):

@@ -93,13 +93,16 @@ class Watch:
         if now < self._next:
             return None
         node = self._turns[0]
+        overdue = now >= self._last.get(node, -inf) + OVERDUE * HEALTH
+        if slack <= 0.0 and not overdue:
+            return None
         wanted = self._axes[node].able["health"](self._axes[node].device)
         if not isinstance(
             wanted, Exchange
         ):  # others set it up anew, and it is not known well enough for the moment
             self._passed(node, now, 0.0)
             return None
-        if self._air(wanted) > slack and now < self._last.get(node, -inf) + OVERDUE * HEALTH:
+        if self._air(wanted) > slack and not overdue:
             return None
         return wanted
 

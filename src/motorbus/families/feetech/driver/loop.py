@@ -197,8 +197,10 @@ class _Gauges:
         scales = [(one.node.node, one.scale, one.factor) for one in how]
 
         def whole(data: bytes, at: float) -> Positions | Unlike:
-            if not are_sound(data) or list(map(settings_of_now, nodes)) != made_by:
+            nonlocal made_by
+            if not are_sound(data) or (by := list(map(settings_of_now, nodes))) != made_by:
                 return UNLIKE
+            made_by = by  # where they were read once more and are the same, that is seen at once from now on
             raws = unpack(data)
             if max(raws) >= plain:
                 return UNLIKE
@@ -214,8 +216,11 @@ class _Gauges:
     def _settled(self) -> bool:
         """Whether all have the settings by which they were read last."""
         for gauge in self._gauges.values():
-            if gauge.node.settings is not gauge.settings and gauge.node.settings != gauge.settings:
-                return False
+            settings = gauge.node.settings
+            if settings is not gauge.settings:
+                if settings != gauge.settings:
+                    return False
+                gauge.settings = settings  # the same, read once more: that is seen at once from now on
         return True
 
 
