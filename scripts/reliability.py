@@ -35,7 +35,7 @@ of the tests. To measure all of it again:
 make soak
 ```
 
-It takes hours; a part of it, as `make soak ARGS=tests/faults/test_lines.py`, renews the figures of that part alone.
+It takes hours; a part of it, as `make soak ARGS=tests/faults/test_chance.py`, renews the figures of that part alone.
 `make test` runs the same tests with fewer rounds, in virtual time. A commit with a plus had files that differed.
 
 **Wrong** is judged by what the simulated devices really held, which they keep a history of. A value is right if the
@@ -69,7 +69,7 @@ PROMISES: Final = {
     " project, and again during the recovery: old or new, reachable, locked, at most one device with an id.",
     5: "A day of jogging, monitoring and reconnecting writes nothing to an EEPROM.",
     6: "Ten minutes of garbage as fast as the line carries it, of five kinds: nothing hangs, no buffer has more than"
-    " 4 KiB, and the processor's time is bounded.",
+    " 4 KiB, and four times the garbage is about four times the work. What processor time it takes is told.",
     7: "No test of a fault can pass while its fault is switched off.",
 }
 

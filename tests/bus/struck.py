@@ -64,6 +64,12 @@ def struck(fault: str, data: bytes) -> list[tuple[float, bytes]]:
         "double": [(0.0, data), (0.0, data)],
         "doubled": [(0.0, data + data)],
         "split": [(0.0, data[:3]), (0.0001, data[3:])],
+        "bytes": [(number * 1e-5, data[number : number + 1]) for number in range(len(data))],
+        "split short": [(0.0, data[:3])],
+        "split late": [(0.0, data[:3]), (LATE, data[3:])],
+        "split surplus": [(0.0, data[:3]), (0.0001, data[3:]), (0.00011, b"\0")],
+        "split damaged": [(0.0, data[:3]), (0.0001, damaged(data[3:]))],
+        "split among": [(0.0, data[:3]), (0.0001, data[3:] + b"\xff\xff")],
         "merge": [(0.0, data + b"\xff\xff")],
         "surplus": [(0.0, data), (0.0002, data)],
         "foreign": [(0.0, b"\x12\x34"), (0.0, data)],
@@ -76,6 +82,7 @@ def struck(fault: str, data: bytes) -> list[tuple[float, bytes]]:
 FAULTS = (
     *("drop", "drop last", "corrupt", "late", "late last", "apart", "double", "doubled", "split", "merge"),
     *("surplus", "foreign", "alarm", "alarm last"),
+    *("bytes", "split short", "split late", "split surplus", "split damaged", "split among"),
     *("odd", "echo"),
 )
 

@@ -74,7 +74,11 @@ def unanswered(bus: Bus) -> list[int]:
 
 
 CASES = [(what, "", rest) for what in CALLS for rest in (0.0, 0.01)]
-CASES += [(what, fault, 0.0) for what in ("one", "group", "volley") for fault in ("late", "drop", "split")]
+CASES += [
+    (what, fault, 0.0)
+    for what in ("one", "group", "volley")
+    for fault in ("late", "drop", "split", "apart", "bytes")
+]
 
 
 @pytest.mark.parametrize(("what", "fault", "rest"), CASES)

@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
+from motorbus.bus import straight
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, Side
-from tests.bus.struck import Struck, kept, order, struck_bus
+from tests.bus.struck import FAULTS, Struck, kept, order, struck_bus
+from tests.conftest import Figures, Rounds
 
 
 def together(*calls: Any) -> list[BaseException]:
@@ -55,6 +57,94 @@ def test_threads_that_poll_one_servo_get_its_values_and_nobody_is_called_silent(
     assert wrong == []
     no_silence(bus)
     assert bus.statistics.nodes[1].ok >= 4 * count
+    bus.close()
+
+
+class Changing(Struck):
+    """What servo 1 tells is the number of the request that it answers; every so many-th time its reply is struck.
+
+    Now and then it is silent for so long that whoever asks gives up.
+    """
+
+    EVERY, SILENT, LONG = 17, 150, 6
+
+    def __init__(self, memory: Any) -> None:
+        super().__init__()
+        self.memory = memory
+        self.heard = self.struck = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            self.heard += 1
+            self.memory[57] = self.heard % 251
+            if self.heard % self.EVERY == 0:
+                self.fault = ONCE[self.heard // self.EVERY % len(ONCE)]
+                self.struck += 1
+            if self.EVERY < self.SILENT and self.heard % self.SILENT < self.LONG:
+                self.fault = "drop"
+                self.struck += 1
+        return super().carry(sender, data, at)
+
+
+ONCE = [fault for fault in FAULTS if fault != "echo"]
+"""A line does not begin to echo of a sudden and cease again."""
+
+
+class Launches:
+    """Counts what leaves by the straight way."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.straight = 0
+        launched = straight._launched
+
+        def counted(*given: Any) -> Any:
+            course = launched(*given)
+            self.straight += course is not None
+            return course
+
+        monkeypatch.setattr(straight, "_launched", counted)
+
+
+@pytest.mark.timeout(600)
+def test_l16_two_threads_that_share_one_kept_exchange_get_values_true_inside_their_call_and_errors_of_their_own(
+    rounds: Rounds, figures: Figures, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, simulator, _ = struck_bus(virtual=False)
+    line = bus.link.line = Changing(simulator.memory[1])  # type: ignore[attr-defined]
+    shared, left = kept(1), Launches(monkeypatch)
+    count = rounds(20_000, 200)
+    told: list[BaseException] = []
+    wrong: list[str] = []
+
+    def poll() -> None:
+        for _ in range(count):
+            before = line.heard
+            try:
+                (((_, _, _, value),), _) = bus.run(shared)
+            except MotorbusError as error:
+                told.append(error)
+                continue
+            true = [number % 251 for number in range(before + 1, line.heard + 1)]
+            if value not in true:
+                wrong.append(f"{value}, and it was one of {true}")
+
+    assert together(poll, poll) == []
+    ledger = bus.statistics.nodes[1]
+    assert wrong == []
+    assert line.struck >= 2 * count // Changing.EVERY
+    assert len({id(error) for error in told}) == len(told), "nobody is told what another one was told"
+    assert ledger.sent == ledger.ok + sum(ledger.errors.values())
+    assert len(told) + ledger.retries <= sum(ledger.errors.values())
+    assert told
+    assert left.straight >= count / 10, f"{left.straight} have left by the straight way"
+    assert not bus.turns.waiting
+    assert bus.relay.pumper is None
+    line.EVERY = 1 << 30
+    assert bus.run(shared) == ([(1, 0, 1, line.heard % 251)], ())
+    figures(
+        "L16 two threads that share one exchange, the straight way", family="feetech", reads=2 * count,
+        faults=line.struck, wrong=len(wrong), failed=len(told), straight=left.straight,
+    )  # fmt: skip
     bus.close()
 
 

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from motorbus.bus.trust import EQUAL_RUN, FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from motorbus.bus.trust import ATTEMPTS, EQUAL_RUN, FORGOTTEN_AFTER, LONGEST_BACK_OFF, Trust
 from motorbus.core.operation import Due, Exchange
 from motorbus.families.feetech import FAMILY
 from motorbus.families.kst import FAMILY as KST
 from motorbus.families.kst.wire import encode_upload, upload_due
+from motorbus.families.stepper import FAMILY as STEPPER
 from tests.bus.script import position
 
 DUE = Due(1, 1, 8)
@@ -115,3 +122,53 @@ def test_many_equal_replies_on_can_must_be_vouched_for_by_a_probe() -> None:
     assert trust.of(0x25).tainted
     trust.believe(upload_due(0x25, 0x3000), barrier=True)
     assert not trust.of(0x25).tainted
+
+
+def looked_for(trust: Trust, attempt: int, outstanding: dict[Any, float]) -> Exchange[bool]:
+    """The probe that is found by looking at one after the other: the first that is free, else the oldest."""
+    oldest: tuple[float, Exchange[bool]] | None = None
+    for number in range(attempt, attempt + ATTEMPTS):
+        probe = trust.family.probe(1, number % ATTEMPTS)
+        due = probe.replies[0]  # type: ignore[index]  # a probe has exactly one reply
+        asked_at = outstanding.get((probe.lane, due.key, due.length))
+        if asked_at is None:
+            return probe
+        if oldest is None or asked_at < oldest[0]:
+            oldest = asked_at, probe
+    assert oldest is not None
+    return oldest[1]
+
+
+@pytest.mark.parametrize("family", [FAMILY, KST, STEPPER])
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(("miss",) * 12 + ("late", "believe", "lost", "old")),
+            st.sampled_from((0.0, 0.02, 0.3, 2.0)),
+        ),
+        max_size=150,
+    )
+)
+@example([("miss", 0.02)] * 150)
+@example([("miss", 0.0)] * 150)
+def test_a_probe_is_the_one_that_looking_at_all_would_find(
+    family: Any, steps: list[tuple[str, float]]
+) -> None:
+    trust, now = Trust(family), 10.0
+    for what, later in steps:
+        now += later
+        one = trust.of(1)
+        fresh = {kind: at for kind, at in one.outstanding.items() if now - at <= FORGOTTEN_AFTER}
+        wanted = looked_for(trust, one.attempt, fresh)
+        probe = trust.probe(1, now)
+        assert one.outstanding == fresh
+        assert (probe.request, probe.replies, probe.lane) == (wanted.request, wanted.replies, wanted.lane)
+        due = probe.replies[0]  # type: ignore[index]  # a probe has exactly one reply
+        if what == "late":
+            trust.late(probe.lane, due.key, due.length)
+        elif what == "believe":
+            trust.believe(due, barrier=True)
+        elif what == "lost":
+            trust.doubt_everyone(now, QUIET)
+        else:
+            trust.missed(probe.lane, due, now - (1.0 if what == "old" else 0.0), QUIET)

@@ -62,7 +62,7 @@ def leaving(frame: FrameType) -> bool:
 class Scissors:
     """Raises this before the nth executed line, and `later` lines on once more.
 
-    `where` is the first of the two, None when there were fewer lines.
+    `where` is the first of the two and `second` the other, None when there were fewer lines.
     """
 
     def __init__(self, at: int, error: type[BaseException], later: int = 0) -> None:
@@ -71,6 +71,7 @@ class Scissors:
         self.error = error
         self.count = 0
         self.where: str | None = None
+        self.second: str | None = None
         self.walked: list[tuple[object, int]] = []
         self._outside: FrameType | None = None
 
@@ -96,18 +97,48 @@ class Scissors:
                 self.walked.append((frame.f_code, frame.f_lineno))
             elif self.count in (self.at, self.again):
                 name = Path(frame.f_code.co_filename).relative_to(PACKAGE)
-                self.where = self.where or f"{name}:{frame.f_lineno} in {frame.f_code.co_name}"
+                place = f"{name}:{frame.f_lineno} in {frame.f_code.co_name}"
+                if self.where is None:
+                    self.where = place
+                else:
+                    self.second = place
+                self._struck()
                 raise self.error
         return self._line
 
+    def _struck(self) -> None:
+        """It is about to be raised."""
+
+
+class Twice(Scissors):
+    """Strikes a second time for sure: a tracer that raises is put away, and this one is taken up again."""
+
+    def _struck(self) -> None:
+        if self.count < self.again:
+            sys.setprofile(self._on)
+
+    def _on(self, frame: FrameType, event: str, argument: object) -> None:
+        """At the next call or return: all who are at work are watched from here on."""
+        sys.setprofile(None)
+        there: FrameType | None = frame
+        while there is not None:
+            if ours(there.f_code.co_filename) and there.f_code.co_filename != WORLD:
+                there.f_trace = self._line
+            there = there.f_back
+        sys.settrace(self)
+
 
 class Outcome(NamedTuple):
-    """What came of a call that was cut: its value, or what it raised; where it was cut, or all lines if it was not."""
+    """What came of a call that was cut: its value, or what it raised; where it was cut, or all lines if it was not.
+
+    `again` is where it was cut a second time.
+    """
 
     value: Any
     error: BaseException | None
     where: str | None
     walked: list[tuple[object, int]]
+    again: str | None = None
 
 
 def cut(
@@ -115,20 +146,22 @@ def cut(
     at: int = NEVER,
     error: type[BaseException] = KeyboardInterrupt,
     later: int = 0,
+    scissors: type[Scissors] = Scissors,
 ) -> Outcome:
-    """Do it, cut at this line, and so many lines later once more."""
-    scissors, before = Scissors(at, error, later), sys.gettrace()
+    """Do it, cut at this line, and so many lines later once more; for sure where the `scissors` are `Twice`."""
+    tracer, before = scissors(at, error, later), sys.gettrace()
     value, raised = None, None
     gc.disable()  # what an earlier call has left behind is no line of this one
-    sys.settrace(scissors)
+    sys.settrace(tracer)
     try:
         value = act()
     except BaseException as caught:
         raised = caught
     finally:
+        sys.setprofile(None)
         sys.settrace(before)
         gc.enable()
-    return Outcome(value, raised, scissors.where, scissors.walked)
+    return Outcome(value, raised, tracer.where, tracer.walked, tracer.second)
 
 
 def places(walked: list[tuple[object, int]], visits: int, most: int) -> list[int]:

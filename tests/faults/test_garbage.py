@@ -1,7 +1,8 @@
 """Row L9: something that never stops talking, at line rate, on each family's line. No call hangs, nothing piles up.
 
 In the soak it is ten minutes of each kind of garbage, and a call every twentieth of a second. What processor time a
-minute of it takes is told and not judged. A wire carries no more than its rate, and the simulated one holds back what
+minute of it takes is told and not judged; that work does not grow faster than garbage is shown in
+`test_work_on_garbage`. A wire carries no more than its rate, and the simulated one holds back what
 it is given beyond that: so garbage fills what the answers leave of it, or it would pile up before it for ever.
 """
 
@@ -30,6 +31,7 @@ from tests.faults.slcan_rig import SlcanRig, TextLink
 
 MOST = 4096
 """Bytes that a receiver may hold back."""
+SEED = 1
 MINUTES = 10
 EVERY = 0.01
 """s between two pieces of garbage."""
@@ -50,7 +52,7 @@ class Babble:
     def __init__(self, link: MemoryLink, garbage: Callable[[Random], list[Data]]) -> None:
         self.link = link
         self.inner: Any = link.simulator
-        random = Random(1)
+        random = Random(SEED)
         self.pool = [garbage(random) for _ in range(POOL)]
         self.pieces = self.full = 0
         self.next = link.now()
@@ -84,16 +86,23 @@ class Babble:
 
 
 class Watched:
-    """A receiver, and the most bytes that it has held back."""
+    """A receiver, and the most bytes that it, or the reader before it, has held back; None where there are none."""
 
-    def __init__(self, receiver: Any, held: Callable[[], int]) -> None:
+    def __init__(self, receiver: Any, held: Callable[[], int | None]) -> None:
         self.receiver = receiver
-        self.most = 0
+        self.most: int | None = None
         self._held = held
+
+    @property
+    def held(self) -> int:
+        held: int = self.receiver.held
+        return held
 
     def feed(self, data: Data) -> list[Event]:
         events: list[Event] = self.receiver.feed(data)
-        self.most = max(self.most, self._held())
+        held = self._held()
+        if held is not None:
+            self.most = max(self.most or 0, held)
         return events
 
     def flush(self) -> list[Event]:
@@ -142,24 +151,24 @@ CONTROLLER: dict[str, Callable[[Random], list[Data]]] = {
 }
 
 
-def servos() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+def servos() -> tuple[Any, Callable[[], object], Callable[[], int | None]]:
     rig = Rig(ids=(1,), options={"pace": True})
     return rig, lambda: read_word(rig), lambda: _receiver(rig).held
 
 
-def can() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+def can() -> tuple[Any, Callable[[], object], Callable[[], int | None]]:
     rig = KstRig()
-    return rig, lambda: read_2(rig), lambda: 0  # one frame is one event
+    return rig, lambda: read_2(rig), lambda: None  # one frame is one event
 
 
-def text() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+def text() -> tuple[Any, Callable[[], object], Callable[[], int | None]]:
     rig = SlcanRig()
     assert isinstance(rig.link, TextLink)
     reader = rig.link.reader
     return rig, lambda: read_2(rig), lambda: len(reader._rest)
 
 
-def controller() -> tuple[Any, Callable[[], object], Callable[[], int]]:
+def controller() -> tuple[Any, Callable[[], object], Callable[[], int | None]]:
     rig = StepperRig(PerfectLine(), 1)
     rig.open()
 
@@ -213,7 +222,7 @@ def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Roun
     used = time.process_time() - before
     assert babble.pieces > 10 * seconds
     assert babble.pieces + babble.full >= 0.99 * seconds / EVERY
-    assert watched.most <= MOST
+    assert line == "kst" or (watched.most is not None and watched.most <= MOST)
     assert took <= longest
     assert max(link._free.values()) < link.now() + LONGEST_ANSWER, (
         "the wire of the rig holds back more and more"
@@ -225,5 +234,6 @@ def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Roun
     figures(
         f"L9 {seconds / 60:.2g} minutes of garbage: {kind}",
         family=line, promise=6, pieces=babble.pieces, full=babble.full, calls=calls, succeeded=good,
-        longest_s=round(took, 3), most_bytes_held=watched.most, core_seconds_per_minute=round(used / seconds * 60, 2),
+        longest_s=round(took, 3), core_seconds_per_minute=round(used / seconds * 60, 2), seed=SEED,
+        **({} if watched.most is None else {"most_bytes_held": watched.most}),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Nothing piles up: ten thousand unplugs in memory, hundreds on real ports; descriptors, threads and memory stay level.
+"""Nothing piles up: ten thousand unplugs in memory, thousands on real ports; descriptors, threads, memory stay level.
 
 What the first cycles leave behind (caches, modules, arenas) is not counted; after those there must be no slope.
 """
@@ -98,7 +98,7 @@ def test_real_ports_that_come_and_go_leave_nothing_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-    cycles = rounds(200, 6)
+    cycles = rounds(5_000, 6)
     before, after = slope(plugged_and_pulled, cycles)
     assert level(before, after), (before, after)
     figures(

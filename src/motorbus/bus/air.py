@@ -13,7 +13,7 @@ from typing import Any
 from motorbus.bus import verdict
 from motorbus.bus.echo import Echo
 from motorbus.bus.known import Known
-from motorbus.bus.pace import Pace, byte_time, least_time, patience
+from motorbus.bus.pace import SETTLE, Pace, byte_time, least_time, patience
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.ticket import Flight, Ticket, all_taken
 from motorbus.bus.trace import Feed, TraceRecord
@@ -33,7 +33,6 @@ from motorbus.core.operation import (
     Reply,
 )
 
-SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 ECHO_SETTLE = 3.0  # byte times after a reply that may be the beginning of an echo, for the rest of it
 
 

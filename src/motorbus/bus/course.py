@@ -15,7 +15,7 @@ from math import inf
 from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.bus.pace import EARLY, least_time, patience
+from motorbus.bus.pace import EARLY, SETTLE, byte_time, least_time, patience
 from motorbus.bus.statistics import BUCKETS, bucket_of
 from motorbus.bus.ticket import Flight
 from motorbus.bus.trust import GROUP_RUN
@@ -66,6 +66,10 @@ class Course(Flight):
     `era` is when the bus was found fit for it, `wait` (s) what its answer may take, `least` what it must take.
     `data` and `at` are the last answer; `pending` says that not all know it whom it concerns. `times` are the answers
     since they were counted last, by their buckets, of which the last one reached from `low` to `high` (s).
+
+    An answer has `size` bytes, and before `thinks` (s) are left of its time nothing of it need be looked at. Of one
+    that comes in pieces, `held` has those that have come, the last one at `held_at`; a byte that is one too many would
+    be there `settle` (s) later.
     """
 
     __slots__ = (
@@ -76,6 +80,8 @@ class Course(Flight):
         "era",
         "first",
         "group",
+        "held",
+        "held_at",
         "high",
         "holder",
         "ids",
@@ -89,6 +95,9 @@ class Course(Flight):
         "own",
         "pending",
         "request",
+        "settle",
+        "size",
+        "thinks",
         "times",
         "trusts",
         "turns",
@@ -116,12 +125,14 @@ class Course(Flight):
         self.trusts: Final = tuple(turns.trust.of(id) for id in self.ids)
         self.first: Final = self.trusts[0]
         self.length: Final = dues[0].length
+        self.size: Final = sum(due.length for due in dues)
         self.most: Final[float] = inf if exchange.other is None else 1 if len(dues) == 1 else GROUP_RUN
         self.group: Final[Course | None] = None if len(dues) == 1 else twin or self
         self.era = STALE
-        self.wait = self.least = 0.0
+        self.wait = self.least = self.thinks = self.settle = 0.0
         self.data: Data = b""
-        self.at = -inf
+        self.at = self.held_at = -inf
+        self.held: list[bytes] = []
         self.pending = self.counting = False
         self.times = [0] * BUCKETS
         self.low = self.high = 0.0
@@ -142,7 +153,9 @@ class Course(Flight):
         self.abandoned, self.left, self.tries = False, True, 0
         self.unbelieved, self.echo_checked = (), False
         self.reset()
-        self.wait = turns.allowance(self.own)
+        self.thinks = patience(self.own, turns.family, turns.latency)
+        self.wait = turns.family.air_time(self.own, turns.rate) + self.thinks
+        self.settle = SETTLE * byte_time(self.own, turns.family, turns.rate)
         self.least = -inf if pace is None else EARLY * least_time(self.own, turns.family, turns.rate)
         self.era = turns.lock.era
         return True
@@ -244,6 +257,9 @@ class Straight:
             turns.statistics.asked(course_aloft.exchange.replies)
             turns.aloft = None
         turns.lock.owing = False
+        if course_aloft is not None and course_aloft.held:
+            held, course_aloft.held = course_aloft.held, []
+            turns.feed(held, course_aloft.held_at)
 
     def regroup(self: Any, course: Course) -> None:
         """Another course is flown than the last one. How long the last answers of its nodes were must be known, to
@@ -263,6 +279,8 @@ class Straight:
         turns: Turns = self
         if not turns.pending and not turns.aims:
             return
+        if len(turns.pending) == 1 == len(turns.aims) and self._told_at_once(turns):
+            return
         events: list[tuple[float, Aim | Course]] = [(course.at, course) for course in turns.pending]
         events += [(at, aim) for aim, at in turns.aims.items() if at > -inf]  # behind an answer as old
         for _, event in sorted(events, key=itemgetter(0)):
@@ -275,6 +293,25 @@ class Straight:
                 turns.known.saw(event.ids, event.own, answer)
             event.pending = False
         turns.pending.clear()
+
+    @staticmethod
+    def _told_at_once(turns: Turns) -> bool:
+        """The same in the usual case: one order left, and after it all told where they are whom it was for; else false.
+
+        That they were not known for a while is told nobody.
+        """
+        (course,), ((aim, left),) = turns.pending, turns.aims.items()
+        exchange, at, known = course.own, course.at, turns.known
+        if not left < at or not exchange.tells_position or not course.nodes.issuperset(aim.ordered):
+            return False
+        if left > -inf:
+            known.follow(aim.ordered)
+            turns.aims[aim] = -inf
+        answer = Answered((exchange.replies, course.lane, course.data), (), at)  # type: ignore[arg-type]
+        known.saw(course.ids, exchange, answer)
+        course.pending = False
+        turns.pending.clear()
+        return True
 
     def orders(self: Any, exchange: Exchange[Any], now: float) -> None:
         """This leaves, and sets something moving. The caller holds the lock."""
@@ -291,12 +328,6 @@ class Straight:
         """`settle`, if there is anything, for somebody who has not the lock."""
         with self.lock:
             pass
-
-    def allowance(self: Any, exchange: Exchange[Any]) -> float:
-        """s that the answer to this may take, once it has left."""
-        turns: Turns = self
-        family = turns.family
-        return family.air_time(exchange, turns.rate) + patience(exchange, family, turns.latency)
 
 
 def _count(turns: Turns, course: Course) -> None:

@@ -25,7 +25,8 @@ class BusFace:
     refused. `report` gets the events of operations (progress, early results, journal records). `journal` gets the
     journal records before anybody else, whoever listens. `stop_socket` is where another process can ask for an
     emergency stop. `warnings` are what the user ought to know about this bus. `readdressed`, where somebody has set it,
-    hears before anybody else that a device is about to answer to another id.
+    hears before anybody else that a device is about to answer to another id. Where it `sleeps`, who asks the same
+    again and again is not woken before the whole of the answer can be there.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class BusFace:
         )
         self.turns.trouble = getattr(link, "trouble", str)
         self.turns.renewal = link if isinstance(link, Renewable) else None
+        self.sleeps = bool(getattr(link, "sleeps", False)) and not link.virtual
         self.changed = Condition(self.turns.lock)
         self.stopper = Stopper(link, self.turns, stop_socket)
         if stop_socket is not None:

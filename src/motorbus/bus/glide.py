@@ -40,13 +40,17 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
         return UNLIKE
     news: asyncio.Future[Any] = loop.create_future()
     try:
-        course = rise(turns, bus.link, exchange, _bell(loop, news))
-        if course is None:
-            return UNLIKE
-        watch.expect(course, news)
-        value = await news
-    except BaseException:
-        _cut_short(turns, exchange)
+        try:
+            course = rise(turns, bus.link, exchange, _bell(loop, news))
+            if course is None:
+                return UNLIKE
+            watch.expect(course, news)
+            value = await news
+        except BaseException:
+            _cut_short(turns, exchange)
+            raise
+    except BaseException:  # a second interrupt may fall into what the first one has brought about
+        let_go(turns.lock)
         raise
     if (
         value is UNLIKE
@@ -137,7 +141,8 @@ def rise(turns: Turns, link: Link, exchange: Exchange[Any], wake: Callable[[], N
 
 
 def touch_down(turns: Turns, link: Link, course: Course, news: asyncio.Future[Any]) -> bool:
-    """Something has come: True when it is the whole answer, which is handed over; else all of it has been taken in."""
+    """Something has come: True when it is the whole answer, which is handed over, or a piece of it, which is kept; else
+    all of it has been taken in."""
     looked, arrived = link.now(), link.read(-inf)
     if len(arrived) == 1 and _is_it(turns, link, course, news, arrived[0]):
         return True
@@ -149,16 +154,35 @@ def touch_down(turns: Turns, link: Link, course: Course, news: asyncio.Future[An
 def _is_it(turns: Turns, link: Link, course: Course, news: asyncio.Future[Any], data: Data) -> bool:
     lock, is_it = turns.lock, False
     try:
-        lock.acquire()
-        at = min(link.now(), course.deadline)  # a loop that was held up takes it in late
-        if turns.aloft is course and at - course.sent_at >= course.least and not news.done():
-            value = course.whole(data, at)
-            if value is not UNLIKE:
-                course.lands(data, at)
-                news.set_result(value)
-                is_it = True
-        lock.release()
-    except BaseException:
+        try:
+            lock.acquire()
+            at = min(link.now(), course.deadline)  # a loop that was held up takes it in late
+            if turns.aloft is course and not news.done():
+                if len(data) + sum(map(len, course.held)) < course.size:
+                    course.held.append(data)  # type: ignore[arg-type]  # bytes, as the bus is calm
+                    course.held_at, is_it = at, True
+                else:
+                    is_it = _ends(course, news, data, at)
+            lock.release()
+        except BaseException:
+            let_go(lock)
+            raise
+    except BaseException:  # as in `glide`
         let_go(lock)
         raise
     return is_it
+
+
+def _ends(course: Course, news: asyncio.Future[Any], last: Data, at: float) -> bool:
+    """With this the answer is there: hand it over. False where it is none as it should be, or another look is needed,
+    as its last packet came in pieces: then a byte may follow that is one too many."""
+    if at - course.sent_at < course.least or (course.held and len(last) < course.length):
+        return False
+    data = b"".join((*course.held, last)) if course.held else last  # type: ignore[arg-type]
+    value = course.whole(data, at)
+    if value is UNLIKE:
+        return False
+    course.held = []
+    course.lands(data, at)
+    news.set_result(value)
+    return True

@@ -23,6 +23,7 @@ MARGIN = {  # s; a busy host may run this late without a reply counting as missi
     Timeout.REPLY: 0.02,
     Timeout.STORE: 0.02,
 }
+SETTLE = 1.5  # byte times after a reply that came in pieces, for the byte that would be one too many
 DIRECT = 0.001  # s; a link of less latency has no adapter that holds bytes back
 
 

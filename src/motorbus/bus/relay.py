@@ -11,9 +11,10 @@ from collections.abc import Callable
 from math import inf
 from threading import Condition, get_ident
 
-from motorbus.bus.crank import crank, launch, push, take_in
+from motorbus.bus.crank import IDLE, crank, launch, push, take_in
 from motorbus.bus.ticket import Flight
 from motorbus.bus.turns import Turns
+from motorbus.errors import LinkError
 from motorbus.link.base import Link
 
 SHORT = 0.001  # s; the shortest nap
@@ -30,6 +31,7 @@ class Relay:
         self.pumper: int | None = None
         self.bells: set[Callable[[], None]] = set()
         self._lock = turns.lock  # that of `changed`; taken by itself it costs less
+        self._waiting: set[int] = set()  # the threads that may wait for it; one too many does no harm
 
     def start(self, *flights: Flight) -> None:
         """Send this exchange at once where the bus is idle, and take in what comes; queue it otherwise.
@@ -55,17 +57,26 @@ class Relay:
 
     def turn(self) -> None:
         """Let time pass: pump, or wait for the thread that does."""
-        with self.changed:
-            if self.pumper not in (None, get_ident()):
+        own = get_ident()
+        with self._lock:
+            if self.pumper not in (None, own):
                 take_in(self.link, self.turns, -inf)  # the one who pumps may wait for something far away
                 push(self.link, self.turns)
-                self.changed.wait(min(NAP, max(self.turns.due() - self.link.now(), SHORT)))
+                self._wait(own)
                 return
-            self.pumper = get_ident()
+            self.pumper = own
         try:
-            crank(self.link, self.turns, inf)
+            if not asked_again(self.link, self.turns):
+                crank(self.link, self.turns, inf)
         finally:
             self.hand_over()
+
+    def _wait(self, own: int) -> None:
+        self._waiting.add(own)
+        try:
+            self.changed.wait(min(NAP, max(self.turns.due() - self.link.now(), SHORT)))
+        finally:
+            self._waiting.discard(own)
 
     def claim(self) -> bool:
         """Become the one who pumps, unless another thread does."""
@@ -77,17 +88,19 @@ class Relay:
 
     def hand_over(self) -> None:
         """Pump no longer: whoever waits may."""
-        with self.changed:
+        with self._lock:
             self.pumper = None
-            self.changed.notify_all()
+            if self._waiting:
+                self.changed.notify_all()
         if self.bells:
             for ring in tuple(self.bells):
                 ring()
 
     def wake(self) -> None:
         """Something has been settled."""
-        with self.changed:
-            self.changed.notify_all()
+        if self._waiting:
+            with self._lock:
+                self.changed.notify_all()
 
     def recover(self) -> None:
         """After an interrupt: stop being the one that pumps, and let go of the lock as often as it is held."""
@@ -99,3 +112,25 @@ class Relay:
                 self.turns.lock.release()
         except RuntimeError:  # not held (any more): the usual case
             pass
+
+
+def asked_again(link: Link, turns: Turns) -> bool:
+    """A turn of the crank, where a probe is all there is to do; False where it is not, and nothing has left."""
+    try:
+        with turns.lock:
+            probe = turns.sole_probe(link)
+            if probe is None:
+                return False
+            link.write(probe.exchange.request)
+        looked = link.now()
+        arrived = link.read(min(probe.deadline, looked + IDLE))
+        if not arrived:  # a host that was held up looks once more before it calls a node silent
+            looked = link.now()
+            arrived = link.read(looked)
+        with turns.lock:
+            if arrived or not turns.is_unanswered(probe, looked):
+                turns.feed(arrived, link.now(), looked)
+    except LinkError as error:
+        with turns.lock:
+            turns.lost(error)
+    return True

@@ -155,7 +155,12 @@ class Run(Generic[T]):
             self._grant(branch, wish)
 
     def _grant(self, branch: Branch, wish: Step) -> None:
-        if isinstance(wish, Together):
+        if isinstance(wish, Exchange):
+            if not branch.looked and wish.effect in GATED and questions(self.turns, wish):
+                branch.children = [Branch(_looked(self.turns, wish), branch, looked=True)]
+            else:
+                self._await(branch, Flight(wish, branch.owner, self.wake))
+        elif isinstance(wish, Together):
             branch.children = [Branch(operation, branch) for operation in wish.operations]
         elif isinstance(wish, Alone):
             child = Branch(wish.operation, branch, alone=True)
@@ -165,18 +170,10 @@ class Run(Generic[T]):
             self._await(child, child.claim)
         elif isinstance(wish, Report):
             self._notify(branch, wish.event)
-        elif isinstance(wish, Exchange) and self._must_look(branch, wish):
-            branch.children = [Branch(_looked(self.turns, wish), branch, looked=True)]
         else:
             self._await(branch, self._ticket(branch.owner, wish))
 
-    def _must_look(self, branch: Branch, wish: Exchange[Any]) -> bool:
-        """Whether something must be asked before this order can be judged."""
-        return not branch.looked and wish.effect in GATED and bool(questions(self.turns, wish))
-
-    def _ticket(self, owner: object, wish: Exchange[Any] | Pause | Listen | Tune) -> Ticket:
-        if isinstance(wish, Exchange):
-            return Flight(wish, owner, self.wake)
+    def _ticket(self, owner: object, wish: Pause | Listen | Tune) -> Ticket:
         if isinstance(wish, Tune):
             return Retune(wish, owner, self.wake)
         if isinstance(wish, Listen):

@@ -1,9 +1,9 @@
 """The straight way of an exchange that is run again and again: a control loop does little else.
 
-When the bus is as it was when it was found idle and clean, the request leaves, the whole answer comes at one look, and
-all there is to do is to check it and to say what it means: `fly`. What nobody answers just leaves: `cast`. Whatever is
-otherwise goes the usual way; an answer that is not exactly the one that is due finds a flight in the air like any
-other. A test proves that both ways give the same.
+When the bus is as it was when it was found idle and clean, the request leaves, the whole answer comes at one look, or
+piece by piece, and all there is to do is to check it and to say what it means: `fly`. What nobody answers just leaves:
+`cast`. Whatever is otherwise goes the usual way; an answer that is not exactly the one that is due finds a flight in
+the air like any other. A test proves that both ways give the same.
 
 Here microseconds count, so what elsewhere would be three functions is one.
 """
@@ -15,6 +15,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus.bus.course import Course
+from motorbus.bus.pieces import gathered
 from motorbus.bus.run import taken
 from motorbus.bus.ticket import Flight
 from motorbus.core.operation import UNLIKE, Answer, Data, Exchange, Rank, Unlike
@@ -50,40 +51,50 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
     """
     turns, lock = bus.turns, bus.turns.lock
     course: Course | None = exchange.course
-    if course is None or course.turns is not turns:
-        try:
-            course = charted(turns, exchange)
-        except BaseException:
-            bus.relay.recover()
-            raise
-        if course is None:
-            return UNLIKE
+    if (course is None or course.turns is not turns) and (course := _found(bus, exchange)) is None:
+        return UNLIKE
     launched = None
     try:
-        launched = _launched(bus, course, ahead)
-        if launched is None:
-            return UNLIKE
-        course = launched
-        arrived = bus.link.read(course.deadline)
-        if len(arrived) == 1:
-            lock.acquire()  # let go of it below, or where the flight falls: behind an inner `try` a line would be bare
-            at = bus.link.now()
-            if at > course.deadline:  # a host that was held up takes it in late
-                at = course.deadline
-            if turns.aloft is course and at - course.sent_at >= course.least:
-                value: T | Unlike = course.whole(arrived[0], at)
-                if value is not UNLIKE:
-                    course.lands(arrived[0], at)
-                    bus.relay.pumper = None
-                    lock.release()
-                    return value
-            lock.release()
-        _astray(bus, course, arrived)
-    except BaseException as error:
-        _fallen(bus, launched, error)
+        try:
+            launched = _launched(bus, course, ahead)
+            if launched is None:
+                return UNLIKE
+            course = launched
+            if bus.sleeps:
+                bus.link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
+            arrived = bus.link.read(course.deadline)
+            if len(arrived) == 1:
+                lock.acquire()  # let go of it below, or where the flight falls
+                at = bus.link.now()
+                if at > course.deadline:  # a host that was held up takes it in late
+                    at = course.deadline
+                if turns.aloft is course and at - course.sent_at >= course.least:
+                    value: T | Unlike = course.whole(arrived[0], at)
+                    if value is not UNLIKE:
+                        course.lands(arrived[0], at)
+                        bus.relay.pumper = None
+                        lock.release()
+                        return value
+                lock.release()
+            if (value := gathered(bus, course, arrived)) is not UNLIKE:
+                return value  # type: ignore[no-any-return]
+            _astray(bus, course, arrived)
+        except BaseException as error:
+            _fallen(bus, launched, error)
+            raise
+    except BaseException:  # a second interrupt may fall into what the first one has brought about
+        bus.relay.recover()
         raise
     answer: Any = course.result()
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
+
+
+def _found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
+    try:
+        return charted(bus.turns, exchange)
+    except BaseException:
+        bus.relay.recover()
+        raise
 
 
 def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course | None:
@@ -125,11 +136,15 @@ def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
     if exchange.replies != ():
         return UNLIKE
     try:
-        lock.acquire()
-        moment = _thrown(bus, exchange)
-        lock.release()
-    except BaseException as error:
-        _fallen(bus, None, error)
+        try:
+            lock.acquire()
+            moment = _thrown(bus, exchange)
+            lock.release()
+        except BaseException as error:
+            _fallen(bus, None, error)
+            raise
+    except BaseException:  # as in `fly`
+        bus.relay.recover()
         raise
     if moment is None:
         return UNLIKE

@@ -112,7 +112,10 @@ class Flight(Ticket):
         wake: Callable[[], None] | None = None,
         parent: Flight | None = None,
     ) -> None:
-        super().__init__(owner, wake)
+        self.owner, self.wake = owner, wake  # as `Ticket` does, and `reset`: here lines count
+        self.deadline = inf
+        self.value = self.error = None
+        self.done = False
         self.exchange = exchange
         self.parent = parent
         self.tries = 0

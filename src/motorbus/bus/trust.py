@@ -9,7 +9,8 @@ nothing older can follow.
 
 from __future__ import annotations
 
-from typing import Any
+from math import inf
+from typing import Any, TypeAlias
 
 from motorbus.core.family import Family
 from motorbus.core.operation import ANY, Due, Exchange, Key
@@ -21,6 +22,11 @@ GROUP_RUN = 8  # group replies of one length in a row; another length costs a by
 EQUAL_RUN = 128  # equal replies in a row from a node on CAN, where nothing but a probe shows that they are all one old
 ATTEMPTS = 64  # probes looked at to find one that differs from all outstanding replies
 
+Kind: TypeAlias = "tuple[int, Key, int]"
+"""What a reply is known by: its lane, its key, its length."""
+Look: TypeAlias = "tuple[Kind, int, Exchange[bool]]"
+"""What a probe is known by, how many have been looked at with it, and the probe."""
+
 
 class NodeTrust:
     """One node: may it be believed, what is still outstanding, when may it be probed."""
@@ -29,9 +35,11 @@ class NodeTrust:
         "asked_at",
         "attempt",
         "equal",
+        "from_here",
         "key",
         "lane",
         "length",
+        "oldest",
         "outstanding",
         "probe_at",
         "probes",
@@ -54,7 +62,9 @@ class NodeTrust:
         self.silent = 0
         self.attempt = 0
         self.probes: list[Exchange[bool]] = []
-        self.outstanding: dict[tuple[int, Key, int], float] = {}
+        self.from_here: tuple[int, list[Look]] = -1, []  # where to look from, and what is looked at
+        self.outstanding: dict[Kind, float] = {}
+        self.oldest = inf  # s; none of those was asked before
 
 
 class Trust:
@@ -85,6 +95,8 @@ class Trust:
         """This reply did not come in time and may still come."""
         trust = self.of(due.node)
         trust.outstanding[lane, due.key, due.length] = now
+        if now < trust.oldest:
+            trust.oldest = now
         if len(trust.outstanding) > OUTSTANDING:
             del trust.outstanding[next(iter(trust.outstanding))]
         trust.quiet_until = now + quiet
@@ -136,17 +148,17 @@ class Trust:
         return False
 
     def probe(self, node: int, now: float) -> Exchange[bool]:
-        """The next probe of this node whose reply differs from every reply outstanding."""
+        """The next probe of this node whose reply differs from every reply outstanding; else from the later ones."""
         trust = self.of(node)
-        for kind, asked in list(trust.outstanding.items()):
-            if now - asked > FORGOTTEN_AFTER:
-                del trust.outstanding[kind]
+        if now - trust.oldest > FORGOTTEN_AFTER:
+            _forget(trust, now)
+        if len(trust.probes) == ATTEMPTS:
+            return _next_of_all(trust)
         oldest: tuple[float, Exchange[bool]] | None = None
         for _ in range(ATTEMPTS):
             exchange = self._made(node, trust)
             trust.attempt += 1
-            due = exchange.replies[0]  # type: ignore[index]  # a probe has exactly one reply
-            asked_at = trust.outstanding.get((exchange.lane, due.key, due.length))
+            asked_at = trust.outstanding.get(_kind(exchange))
             if asked_at is None:
                 return exchange
             if oldest is None or asked_at < oldest[0]:
@@ -155,11 +167,13 @@ class Trust:
         return oldest[1]
 
     def _made(self, node: int, trust: NodeTrust) -> Exchange[bool]:
-        """The probe of this attempt. They are kept, for of a node that answers nothing many are looked at each time."""
-        number = trust.attempt % ATTEMPTS
-        if number == len(trust.probes):
-            trust.probes.append(self.family.probe(node, number))
-        return trust.probes[number]
+        """The probe of this attempt. They are kept, for of a node that answers nothing many are looked at each time,
+        and made each time as many as there are: whoever needs the second one soon needs them all."""
+        number, made = trust.attempt % ATTEMPTS, trust.probes
+        if number == len(made):
+            more = range(number, min(2 * number or 1, ATTEMPTS))
+            made += [self.family.probe(node, attempt) for attempt in more]
+        return made[number]
 
     def doubt_everyone(self, now: float, quiet: float) -> None:
         """The line to all of them was cut, and is there again: what is outstanding may still come, from now on."""
@@ -168,6 +182,7 @@ class Trust:
             trust.quiet_until = now + quiet
             trust.silent = 0
             trust.outstanding = dict.fromkeys(trust.outstanding, now)
+            trust.oldest = min(trust.oldest, now)
 
     def stayed_silent(self, node: int, now: float, quiet: float) -> None:
         """A probe was not answered: leave the node alone, longer each time."""
@@ -175,3 +190,43 @@ class Trust:
         trust.silent += 1
         trust.quiet_until = now
         trust.probe_at = now + min(quiet * 2.0 ** min(trust.silent, 10), LONGEST_BACK_OFF)
+
+
+def _kind(probe: Exchange[bool]) -> Kind:
+    """What its reply is known by."""
+    ((_, key, length),) = probe.replies  # type: ignore[misc]  # a probe has exactly one reply
+    return probe.lane, key, length
+
+
+def _forget(trust: NodeTrust, now: float) -> None:
+    """No reply comes as late as this."""
+    for kind, asked in list(trust.outstanding.items()):
+        if now - asked > FORGOTTEN_AFTER:
+            del trust.outstanding[kind]
+    trust.oldest = min(trust.outstanding.values(), default=inf)
+
+
+def _next_of_all(trust: NodeTrust) -> Exchange[bool]:
+    """`Trust.probe` where all of them have been made: of those with equal replies only the first is looked at."""
+    place = trust.attempt % ATTEMPTS
+    if trust.from_here[0] != place:
+        trust.from_here = place, _in_order(trust.probes[place:] + trust.probes[:place])
+    get, least, best = trust.outstanding.get, inf, trust.probes[place]
+    for kind, looks, exchange in trust.from_here[1]:
+        asked_at = get(kind)
+        if asked_at is None:
+            trust.attempt += looks
+            return exchange
+        if asked_at < least:
+            least, best = asked_at, exchange
+    trust.attempt += ATTEMPTS
+    return best
+
+
+def _in_order(probes: list[Exchange[bool]]) -> list[Look]:
+    """The first of each kind, and how many have been looked at with it."""
+    firsts: dict[Kind, Look] = {}
+    for number, exchange in enumerate(probes, 1):
+        kind = _kind(exchange)
+        firsts.setdefault(kind, (kind, number, exchange))
+    return list(firsts.values())

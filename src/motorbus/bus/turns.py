@@ -23,6 +23,7 @@ from motorbus.bus.claims import Claims
 from motorbus.bus.course import Straight, TurnsLock
 from motorbus.bus.known import rest_of, withdraws
 from motorbus.bus.pace import Pace
+from motorbus.bus.silence import Silence
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
 from motorbus.core.family import Family, Stop
 from motorbus.core.operation import ANY, Data, Effect, Exchange, Notice, Rank, Runnable, Timeout
@@ -36,7 +37,7 @@ Admit = Callable[[Exchange[Any]], None]
 Look = Callable[[Exchange[Any]], "Sequence[Runnable[Any]]"]  # what must be asked before this may leave
 
 
-class Turns(Absence, Straight, Air):
+class Turns(Absence, Straight, Silence, Air):
     """The turn-taking of one bus. `rate` in bit/s and `latency` in seconds describe the link.
 
     `paced` says whether it takes bit time; None: it will show. While the link is `listening` every exchange is
@@ -76,12 +77,13 @@ class Turns(Absence, Straight, Air):
         if isinstance(ticket, Flight):
             if ticket.done:
                 return
-            if self.latched and ticket.exchange.effect in GATED and ticket.rank is not Rank.STOP:
+            exchange, rank = ticket.exchange, ticket.exchange.rank
+            if self.latched and exchange.effect in GATED and rank is not Rank.STOP:
                 self._settle(ticket, error=verdict.latched())
                 return
-            if ticket.rank is Rank.STOP:
-                self._withdraw(ticket.exchange)
-            self._queues[ticket.rank].append(ticket)
+            if rank is Rank.STOP:
+                self._withdraw(exchange)
+            self._queues[rank].append(ticket)
         elif isinstance(ticket, Retune):
             self._queues[Rank.CONFIGURATION].append(ticket)
         elif isinstance(ticket, Timer | Listener):
@@ -330,22 +332,21 @@ class Turns(Absence, Straight, Air):
             return
         self.trust.stayed_silent(node, now, self._quiet)
         if len(parent.exchange.replies) == 1:  # type: ignore[arg-type]  # never ANY here
-            self._drop(parent)
+            queue = self._queues[parent.exchange.rank]
+            if parent in queue:
+                queue.remove(parent)
             parent.noise = probe.noise
             self._settle(parent, error=verdict.error(parent, kind, parent.tries, self.trouble()))
-
-    def _drop(self, flight: Flight) -> None:
-        if flight in self._queues[flight.rank]:
-            self._queues[flight.rank].remove(flight)
 
     # -- when to look again, and stopping -------------------------------------------------------------------
 
     def due(self) -> float:
         """The next moment something must be settled or may be sent; inf when nothing is awaited."""
-        moments = [self._look_at]
-        moments += [flight.deadline for flight in self.flying.values()]
-        moments += [timer.deadline for timer in self._timers]
-        return min(moments)
+        moment = self._look_at
+        for ticket in (*self.flying.values(), *self._timers):
+            if ticket.deadline < moment:
+                moment = ticket.deadline
+        return moment
 
     def latch(self, now: float) -> Stop:
         """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""

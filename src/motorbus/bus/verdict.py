@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from motorbus.bus.ticket import Flight
-from motorbus.core.operation import ANY, CanFrame, Data, Effect, Exchange
+from motorbus.core.operation import ANY, CanFrame, Effect, Exchange
 from motorbus.errors import (
     ChecksumError,
     FramingError,
@@ -61,14 +61,28 @@ ERRORS: dict[str, type[MotorbusError]] = {
 SOUGHT = "it is looked for again whenever something is asked for; nothing of before is sent again"
 
 
+WORDS = {
+    "serial": {"rate": "baud rate", "flag": "--baud", "bus": ""},
+    "CAN": {"rate": "bit rate", "flag": "--bitrate", "bus": ", a bus without its two terminating resistors"},
+}
+"""What things are called on a serial line, and on a CAN bus."""
+TOLD = {
+    (kind, line): (cause.format(**words), advice.format(**words))
+    for kind, (cause, advice) in CAUSES.items()
+    for line, words in WORDS.items()
+}
+
+
 def fault(flight: Flight) -> str:
     """The kind of failure of this try, a key of `CAUSES`."""
     if flight.spoiled:
         return flight.spoiled
     if flight.surplus:
         return "surplus"
+    if not flight.noise:
+        return "silence"
     kinds = [kind for kind, _ in flight.noise]
-    return "checksum" if "checksum" in kinds else kinds[0] if kinds and kinds[0] in CAUSES else "silence"
+    return "checksum" if "checksum" in kinds else kinds[0] if kinds[0] in CAUSES else "silence"
 
 
 def error(flight: Flight, kind: str, tries: int, said: str = "") -> MotorbusError:
@@ -76,24 +90,23 @@ def error(flight: Flight, kind: str, tries: int, said: str = "") -> MotorbusErro
     exchange = flight.exchange
     dues = () if exchange.replies is ANY else exchange.replies
     node = dues[0].node if dues else None
-    received = b"".join(bytes(data) for _, data in flight.noise) + b"".join(
-        r.data for r in flight.got.values()
-    )
     changes = exchange.effect is not Effect.NONE or not exchange.repeatable
     made = OutcomeUnknown if changes and dues and flight.left else ERRORS[kind]
     who = f"node {node}" if node is not None else "the bus"
     again = f" ({tries} tries)" if tries > 1 else ""
-    what = {
-        "silence": f"{who} did not answer{again}",
-        "checksum": f"the answer of {who} was damaged{again}",
-    }.get(kind, f"no valid answer from {who}{again}")
+    if kind == "silence":
+        what = f"{who} did not answer{again}"
+    elif kind == "checksum":
+        what = f"the answer of {who} was damaged{again}"
+    else:
+        what = f"no valid answer from {who}{again}"
     if made is OutcomeUnknown:
         what += "; whether the write took effect is not known"
-    cause, advice = (text.format(**_words(exchange.request)) for text in CAUSES[kind])
+    cause, advice = TOLD[kind, "CAN" if isinstance(exchange.request, CanFrame) else "serial"]
     return made(
         what,
         sent=exchange.request,
-        received=received,
+        received=_received(flight) if flight.noise or flight.got else b"",
         expected=f"{dues[0].length} bytes from {who}" if dues else "",
         cause=said or cause,
         advice=advice,
@@ -101,15 +114,9 @@ def error(flight: Flight, kind: str, tries: int, said: str = "") -> MotorbusErro
     )
 
 
-def _words(request: Data) -> dict[str, str]:
-    """What things are called on a CAN bus, and on a serial line."""
-    if isinstance(request, CanFrame):
-        return {
-            "rate": "bit rate",
-            "flag": "--bitrate",
-            "bus": ", a bus without its two terminating resistors",
-        }
-    return {"rate": "baud rate", "flag": "--baud", "bus": ""}
+def _received(flight: Flight) -> bytes:
+    noise = [bytes(data) for _, data in flight.noise]
+    return b"".join([*noise, *(reply.data for reply in flight.got.values())])
 
 
 def latched() -> Interrupted:

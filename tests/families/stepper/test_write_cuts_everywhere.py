@@ -158,7 +158,7 @@ def judged(world: Callable[[], World], cut: Cut) -> bool:
     return one.told
 
 
-@pytest.mark.timeout(3600)
+@pytest.mark.timeout(10_800)
 def test_d10_a_write_cut_at_every_byte(rounds: Rounds, figures: Figures) -> None:
     counted, told, states = 0, 0, set()
     for number, kind in enumerate(KINDS[: 1 if are_off() else None]):
@@ -180,7 +180,7 @@ def test_d10_a_write_cut_at_every_byte(rounds: Rounds, figures: Figures) -> None
     )
 
 
-@pytest.mark.timeout(7200)
+@pytest.mark.timeout(14_400)
 def test_d10_a_write_cut_and_cut_again_while_it_is_mended(rounds: Rounds, figures: Figures) -> None:
     """From each state that a first cut can leave, every exchange of the next write, and one more write after that."""
     counted, told, seen = 0, 0, set()

@@ -17,7 +17,7 @@ from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.entry import Entry
 from motorbus.core.operation import Goal
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import changed_since, settings_of_now
+from motorbus.families.feetech.driver.exchanges import changed_since
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import goals_of
 from motorbus.families.feetech.table import Mode
@@ -39,6 +39,58 @@ class Cell(NamedTuple):
     whole: bool
 
 
+class Column:
+    """One row of all servos.
+
+    In a loop most rows but the goals, as a speed, are what they were: `last` are such values, with their raw values.
+    """
+
+    def __init__(self, cells: Sequence[Cell]) -> None:
+        self._cells: Final = cells
+        self._low: Final = max(
+            cell.low for cell in cells
+        )  # from here on, to there, a raw value is plain for all
+        self._high: Final = min(cell.high for cell in cells)
+        self._whole: Final = cells[0].whole
+        plain = {cell.scale for cell in cells if cell.factor == 1}
+        alike = len(plain) == 1 and all(cell.factor == 1 for cell in cells)
+        self._scale: Final = plain.pop() if alike else None
+        self.last: tuple[Sequence[float], Sequence[int]] = (), ()
+
+    def raws(self, values: Sequence[float]) -> list[int] | None:
+        """What these become, one for each servo; None where one is not plain."""
+        if {*map(type, values)} != FLOATS:
+            return None
+        scale = self._scale
+        try:
+            if scale is not None:
+                raws = [(value / scale).__round__() for value in values]  # as `round`, and sooner
+            else:
+                raws = [
+                    round(value / cell[0] / cell[1]) for value, cell in zip(values, self._cells, strict=True)
+                ]
+        except (ValueError, OverflowError):  # not a finite number
+            return None
+        if not (self._low <= min(raws) and max(raws) <= self._high) and not self._are_plain(raws):
+            return None
+        if self._whole and list(values) != raws:
+            return None
+        return raws
+
+    def kept(self, values: tuple[float, ...]) -> Sequence[int] | None:
+        """As `raws`; what is the same as it was last time is not reckoned anew."""
+        last, raws = self.last
+        if values == last and {*map(type, values)} == FLOATS:
+            return raws
+        found = self.raws(values)
+        if found is not None:
+            self.last = values, found
+        return found
+
+    def _are_plain(self, raws: Sequence[int]) -> bool:
+        return all(cell.low <= raw <= cell.high for cell, raw in zip(self._cells, raws, strict=True))
+
+
 class Mould:
     """The packet for these rows, which adjoin and have the same place for all of these nodes. Made by `mould`."""
 
@@ -47,55 +99,57 @@ class Mould:
         size = sum(row.size for row in first)
         item = "B" + "".join("BH"[row.size - 1] for row in first)
         self.ids: Final = tuple(node.node for node in nodes)
-        self._nodes: Final = list(nodes)
-        self._made_by: Final = [node.settings for node in nodes]
+        self._made_by: Final = [(node, node.settings) for node in nodes]
         as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
         self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
-        self._cells: Final = cells
-        self._columns: Final = [_column(cells[place::count], place, count) for place in range(count)]
+        self._columns: Final = [Column(cells[place::count]) for place in range(count)]
+        self._each: Final = count + 1  # parts of a packet for each servo
         self._items: Final = [part for id in self.ids for part in (id, *[0] * count)]
         self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
         self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
         self._sum: Final = sum(self._head[2:])
         self._aim: Final = Aim(self.ids, self._goals, changed_since((node, node.settings) for node in nodes))
-        self._plain: Final = all(cell.factor == 1 for cell in cells)
-        self._scales: Final = [cell.scale for cell in cells]
         self._places: Final = _places(nodes, rows, cells)
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
-        return list(map(settings_of_now, self._nodes)) == self._made_by
+        for node, settings in self._made_by:
+            if node.settings is not settings and node.settings != settings:
+                return False
+        return True
 
     def cast(self, values: Sequence[float]) -> Aimed | None:
         """The packet with these values, those of one servo behind those of the one before; None where one of them is
         not plain, or they are not as many as it takes."""
-        if {*map(type, values)} != FLOATS or len(values) != len(self._cells):
+        columns = self._columns
+        count = len(columns)
+        if len(values) != count * len(self.ids):
             return None
-        try:
-            if self._plain:
-                raws = [round(value / scale) for value, scale in zip(values, self._scales, strict=True)]
-            else:
-                raws = [
-                    round(value / cell[0] / cell[1]) for value, cell in zip(values, self._cells, strict=True)
-                ]
-        except (ValueError, OverflowError):  # not a finite number
-            return None
+        if count > 1:
+            return self.press([tuple(values[place::count]) for place in range(count)])
+        raws = columns[0].raws(values)
+        return None if raws is None else self._filled([raws])
+
+    def press(self, shares: Sequence[tuple[float, ...]]) -> Aimed | None:
+        """The same from the values of each row, which are one for each servo."""
+        found = []
+        for column, share in zip(self._columns, shares, strict=True):
+            raws = column.kept(share)
+            if raws is None:
+                return None
+            found.append(raws)
+        return self._filled(found)
+
+    def _filled(self, columns: Sequence[Sequence[int]]) -> Aimed:
         items = self._items.copy()
-        for place, share, low, high, whole in self._columns:
-            column = raws[share]
-            if not (low <= min(column) and max(column) <= high) and not self._are_plain(raws):
-                return None
-            if whole and list(values[share]) != column:
-                return None
-            items[place] = column
+        for place, column in enumerate(columns, 1):
+            items[place :: self._each] = column
         body = self._pack(*items)
         check = ~(self._sum + adler32(body) - 1) & 255
-        return Aimed(self._head + body + BYTES[check], self._aim, raws)
+        return Aimed(self._head + body + BYTES[check], self._aim, items)
 
-    def _are_plain(self, raws: Sequence[int]) -> bool:
-        return all(cell.low <= raw <= cell.high for cell, raw in zip(self._cells, raws, strict=True))
-
-    def _goals(self, raws: Sequence[int]) -> tuple[Goal, ...]:
+    def _goals(self, items: Sequence[int]) -> tuple[Goal, ...]:
+        raws = [raw for number, raw in enumerate(items) if number % self._each]
         if self._places:
             return tuple(
                 [
@@ -128,13 +182,6 @@ def _places(
         return []
     its = [(node.node, cell, node.limits) for node, cell in zip(nodes, cells, strict=True)]
     return [(id, cell.scale, cell.factor, *limits) for id, cell, limits in its if limits is not None]
-
-
-def _column(cells: Sequence[Cell], place: int, count: int) -> tuple[slice, slice, int, int, bool]:
-    """One row of all servos: where its raw values go in the parts of a packet, where they are among all raw values, the
-    bounds within which they are plain for every servo, and whether only whole numbers are values."""
-    low, high = max(cell.low for cell in cells), min(cell.high for cell in cells)
-    return slice(place + 1, None, count + 1), slice(place, None, count), low, high, cells[0].whole
 
 
 def _adjoin(rows: Sequence[Entry]) -> bool:

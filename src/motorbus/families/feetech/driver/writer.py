@@ -7,7 +7,6 @@ What is plain goes through a `Mould`, which costs hardly more than the bytes of 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.operation import Exchange
@@ -43,20 +42,21 @@ class SyncWriter:
         made = self._mould
         if made is None or not made.holds():
             made = self._fit()
-        exchange = None if made is None else made.cast(self._flat(values))
+        exchange = None
+        if made is not None and (type(values) is list or type(values) is tuple):
+            exchange = made.cast(values) if self._single else self._pressed(made, values)
         return exchange or self._slowly(values)
 
-    def _flat(self, values: Any) -> Sequence[float]:
-        """The values of all, one behind the other; none where a row is too long or too short."""
-        if type(values) is not list and type(values) is not tuple:
-            return ()
-        if self._single:
-            return values
+    def _pressed(self, made: Mould, values: Any) -> Exchange[None] | None:
+        """The packet for rows of values; None where a row is too long or too short, or none at all."""
         try:
             alike = {*map(len, values)} == self._width
         except TypeError:  # a row that is none
-            return ()
-        return list(chain.from_iterable(values)) if alike else ()
+            return None
+        if not alike or len(values) != len(self.servos):
+            return None
+        shares = tuple(zip(*values))  # noqa: B905 - they are alike
+        return made.press(shares) if len(shares) == len(self.names) else None
 
     def _fit(self) -> Mould | None:
         """Made anew when the settings of a servo have changed."""

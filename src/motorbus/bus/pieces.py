@@ -1,0 +1,61 @@
+"""The straight way of an answer that comes in pieces: most UARTs hand bytes over as they come.
+
+What has come is kept with the course, and nobody is called before all of it is there. Whoever takes the lock of the
+turns in the usual way meanwhile finds it taken in, as the pieces of any other flight.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from motorbus.bus.course import Course
+from motorbus.core.operation import UNLIKE, Data
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+
+
+def gathered(bus: Bus, course: Course, arrived: list[Data]) -> Any:
+    """Wait for the rest of the answer that has begun to come, and return what it means.
+
+    `UNLIKE` when it is none as it should be, or does not come: then `arrived` is what is not taken in yet. Raises
+    LinkError; the caller lets go of the lock.
+    """
+    link = bus.link
+    while keeps(course, arrived, link.now()):
+        if course.size <= sum(map(len, course.held)):
+            last = len(arrived[-1])
+            arrived.clear()
+            if last < course.length:  # the last packet came in pieces
+                arrived += link.read(link.now() + course.settle)
+            return UNLIKE if arrived else _meant(bus, course)
+        arrived[:] = link.read(course.deadline)
+    return UNLIKE
+
+
+def keeps(course: Course, arrived: list[Data], at: float) -> bool:
+    """Keep these pieces with the course; False where there are none, or the course is no longer in the air."""
+    lock = course.lock
+    lock.acquire()
+    kept = bool(arrived) and course.turns.aloft is course
+    if kept:
+        course.held_at = min(at, course.deadline)  # a host that was held up takes it in late
+        course.held += arrived  # type: ignore[arg-type]  # bytes, as the bus is calm
+    lock.release()
+    return kept
+
+
+def _meant(bus: Bus, course: Course) -> Any:
+    """What the answer means of which all pieces have come."""
+    lock, value = course.lock, UNLIKE
+    lock.acquire()
+    at = min(bus.link.now(), course.deadline)
+    if course.turns.aloft is course and at - course.sent_at >= course.least:
+        data = b"".join(course.held)
+        value = course.whole(data, at)
+        if value is not UNLIKE:
+            course.held = []  # first, or after an interrupt in between they would be those of the next flight
+            course.lands(data, at)
+            bus.relay.pumper = None
+    lock.release()
+    return value

@@ -1,0 +1,70 @@
+"""Ctrl-C once more while the first one is being dealt with, on the straight way: the bus is let go all the same."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.bus.responder import position
+from tests.bus.test_straight_ends import CALLS, flown, in_another_thread, unanswered
+from tests.conftest import Figures, Rounds
+from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
+
+SOON = 1.0
+"""s in which the lock is free."""
+LATER = 60
+"""Lines after the first one at which the second may fall: by then the first one has been dealt with."""
+
+
+def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list[str]]:
+    """What came of it, and what is wrong afterwards."""
+    nodes, call = CALLS[what]
+    bus, simulator, line, exchange = flown(nodes)
+    line.fault = fault
+    line.sent.clear()
+    came = cut(lambda: call(bus, exchange), at, KeyboardInterrupt, later, Twice)
+    wrong = [] if isinstance(came.error, KeyboardInterrupt) else [f"it ended with {came.error!r}"]
+    if bus.relay.pumper is not None:
+        return came, [*wrong, "nobody else may pump any more"]
+    if not in_another_thread(
+        lambda: bus.turns.lock.acquire(timeout=SOON) and (bus.turns.lock.release() or True)
+    ):
+        return came, [*wrong, "the lock is held"]
+    wrong += [f"{node} is believed" for node in unanswered(bus) if not bus.turns.trust.nodes[node].tainted]
+    line.fault = line.fault if line.sent else ""
+    for node in nodes:
+        simulator.memory[node][57] = 99
+    value = in_another_thread(lambda: bus.run(exchange))
+    value = value if value[0] else bus.run(exchange)  # a group says that they are missing, and does not wait
+    if value != ([(node, 0, node, 99) for node in nodes], ()):
+        wrong.append(f"a wrong value: {value}")
+    if bus.run(position(6)) != 6:
+        wrong.append("another one is not read")
+    return came, wrong
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("fault", ["", "late", "split"])
+@pytest.mark.parametrize("what", CALLS)
+def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_way(
+    what: str, fault: str, rounds: Rounds, figures: Figures
+) -> None:
+    nodes, call = CALLS[what]
+    bus, _, line, exchange = flown(nodes)
+    line.fault = fault
+    whole = cut(lambda: call(bus, exchange))
+    assert whole.error is None
+    cuts, twice, wrong = 0, 0, list[str]()
+    most = rounds(NEVER, 12)
+    for number, at in enumerate(places(whole.walked, 1, most)):
+        for later in range(1, LATER) if most == NEVER else (1 + number * 7 % 23, 1 + number * 13 % LATER):
+            came, found = cut_twice(what, fault, at, later)
+            assert came.where is not None
+            cuts += 1
+            twice += came.again is not None
+            wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
+    figures(
+        f"L17 interrupted twice: {what}, {fault or 'no fault'}, the straight way",
+        family="feetech", cuts=cuts, twice=twice, wrong=len(wrong),
+    )  # fmt: skip
+    assert wrong == []
+    assert twice >= cuts / 3  # the others were over by then
