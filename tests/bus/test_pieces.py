@@ -15,6 +15,7 @@ from tests.bus.script import admit_all
 from tests.bus.struck import Landings, Struck, Train, kept, order, struck_bus
 
 ALL = (1, 2, 3, 4, 5, 6)
+TINY = 1e-9
 PIECES = ("apart", "bytes", "split")
 
 
@@ -123,3 +124,32 @@ def test_a_byte_too_many_behind_the_last_piece_is_seen() -> None:
     assert bus.run(exchange) == ([(1, 0, first, second)], ()), "asked again, as the first answer was none"
     assert not line.fault
     assert [len(data) for data in line.sent[-2:]] == [8, 8]
+
+
+@pytest.mark.parametrize("nodes", [(1,), ALL])
+def test_who_sleeps_sleeps_until_the_last_bit_can_be_here(
+    monkeypatch: pytest.MonkeyPatch, nodes: tuple[int, ...]
+) -> None:
+    bus, _, line = struck_bus()
+    slept: list[float] = []
+    monkeypatch.setattr(bus, "sleeps", True)
+    monkeypatch.setattr(bus.link, "doze", slept.append, raising=False)
+    exchange = kept(*nodes)
+    for fault in ("", *PIECES):
+        line.fault = fault
+        before, free = bus.link.now(), bus.turns.free_at
+        assert where(bus.run(exchange)) == list(nodes)
+        least = max(before, free) + FAMILY.air_time(exchange, 1_000_000)
+        assert least - TINY <= slept.pop() <= least + len(nodes) * 1e-5 + TINY, "a byte more in its other form"
+    before = bus.link.now()
+    bus.volley(order(), exchange)
+    assert slept.pop() > before + FAMILY.air_time(exchange, 1_000_000), "the goals go before it"
+    assert not slept
+
+
+def test_a_bus_sleeps_as_its_link_was_told() -> None:
+    for told in (True, False):
+        link = MemoryLink(Train(), line=Struck())
+        link.sleeps, link.virtual = told, False  # type: ignore[attr-defined]
+        assert Bus(link, FAMILY).sleeps is told
+    assert not Bus(MemoryLink(Train(), line=Struck()), FAMILY).sleeps
