@@ -20,6 +20,7 @@ from motorbus.core.family import Simulator
 from motorbus.core.operation import Exchange
 from motorbus.errors import Interrupted, LinkLost, NoReply
 from motorbus.link.pty import PtyMaster
+from tests.bus.struck import Landings
 from tests.faults.cutting import NEVER, cut, places
 
 STEP = math.tau / 4096
@@ -36,6 +37,7 @@ class Far:
         self.simulator.tune(1_000_000)
         self.change: Callable[[bytes], list[bytes]] = lambda data: [data]
         self.asked = 0
+        self.said = b""
         loop.add_reader(self.master.fileno(), self._hear)
 
     def _hear(self) -> None:
@@ -45,7 +47,12 @@ class Far:
         self.loop.call_later(0.0 if due is None else max(0.0, due - self.loop.time()), self._say)
 
     def _say(self) -> None:
-        said = b"".join(bytes(data) for _, data in self.simulator.advance(self.loop.time()))  # type: ignore[arg-type]
+        self.said += b"".join(bytes(data) for _, data in self.simulator.advance(self.loop.time()))  # type: ignore[arg-type]
+        due = self.simulator.due()
+        if due is not None:  # several answer one question: all of it goes out together
+            self.loop.call_later(max(0.0, due - self.loop.time()), self._say)
+            return
+        said, self.said = self.said, b""
         for number, piece in enumerate(self.change(said)):
             self.loop.call_later(0.002 * number, self.master.write, piece)
 
@@ -96,6 +103,28 @@ def test_it_is_the_straight_way_and_tells_the_same() -> None:
             assert asked >= 20
             ledger = bus.statistics.nodes[1]
             assert ledger.sent == ledger.ok
+
+    run(main)
+
+
+@pytest.mark.parametrize("at", [8, 16, 3, 23])
+def test_an_answer_in_pieces_lands_too_and_goes_the_usual_way_where_its_last_packet_is_cut(
+    monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    landings = Landings(monkeypatch)
+
+    async def main() -> None:
+        async with there() as (far, bus, servo):
+            others = [feetech.AsyncServo(bus, node) for node in (2, 3)]
+            for one in others:
+                await one.prepare()
+            group = feetech.sync_read_positions([servo, *others])
+            far.change = lambda data: [data[:at], data[at:]]
+            for _ in range(10):
+                found = await bus.run(group)
+                assert found.values == dict.fromkeys((1, 2, 3), 2048 * STEP)
+                assert bus.turns.idle
+            assert (len(landings.groups) > 5) is (at <= 16)
 
     run(main)
 
