@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from bench import (
+    apart,
     can_rounds,
     estimates,
     estop,
@@ -112,6 +113,7 @@ def measured(times: int) -> report.Results:
         stepper=had("stepper", lambda: stepper_line.samples(times, say), failures, []),
         loop=had("robot.loop", lambda: robot_loop.samples(robot_loop.SECONDS, say), failures, []),
         stops=had("emergency stop", lambda: estop.samples(estop.STOPS, say), failures, []),
+        repeated=dict(apart.repeated),
     )
 
 
@@ -119,6 +121,8 @@ def printed(found: list[Row], failures: list[str]) -> int:
     """Some rows on the terminal; exit code 1 when one could not be measured."""
     print(report.as_text(report.goal_table(found)))
     print(goals.summary(found))
+    for name, times in apart.repeated.items():
+        print(f"run once more {times} times: {name}", file=sys.stderr)
     for failure in failures:
         print(f"NOT MEASURED: {failure}", file=sys.stderr)
     return 1 if failures else 0

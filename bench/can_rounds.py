@@ -1,7 +1,8 @@
 """CAN side by side with python-canopen and canopen-asyncio, over slcan: simulated servos in a process of their own.
 
-Everyone reads positions, of one node and of eight, in shuffled rounds. The simulator answers at once, so what differs
-is the library; on a real bus the wire and the adapter set the pace, and what counts is how many are kept in flight.
+Everyone reads positions, of one node and of eight, in shuffled rounds. Each servo is elsewhere each time it is read,
+and every value is checked. The simulator answers at once, so what differs is the library; on a real bus the wire and
+the adapter set the pace, and what counts is how many are kept in flight.
 """
 
 from __future__ import annotations
@@ -10,13 +11,11 @@ import json
 import random
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench.can_loop import FIRST, STANDS
+from bench.can_loop import FIRST
 from bench.places import PEERS, ROOT, surroundings
 from bench.rounds import Candidate, Failed, Sample
 
@@ -52,26 +51,26 @@ def missing() -> list[str]:
 @contextmanager
 def servos() -> Iterator[str]:
     """Simulated servos on a new pseudo-terminal that speaks slcan, for as long as this lasts; the port."""
-    with tempfile.TemporaryDirectory() as folder:
-        port = Path(folder) / "can"
-        ids = f"{FIRST:#x}-{FIRST + NODES - 1:#x}"
-        command = [sys.executable, "-m", "motorbus.cli", "simulate", "kst", "--ids", ids]
-        process = subprocess.Popen(
-            [*command, "--position", str(STANDS), "--link", str(port)],
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-            env=dict(surroundings()),
-        )
-        assert process.stdout is not None
-        try:
-            if not process.stdout.readline():
-                raise Failed("the simulated servos did not start")
-            yield str(port)
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
+    command = [sys.executable, "-m", "bench.can_servos", str(FIRST), str(NODES)]
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env=dict(surroundings()),
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        port = process.stdout.readline().strip()
+        if not port:
+            raise Failed("the simulated servos did not start")
+        yield port
+    finally:
+        process.stdin.close()
+        process.wait()
+        process.stdout.close()
 
 
 def run(candidate: Candidate, workload: CanWorkload, count: int) -> dict[str, Any]:

@@ -5,8 +5,9 @@
 Each bus is `motorbus.simulate` with ids 0 to 250 and an open memory link; all their virtual clocks go on together. So
 many times a second every axis is given a goal anywhere in its turn (SYNC WRITE), which it never reaches before the next
 one, and its position is read (SYNC READ): nobody ever rests. The requests are made beforehand and the answers counted
-by their bytes, so what is measured is the simulation and its links, without a driver. In the end all goals are the same
-again, and every axis must have come to its own.
+by their bytes, so what is measured is the simulation and its links, without a driver: a fleet that is driven by
+ordinary buses needs more, and `examples/fleet.py` says how much. In the end all goals are the same again, and every
+axis must have come to its own.
 
 It is a process of its own, for its memory is measured, too: what it has more of when the fleet stands, by axis. What
 lives as long as the program is taken out of the garbage collector's sight (`gc.freeze`) when the fleet stands, as
@@ -69,7 +70,7 @@ class Fleet(NamedTuple):
 
     @property
     def speed(self) -> float:
-        """Times faster than real time, by processor time."""
+        """Simulated time by processor time: above 1 is faster than real time."""
         return self.simulated / self.processor
 
 
@@ -183,7 +184,7 @@ def told(found: Fleet) -> str:
     each = 1e6 * found.processor / found.simulated / found.axes
     return (
         f"{found.axes} axes, {found.goals:g} goals and {found.reads:g} readings of each a second: "
-        f"{found.speed:.2f} times faster than real time, {each:.0f} µs for each axis and second\n"
+        f"{found.speed:.2f} times real time, {each:.0f} µs for each axis and second\n"
         f"built in {found.built:.2f} s, {found.memory / 1000:.1f} kB of memory for each axis"
     )
 

@@ -8,23 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from types import ModuleType
 
 from bench import rows as package
+from bench.reasons import reason
 from bench.row import Row, Say, met, noted, shown, verdict
 
 COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs", "notes")
 SHORT = 1e-3
-REASONS: dict[str, str] = {
-    "1": "each exchange leaves its nodes in doubt until it is answered, and each goal is judged by the limits of its "
-    "servo; no peer does either",
-    "6": "what the kernel takes to wake two processes is not on the wire: the bare loop of the same round shows it",
-    "7": "waking up is most of it; what is ours of it is in row 1",
-    "8": "every byte is tried as the beginning of a packet; the vendor's SDK gives up what follows a damaged length, "
-    "and is as quick as it is incomplete. In pieces of 4 KiB, as a file is read, ours is twice as quick as in these",
-    "10": "goals come in rad, rad/s and shares, are rounded, and are held against the limits of their servos",
-    "12": "what runs after 25 ms of waiting runs cold; ours sends a probe that no late reply can answer, counts, and "
-    "says what was sent and what to do",
-}
-"""By number of a row: why it misses when it does."""
-
 Measure = Callable[[int, Say], list[Row]]
 
 
@@ -66,7 +54,7 @@ def _place(row: Row) -> tuple[int, str]:
 
 def cells(row: Row) -> tuple[str, ...]:
     """One row of the table."""
-    why = "" if met(row) else REASONS.get(row.number, "")
+    why = "" if met(row) else reason(row)
     return (
         row.number,
         row.measure,
@@ -89,9 +77,10 @@ def _seconds(row: Row) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many are met, in one sentence."""
-    missed = [row for row in rows if not met(row)]
+    """How many are met, in one sentence; a row without a goal is only told."""
+    judged = [row for row in rows if row.goal]
+    missed = [row for row in judged if not met(row)]
     told = ", ".join(dict.fromkeys(row.number for row in missed))
-    return f"{len(rows) - len(missed)} of {len(rows)} goals are met." + (
+    return f"{len(judged) - len(missed)} of {len(judged)} goals are met." + (
         f" Missed in rows: {told}." if told else ""
     )

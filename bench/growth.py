@@ -12,7 +12,7 @@ from bench import responder, rounds
 from bench.figures import Spread, spread
 from bench.rounds import CANDIDATES, OURS
 from bench.row import Say
-from bench.workloads import GROWTH, MOST_IDS, growing
+from bench.workloads import GROWTH, growing
 
 COUNT = 250
 """Exchanges of one sample."""
@@ -32,12 +32,9 @@ class Point(NamedTuple):
 
 def points(times: int, say: Say, sizes: Sequence[int] = GROWTH, count: int = COUNT) -> list[Point]:
     """All of them; whoever is not installed is left out. Raises Failed, NoCompiler."""
-    near = [
-        size for size in sizes if size <= MOST_IDS
-    ]  # the responder knows no more than it is asked for in one packet
     return [
         *_points(MEMORY, rounds.in_memory, IN_PROCESS, sizes, count, times, say),
-        *_points(WIRE, rounds.on_wire(responder.build()), ON_WIRE, near, count, times, say),
+        *_points(WIRE, rounds.on_wire(responder.build()), ON_WIRE, sizes, count, times, say),
     ]
 
 

@@ -1,6 +1,10 @@
 """The measured loop: it runs inside the process of one contender and prints one line of JSON.
 
 Readings are kept while the clock runs and judged afterwards, so that checking costs nobody anything.
+
+A library that asks again when an answer does not come in time leaves a reading out, for the servo counts both. One that
+tells how often it did so (`late`) is believed, but no more is left out than that, and nothing comes twice or back: then
+the measurement is spoiled, not wrong.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ class Contender(Protocol):
 
     It is made with the port and the workload, and has the method that the workload names besides `read`. `read`,
     `sync_read`, `fields`, `blocks`, `many` and `cycle` return what they read; `sync_write` and `cycle` take prepared
-    goals.
+    goals. A library that asks again by itself may have a method `late`: how many requests had to be asked again.
     """
 
     def read(self, prepared: Any) -> Any: ...
@@ -35,17 +39,45 @@ class Contender(Protocol):
     def close(self) -> None: ...
 
 
+WRONG = "wrong value: "
+"""How what a process says begins when a value was wrong."""
+
+
 class WrongValue(Exception):
     """A contender returned something else than what the responder sent."""
 
 
-def check(readings: Sequence[Sequence[Any]], nodes: tuple[int, ...], what: str = POSITION) -> None:
-    """Every reading against the rule. Raises WrongValue for the first that differs."""
+class Late(Exception):
+    """No value is wrong, but an answer was late: a reading is missing, or was asked for again and left one out."""
+
+
+def check(
+    readings: Sequence[Sequence[Any]], nodes: tuple[int, ...], what: str = POSITION, late: int = 0
+) -> None:
+    """Every reading against the rule.
+
+    Raises WrongValue for the first that differs; where answers to so many requests were `late`, Late instead if all
+    that differs is that up to so many readings are left out, or told as missing.
+    """
     rule = EXPECTED[what]
+    left_out, missing = dict.fromkeys(nodes, 0), 0
     for index, values in enumerate(readings):
-        expected = [rule(node, index) for node in nodes]
-        if list(values) != expected:
+        expected = [rule(node, index + left_out[node]) for node in nodes]
+        if list(values) == expected:
+            continue
+        for node, value in zip(nodes, values, strict=False):
+            if value is None and late:  # told as missing
+                missing += 1
+                continue
+            more = range(left_out[node], late + 1)
+            left_out[node] = next((some for some in more if rule(node, index + some) == value), late + 1)
+        if len(values) != len(nodes) or max(left_out.values()) > late:
             raise WrongValue(f"reading {index}: {list(values)}, expected {expected}")
+    most = max(left_out.values())
+    if most or missing:
+        raise Late(
+            f"{late} answers were late: {most} readings of a servo left out, {missing} told as missing"
+        )
 
 
 class Course:
@@ -85,11 +117,18 @@ class Course:
         self.processor += after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
     def judge(self) -> None:
-        """Raises WrongValue unless every reading is what the responder must have sent."""
+        """Raises WrongValue unless every reading is what the responder must have sent, Late where it came late."""
         counts = self.contender.counts
+        late = self.late()
         if self.workload.reads:
-            check([counts(values) for values in self.readings], self.workload.reads, self.workload.what)
-        check([counts(value) for value in self.barriers], (1,))
+            found = [counts(values) for values in self.readings]
+            check(found, self.workload.reads, self.workload.what, late)
+        check([counts(value) for value in self.barriers], (1,), late=late)
+
+    def late(self) -> int:
+        """How many readings may have been asked for once more, by what the contender says of itself."""
+        said: int = getattr(self.contender, "late", int)()
+        return said
 
     def books(self) -> dict[str, list[int]]:
         """Readings, writings and the sum of the goals by node, as the responder must have them too."""
@@ -115,6 +154,7 @@ def measure(contender: Contender, workload: Workload, count: int) -> dict[str, A
         "processor": course.processor / count,
         "wall": course.wall / count,
         "books": course.books(),
+        "late": course.late(),
     }
 
 
@@ -129,6 +169,8 @@ def main(contender: Callable[[str, Workload], Contender]) -> None:
     try:
         print(json.dumps(measure(opened, given.workload, given.count)))
     except WrongValue as error:
-        sys.exit(f"wrong value: {error}")
+        sys.exit(f"{WRONG}{error}")
+    except Late as error:
+        sys.exit(str(error))
     finally:
         opened.close()

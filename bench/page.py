@@ -65,9 +65,11 @@ _GOALS = """## Goals
 
 {summary} A ratio is the median of those taken within each round, ours by theirs where it is to be at most so much,
 theirs by ours where it is to be at least so much. What is measured in one thread may miss its goal by 15 % and what
-takes two processes by 25 %, for the machine is shared; a share of the wire limit, a count or a time in ms may not. Such
-a row of two processes that misses is measured once more, and the second time counts. The *best* other library of a
-workload is the one in Python that needs least in the same run.
+takes two processes by 25 %, for the machine is shared; a share of the wire limit, a count, a time in ms and real time
+may not. Such a row of two processes that misses is measured once more, and the second time counts. The *best* other
+library of a workload is the one in Python that needs least in the same run. A row that misses says why; one without a
+goal is told beside the one that is judged. *In one burst* and *in pieces* say how an adapter hands over the answers of
+several servos: all at once when the last byte has passed, or each packet as it has.
 
 ![Every figure beside its goal](images/performance-goals.png)
 

@@ -51,7 +51,11 @@ def growth(path: Path, points: Sequence[Point]) -> None:
 
 
 def goals(path: Path, rows: Sequence[Row]) -> None:
-    """How far each figure is from its goal, as a factor; left of 1 is better, the line is from least to greatest."""
+    """How far each figure is from its goal, as a factor; left of 1 is better, the line is from least to greatest.
+
+    A row without a goal is not in it.
+    """
+    rows = [row for row in rows if row.goal]
     figure, axes = _sheet(10.5, 1.2 + 0.3 * len(rows), columns=1)
     panel = axes[0]
     for place, row in enumerate(rows):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -24,7 +24,10 @@ wall = attrgetter("wall")
 
 
 class Results(NamedTuple):
-    """Everything one run of the bench found. `calls` is None where strace could not be had."""
+    """Everything one run of the bench found.
+
+    `calls` is None where strace could not be had; `repeated` tells how often a process of a row was run once more.
+    """
 
     machine: dict[str, str]
     rounds: int
@@ -41,6 +44,7 @@ class Results(NamedTuple):
     stepper: Sequence[stepper_line.Sample] = ()
     loop: Sequence[robot_loop.Sample] = ()
     stops: Sequence[estop.Sample] = ()
+    repeated: Mapping[str, int] = {}
 
 
 class Table(NamedTuple):
@@ -184,18 +188,21 @@ def verdict(results: Results) -> str:
         for (who, name), counted in results.calls.items()
         if who == OURS
     }
-    reached = "reached" if all(round(calls, 1) <= MOST_CALLS for calls in found.values()) else "MISSED"
-    shown = ", ".join(f"{name} {calls:.1f}" for name, calls in found.items())
+    reached = "reached" if all(calls <= MOST_CALLS for calls in found.values()) else "MISSED"
+    shown = ", ".join(f"{name} {calls:.2f}" for name, calls in found.items())
     return f"System calls of {OURS} per exchange: {shown} (a cycle is two). At most {MOST_CALLS}: {reached}."
 
 
 def spoiled(results: Results) -> str:
-    """Who had to be measured again because an answer came too late, or was not the one expected."""
-    counts: Counter[str] = Counter()
+    """Who was measured again because an answer came too late or, of another's library, was not the one expected."""
+    counts: Counter[str] = Counter(results.repeated)
     for sample in results.wire + results.memory:
         counts[sample.contender] += sample.repeats
     shown = ", ".join(f"{name} {count} times" for name, count in counts.items() if count)
-    return f"Measured again after an answer that was late or lost: {shown or 'nobody'}."
+    return (
+        f"Measured again after an answer that was late or lost, or of others wrong: {shown or 'nobody'}. "
+        f"A wrong value of {OURS} is not measured again."
+    )
 
 
 def as_text(table: Table) -> str:
@@ -230,8 +237,9 @@ def as_json(results: Results) -> str:
         "stepper": [sample._asdict() for sample in results.stepper],
         "loop": [sample._asdict() for sample in results.loop],
         "stops": [sample._asdict() for sample in results.stops],
-        "rows": [{**row._asdict(), "met": met(row)} for row in results.rows],
+        "rows": [{**row._asdict(), "met": met(row) if row.goal else None} for row in results.rows],
         "growth": [{**point._asdict(), "seconds": point.seconds._asdict()} for point in results.growth],
+        "repeated": dict(results.repeated),
         "not_measured": list(results.failures),
         "missing": results.missing,
     }

@@ -8,7 +8,10 @@
 
    With a baud rate as its argument bytes take their time, ten bits each, as on a half-duplex line: what arrives waits
    until the line is free, and an answer is there when its last byte has passed. A second argument is the turnaround in
-   microseconds: so long the line is silent between a request and its answers, which then come without a gap.
+   microseconds: so long the line is silent between a request and its answers, which then come without a gap. A third
+   says which ids are there, a fourth how an answer of several packets is handed over: 0 all of it at once, when its
+   last byte has passed, as by an adapter that holds bytes back for longer than it takes; 1 each packet as its own last
+   byte has passed, as by one that does not.
 
    Prints the path of its pseudo-terminal as one line. When standard input ends it prints its books and ends. */
 #define _GNU_SOURCE
@@ -24,7 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { SERVOS = 252, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
+enum { SERVOS = 253, BROADCAST = 254, GOAL = 42, POSITION = 56, COUNTS = 4096, ROOM = 65536 };
 enum { THERE_AND_BACK = 2 * (COUNTS - 1) };
 enum { BITS = 10, SECOND = 1000000000, EXACTLY = 60000, WATCHFUL = 300000 };
 enum { PING = 1, READ = 2, WRITE = 3, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
@@ -40,6 +43,8 @@ static struct servo servos[SERVOS + 1];
 static unsigned long frames, strays;
 /* Only ids that this divides are there. */
 static int every = 1;
+/* Each packet is handed over as it has passed. */
+static int pieces;
 /* Nanoseconds that a byte takes, 0 where it takes none; when the line is free again; when an answer left last. */
 static long long byte_time, line_free, answered, turnaround;
 static byte answer[ROOM];
@@ -178,15 +183,21 @@ static void send_bytes(int master, const byte *from, size_t count) {
     }
 }
 
-/* On a line that takes its time all of it is there when its last byte has passed. */
+/* On a line that takes its time: all of it when its last byte has passed, or each packet as its own has. */
 static void send_answer(int master) {
-    if (byte_time) {
-        line_free += turnaround;
-        pass(filled);
-        wait_for_line();
-        answered = now();
+    line_free += turnaround;
+    if (byte_time) pass(0);
+    for (size_t sent = 0; sent < filled;) {
+        size_t next = pieces ? (size_t)answer[sent + 3] + 4 : filled;
+        if (byte_time) {
+            /* Not from now on: a piece that was handed over late does not hold up what passes after it. */
+            line_free += (long long)next * byte_time;
+            wait_for_line();
+            answered = now();
+        }
+        send_bytes(master, answer + sent, next);
+        sent += next;
     }
-    send_bytes(master, answer, filled);
     filled = 0;
 }
 
@@ -214,6 +225,7 @@ int main(int count_of_arguments, char **arguments) {
     byte_time = baud > 0 ? (long long)BITS * SECOND / baud : 0;
     turnaround = count_of_arguments > 2 ? atol(arguments[2]) * 1000 : 0;
     every = count_of_arguments > 3 ? atoi(arguments[3]) : 1;
+    pieces = count_of_arguments > 4 ? atoi(arguments[4]) : 0;
     prctl(PR_SET_TIMERSLACK, 1);
     urgent = sched_getscheduler(0) == SCHED_FIFO;
     int master = open_terminal();

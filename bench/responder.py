@@ -58,13 +58,16 @@ class Responder:
 
 
 @contextmanager
-def responder(program: Path, baud: int = 0, turnaround: float = 0.0, every: int = 1) -> Iterator[Responder]:
+def responder(
+    program: Path, baud: int = 0, turnaround: float = 0.0, every: int = 1, pieces: bool = False
+) -> Iterator[Responder]:
     """One responder on a new pseudo-terminal; afterwards its `books` are there.
 
     With a `baud` rate bytes take their time, and the answers to one request begin after a `turnaround` (s, in whole
-    microseconds); without, it answers at once. Only ids that `every` divides are there.
+    microseconds); without, it answers at once. Only ids that `every` divides are there. An answer of several packets is
+    handed over whole, or with `pieces` each packet as its last byte has passed.
     """
-    command = [str(program), str(baud), str(round(turnaround * 1e6)), str(every)]
+    command = [str(program), str(baud), str(round(turnaround * 1e6)), str(every), str(int(pieces))]
     running = Responder(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
     try:
         yield running

@@ -35,10 +35,10 @@ class Row(NamedTuple):
     `unit`      of the figure: "x" for a ratio, "calls", "%", "ms", "s"
     `value`     the median; a ratio is ours by theirs where the goal is at most, theirs by ours where it is at least
     `least`, `greatest`  of the samples
-    `goal`, `stretch`    comparator and number, "<= 0.85"; "" is none
+    `goal`, `stretch`    comparator and number, "<= 0.85"; "" is none: such a row is told beside another, not judged
     `ours`, `theirs`     median seconds behind a ratio
     `samples`   how many
-    `note`      why it misses, or what was left out
+    `note`      what was measured in the same run and belongs to it, or what was left out; why it misses says `reasons`
     `margin`    share of the goal by which a figure may miss it and still count: SINGLE, PROCESS or 0 for a count
     """
 
@@ -74,12 +74,14 @@ def reaches(value: float, goal: str, margin: float = 0.0) -> bool:
 
 
 def met(row: Row) -> bool:
-    """Whether the goal is kept within the margin of its kind of row."""
-    return reaches(row.value, row.goal, row.margin)
+    """Whether the goal is kept within the margin of its kind of row, or there is none."""
+    return not row.goal or reaches(row.value, row.goal, row.margin)
 
 
 def verdict(row: Row) -> str:
-    """In words: stretch, met, met within the margin, or MISSED."""
+    """In words: stretch, met, met within the margin, or MISSED; or that there is no goal."""
+    if not row.goal:
+        return "no goal"
     if row.stretch and reaches(row.value, row.stretch):
         return "met, stretch too"
     if reaches(row.value, row.goal):

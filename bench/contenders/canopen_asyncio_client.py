@@ -23,16 +23,15 @@ class CanOpenAsyncio:
         self.network.connect(interface="slcan", channel=port, bitrate=BITRATE, sleep_after_open=0)
         self.nodes = [await self.network.aadd_node(node, canopen.ObjectDictionary()) for node in nodes]
 
-    def read(self, count: int) -> list[int]:
+    def read(self, count: int) -> list[list[int]]:
         """So many positions of each node, raw."""
         return self.loop.run_until_complete(self._read(count))
 
-    async def _read(self, count: int) -> list[int]:
+    async def _read(self, count: int) -> list[list[int]]:
         async def endless(upload: Any) -> list[int]:
             return [int.from_bytes(await upload(POSITION, 0), "little", signed=True) for _ in range(count)]
 
-        values = await asyncio.gather(*(endless(node.sdo.aupload) for node in self.nodes))
-        return [value for one in values for value in one]
+        return list(await asyncio.gather(*(endless(node.sdo.aupload) for node in self.nodes)))
 
     def close(self) -> None:
         async def close() -> None:

@@ -22,7 +22,7 @@ class CanOpen:
         self.network.connect(interface="slcan", channel=port, bitrate=BITRATE, sleep_after_open=0)
         self.nodes = [self.network.add_node(node, canopen.ObjectDictionary()) for node in nodes]
 
-    def read(self, count: int) -> list[int]:
+    def read(self, count: int) -> list[list[int]]:
         """So many positions of each node, raw."""
         values: list[list[int]] = [[] for _ in self.nodes]
 
@@ -39,7 +39,7 @@ class CanOpen:
                 thread.start()
             for thread in threads:
                 thread.join()
-        return [value for one in values for value in one]
+        return values
 
     def close(self) -> None:
         self.network.disconnect()

@@ -124,6 +124,11 @@ class Motorbus:
             found |= group if isinstance(group, dict) else group.values
         return [_raw(found.get(node)) for node in self.nodes]
 
+    def late(self) -> int:
+        """Twice the requests whose answer did not come in time, of all servos: each may be asked again, and probed."""
+        ledgers = self.bus.statistics.nodes.values()
+        return 2 * sum(ledger.sent - ledger.ok for ledger in ledgers)
+
     def close(self) -> None:
         self.bus.close()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import motorbus
 from bench.can_loop import BITRATE, main
 from motorbus import kst
@@ -17,25 +19,26 @@ class Motorbus:
         self.bus = motorbus.open(f"kst:can://slcan{port},bitrate={BITRATE}")
         self.servos = [kst.Servo(self.bus, node) for node in nodes]
 
-    def read(self, count: int) -> list[int]:
+    def read(self, count: int) -> list[list[int]]:
         """So many positions of each node, raw."""
-        values: list[float] = []
+        values: list[list[float]] = [[] for _ in self.servos]
         if len(self.servos) == 1:
             position = self.servos[0].position
-            values += [position() for _ in range(count)]
+            values[0] += [position() for _ in range(count)]
         else:
             self._together(count, values)
-        return [round(value * COUNTS_PER_RADIAN) for value in values]
+        return [[round(value * COUNTS_PER_RADIAN) for value in one] for one in values]
 
-    def _together(self, count: int, values: list[float]) -> None:
-        verb, keep = kst.Servo.position.function, values.append
+    def _together(self, count: int, values: list[list[float]]) -> None:
+        verb = kst.Servo.position.function
 
-        def endless(servo: kst.Servo) -> Operation[None]:
+        def endless(servo: kst.Servo, keep: Callable[[float], None]) -> Operation[None]:
             for _ in range(count):
                 keep((yield from verb(servo)))
 
         def together() -> Operation[None]:
-            yield from Together([endless(servo) for servo in self.servos])
+            pairs = zip(self.servos, values, strict=True)
+            yield from Together([endless(servo, found.append) for servo, found in pairs])
 
         self.bus.run(together())
 

@@ -20,6 +20,7 @@ from bench.loop import check
 from bench.responder import build, responder
 from bench.row import PROCESS, ROUNDS, Row, Say, pairs
 from bench.workloads import COUNTS, WARM_UP
+from motorbus.bus.statistics import Statistics
 
 NUMBERS = ("11",)
 MODULE: Final = "bench.rows.asynchronous"
@@ -65,13 +66,24 @@ def _run(program: Path, job: apart.Job) -> dict[str, Any]:
 
 
 def measured(name: str, port: str, reads: int) -> dict[str, float]:
-    """Seconds of processor time for each read. Raises WrongValue."""
-    values, seconds = {AWAITED: _awaited, BLOCKING: _blocking}[name](f"feetech:{port},baud=1000000", reads)
-    check([[round(value / STEP)] for value in values], (1,))
+    """Seconds of processor time for each read. Raises WrongValue, and Late where a read was asked again."""
+    values, seconds, late = {AWAITED: _awaited, BLOCKING: _blocking}[name](
+        f"feetech:{port},baud=1000000", reads
+    )
+    check([[round(value / STEP)] for value in values], (1,), late=late)
     return {"processor": seconds / reads}
 
 
-def _blocking(address: str, reads: int) -> tuple[Sequence[float], float]:
+Measured = tuple[Sequence[float], float, int]
+"""What was read (rad), seconds of processor time, and how many answers were late."""
+
+
+def _late(statistics: Statistics) -> int:
+    """As in `bench.contenders.motorbus`."""
+    return 2 * sum(ledger.sent - ledger.ok for ledger in statistics.nodes.values())
+
+
+def _blocking(address: str, reads: int) -> Measured:
     import motorbus
     from motorbus import feetech
 
@@ -82,16 +94,16 @@ def _blocking(address: str, reads: int) -> tuple[Sequence[float], float]:
         keep, began = values.append, _used()
         for _ in range(reads):
             keep(servo.position())
-        return values, _used() - began
+        return values, _used() - began, _late(bus.statistics)
 
 
-def _awaited(address: str, reads: int) -> tuple[Sequence[float], float]:
+def _awaited(address: str, reads: int) -> Measured:
     import asyncio
 
     import motorbus
     from motorbus import feetech
 
-    async def course() -> tuple[Sequence[float], float]:
+    async def course() -> Measured:
         async with motorbus.open_async(address) as bus:
             servo = feetech.AsyncServo(bus, 1)
             await servo.prepare()
@@ -99,7 +111,7 @@ def _awaited(address: str, reads: int) -> tuple[Sequence[float], float]:
             keep, began = values.append, _used()
             for _ in range(reads):
                 keep(await servo.position())
-            return values, _used() - began
+            return values, _used() - began, _late(bus.statistics)
 
     return asyncio.run(course())
 

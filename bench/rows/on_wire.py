@@ -80,9 +80,9 @@ def calls(say: Say) -> list[Row]:
             if counted is None:
                 say("strace is absent or may not trace: system calls are not measured\n")
                 return []
-            found[load.name] = round(sum(counted.values()) / exchanges(load.name), 2)
-    shown = ", ".join(f"{name} {count:.1f}" for name, count in found.items())
-    most = round(max(found.values()), 1)
+            found[load.name] = sum(counted.values()) / exchanges(load.name)
+    shown = ", ".join(f"{name} {count:.2f}" for name, count in found.items())
+    most = max(found.values())
     return [
         Row(
             "3",

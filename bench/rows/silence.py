@@ -5,8 +5,9 @@
 A position is asked of an id that nobody has, again and again, in processes of their own against a fresh responder. Our
 deadline is what the bus fixes when the request leaves: the time of the bytes, the turnaround of the family, the latency
 of the adapter and a margin for a busy host. The first request, which is tried twice, is left out; rustypot gets a
-time-out of about the same length. How far past the deadline is wall time in which the kernel wakes a process: the
-median counts, and the greatest is told beside it.
+time-out of about the same length. A bus tells its deadlines to nobody, so this one is reckoned anew from the parts that
+make it, which a program has no other use for; what is timed is the public call. How far past the deadline is wall time
+in which the kernel wakes a process: the median counts, and the greatest is told beside it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from bench.row import PROCESS, ROUNDS, Row, Say, met, noted, pairs
 
 NUMBERS = ("12",)
 MODULE = "bench.rows.silence"
-NOBODY = 253
+NOBODY = 0
+"""An id that the responder does not have; it has all others."""
 COUNT, WARM_UP = 30, 3
 TIMEOUT = 0.025
 """s, for those that are told one."""

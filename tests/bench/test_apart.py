@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bench import apart
 from bench.apart import Job
-from bench.rounds import Failed
+from bench.rounds import Failed, Wrong
 
 JOBS = tuple(Job(name, "nobody") for name in "abcd")
 
@@ -42,11 +44,49 @@ def test_everyone_runs_once_a_round_and_the_order_differs() -> None:
     }
 
 
-def test_a_spoiled_process_is_run_once_more() -> None:
+def test_a_spoiled_process_is_run_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
     course = Course(0)
+    monkeypatch.setattr(apart, "repeated", Counter())
     found = apart.rounds(JOBS, 1, silent, course)
     assert len(course.order) == 5
     assert sum(len(said) for said in found.values()) == 4
+    assert apart.repeated == {f"nobody: {course.order[0]}": 1}
+
+
+def test_ours_is_not_run_again_when_it_was_wrong_and_theirs_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs: list[str] = []
+
+    def run(job: Job) -> dict[str, Any]:
+        runs.append(job.name)
+        raise Wrong("another value")
+
+    monkeypatch.setattr(apart, "repeated", Counter())
+    for job, times in ((Job("ours", "nobody"), 1), (Job("theirs", "nobody", peers=("them",)), 2)):
+        runs.clear()
+        with pytest.raises(Wrong):
+            apart.rounds([job], 1, silent, run)
+        assert runs == [job.name] * times
+    assert apart.repeated == {"nobody: theirs": 1}
+
+
+@pytest.mark.parametrize(
+    ("last", "kind"),
+    [
+        ("motorbus.errors.NoReply: servo 1 is silent", Failed),
+        ("bench.loop.Late: 1 answers were late", Failed),
+        ("AssertionError: somebody answered", Wrong),
+        ("bench.loop.WrongValue: reading 7: [1], expected [2]", Wrong),
+        ("bench.rounds.Failed: ours made other bytes", Wrong),
+    ],
+)
+def test_a_process_says_by_its_error_whether_something_was_wrong(
+    last: str, kind: type[Failed], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = SimpleNamespace(returncode=1, stdout="", stderr=f"Traceback ...\n{last}\n")
+    monkeypatch.setattr("bench.apart.subprocess.run", lambda *words, **named: done)
+    with pytest.raises(Failed) as told:
+        apart.told(JOBS[0])
+    assert type(told.value) is kind
 
 
 def test_what_stays_spoiled_ends_it() -> None:

@@ -2,37 +2,69 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
-from bench.can_loop import STANDS, WrongValue, measure
+from bench.can_loop import FIRST, WARM_UP, WrongValue, measure, position
 from bench.can_report import COLUMNS, rows
 from bench.can_rounds import CANDIDATES, WORKLOADS, run
 from bench.rounds import Failed, Sample
 
+DUE = [[position(FIRST + place, number) for number in range(1000)] for place in range(2)]
+
 
 class Parrot:
-    """Says what it is told to."""
+    """Says what it is told to, node by node, as much of it as it is asked for."""
 
-    def __init__(self, *values: int) -> None:
-        self.values = values
+    def __init__(self, *values: list[int]) -> None:
+        self.values = list(map(iter, values))
 
-    def read(self, count: int) -> list[int]:
-        return list(self.values) * count
+    def read(self, count: int) -> list[list[int]]:
+        return [[next(one) for _ in range(count)] for one in self.values]
 
     def close(self) -> None:
         """Nothing is open."""
 
 
+class Short(Parrot):
+    """Keeps the last one of each to itself."""
+
+    def read(self, count: int) -> list[list[int]]:
+        return [one[:-1] for one in super().read(count)]
+
+
 def test_whoever_returns_what_the_servos_say_is_measured() -> None:
-    found = measure(Parrot(STANDS, STANDS), 2, 200)
+    found = measure(Parrot(*DUE), 2, 200)
     assert found["wall"] > 0
     assert found["processor"] >= 0
 
 
-@pytest.mark.parametrize("values", [(STANDS, STANDS + 1), (STANDS,), (STANDS, STANDS, STANDS)])
-def test_a_wrong_value_and_a_wrong_number_of_them_are_found_out(values: tuple[int, ...]) -> None:
-    with pytest.raises(WrongValue):
-        measure(Parrot(*values), 2, 200)
+def test_no_servo_stands_where_another_does_and_none_stands_still() -> None:
+    both = list(zip(*DUE, strict=True))
+    assert all(one != two for one, two in both)
+    assert all(now != then for one in DUE for now, then in itertools.pairwise(one))
+    assert all(-900 <= where <= 900 for one in DUE for where in one)
+
+
+STALE = [[*DUE[0][:70], DUE[0][69], *DUE[0][71:]], DUE[1]]
+OMITTED = [DUE[0][:70] + DUE[0][71:], DUE[1]]
+
+
+@pytest.mark.parametrize(
+    ("reader", "told"),
+    [
+        (Parrot(*STALE), "number 70"),
+        (Parrot(*OMITTED), "number 70"),
+        (Parrot(DUE[1], DUE[0]), "node 0x21: number 0"),
+        (Parrot(DUE[0]), "of 1 nodes instead of 2"),
+        (Short(*DUE), f"number {WARM_UP // 2 - 1}"),
+    ],
+    ids=["stale", "left out", "swapped", "a node too few", "one too few"],
+)
+def test_a_wrong_value_and_a_wrong_number_of_them_are_found_out(reader: Parrot, told: str) -> None:
+    with pytest.raises(WrongValue, match=told):
+        measure(reader, 2, 200)
 
 
 @pytest.mark.parametrize("workload", WORKLOADS, ids=lambda one: one.name)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import pytest
 
 from bench import fleet
 from bench.fleet import IDS, Fleet, Wrong, course, measured, told
+from bench.places import ROOT, surroundings
 
 ONE = Fleet(10040, 2.0, 5.0, 4.0, 2.0, 0.5, 4500.0)
 
@@ -53,6 +56,32 @@ def test_what_goes_wrong_there_is_told() -> None:
 def test_what_it_cost_in_words() -> None:
     assert ONE.speed == 2.0
     assert told(ONE) == (
-        "10040 axes, 2 goals and 5 readings of each a second: 2.00 times faster than real time, "
+        "10040 axes, 2 goals and 5 readings of each a second: 2.00 times real time, "
         "50 µs for each axis and second\nbuilt in 0.50 s, 4.5 kB of memory for each axis"
     )
+
+
+def example(*words: str) -> subprocess.CompletedProcess[str]:
+    """`examples/fleet.py`, which drives its axes by ordinary buses."""
+    command = [sys.executable, str(ROOT / "examples" / "fleet.py"), *words]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=ROOT, env=dict(surroundings())
+    )
+
+
+def test_the_example_tells_its_speed_in_three_digits_and_what_it_does_not_count() -> None:
+    done = example("2", "3")
+    axes, prepared, speed = done.stdout.splitlines()
+    assert axes == "6 axes within 0.000 rad of their goals, simulated"
+    assert prepared.startswith("prepared in ")
+    assert prepared.endswith(" s of processor time, which is not counted below")
+    assert float(f"{float(speed.split()[0]):.3g}") == float(speed.split()[0]) > 0
+    assert speed.split()[1:4] == ["times", "real", "time"]
+
+
+@pytest.mark.parametrize("words", [("0",), ("x",), ("-1", "6"), ("1", "0"), ("1", "51"), ("1", "2", "3")])
+def test_the_example_refuses_what_is_no_fleet_in_one_line(words: tuple[str, ...]) -> None:
+    done = example(*words)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert "expected a number of arms" in line

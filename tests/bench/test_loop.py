@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from bench import memory
-from bench.loop import WrongValue, measure
-from bench.rounds import CANDIDATES, Failed, compare
+from bench.loop import Late, WrongValue, check, measure
+from bench.rounds import CANDIDATES, Failed, Wrong, compare
 from bench.workloads import (
     FIELDS,
     IDS,
@@ -23,6 +23,7 @@ from bench.workloads import (
     growing,
     named,
     parts,
+    position,
 )
 
 BARE = CANDIDATES["bare loop"]
@@ -150,6 +151,55 @@ def test_books_that_differ_are_refused(kept: list[int]) -> None:
         compare(BARE, {"1": [5, 0, 0]}, {"servos": {"1": kept}, "strays": 0})
 
 
+@pytest.mark.parametrize(
+    ("kept", "late", "kind"),
+    [
+        ([6, 0, 0], 0, Wrong),
+        ([6, 0, 0], 1, Failed),
+        ([7, 0, 0], 1, Wrong),
+        ([4, 0, 0], 1, Wrong),
+        ([6, 1, 0], 1, Wrong),
+    ],
+)
+def test_a_reading_asked_for_once_more_spoils_books_and_nothing_else_excuses_them(
+    kept: list[int], late: int, kind: type[Failed]
+) -> None:
+    with pytest.raises(Failed) as told:
+        compare(BARE, {"1": [5, 0, 0]}, {"servos": {"1": kept}, "strays": 0}, late)
+    assert type(told.value) is kind
+
+
 def test_stray_bytes_on_the_wire_are_refused() -> None:
     with pytest.raises(Failed, match="3 bytes or packets"):
         compare(BARE, {}, {"servos": {}, "strays": 3})
+
+
+NODES = (1, 2)
+READ = [[position(node, number) for node in NODES] for number in range(20)]
+LEFT_OUT = READ[:7] + READ[8:]
+
+
+def test_a_reading_that_was_left_out_after_a_late_answer_spoils_a_measurement() -> None:
+    check(READ, NODES)
+    with pytest.raises(Late, match="1 readings of a servo left out, 0 told as missing"):
+        check(LEFT_OUT, NODES, late=1)
+    check(READ, NODES, late=1)  # it was late, and all is right: it counts as it is
+    with pytest.raises(Late, match="0 readings of a servo left out, 1 told as missing"):
+        check([*READ[:7], [READ[7][0], None], *READ[8:]], NODES, late=1)
+
+
+@pytest.mark.parametrize(
+    ("readings", "late"),
+    [
+        (LEFT_OUT, 0),
+        ([*READ[:7], *READ[9:]], 1),
+        ([*READ[:7], READ[6], *READ[7:]], 1),
+        ([*READ[:7], READ[7][::-1], *READ[8:]], 3),
+        ([*READ[:7], READ[7][:1], *READ[8:]], 1),
+        ([*READ[:7], [READ[7][0], None], *READ[8:]], 0),
+    ],
+    ids=["nobody was late", "two for one", "twice the same", "swapped", "a servo too few", "missing"],
+)
+def test_anything_else_is_wrong_whatever_was_late(readings: list[list[Any]], late: int) -> None:
+    with pytest.raises(WrongValue, match="reading 7:"):
+        check(readings, NODES, late=late)

@@ -100,13 +100,14 @@ def test_the_json_has_every_sample() -> None:
 def test_the_goal_for_system_calls_counts_a_cycle_as_two_exchanges() -> None:
     calls = {("motorbus", name): {"read": 2.0, "write": 1.0, "select": 1.0} for name in WORKLOADS}
     calls["motorbus", "cycle"] = {"read": 4.0, "write": 2.0, "select": 2.0}
-    assert verdict(RESULTS._replace(calls=calls)).endswith("cycle 4.0 (a cycle is two). At most 4: reached.")
-    calls["motorbus", "read1"] = {"read": 5.0}
+    assert verdict(RESULTS._replace(calls=calls)).endswith("cycle 4.00 (a cycle is two). At most 4: reached.")
+    calls["motorbus", "read1"] = {"read": 4.04}
     assert "At most 4: MISSED" in verdict(RESULTS._replace(calls=calls))
     assert "not measured" in verdict(RESULTS)
 
 
 def test_who_was_measured_again_is_said() -> None:
     late = RESULTS.wire[0]._replace(repeats=2)
-    assert spoiled(RESULTS).endswith("nobody.")
+    assert ": nobody. " in spoiled(RESULTS)
+    assert "scanning: scan 3 times" in spoiled(RESULTS._replace(repeated={"scanning: scan": 3}))
     assert "motorbus 2 times" in spoiled(RESULTS._replace(wire=[late, *RESULTS.wire[1:]]))

@@ -15,12 +15,17 @@ TURNAROUND = 0.004
 
 def asked(wire: Responder, request: bytes, due: int, patience: float = 10.0) -> bytes:
     """What comes back of so many bytes."""
+    return b"".join(looks(wire, request, due, patience))
+
+
+def looks(wire: Responder, request: bytes, due: int, patience: float = 10.0) -> list[bytes]:
+    """The same by what each look has found."""
     port = os.open(wire.port, os.O_RDWR | os.O_NOCTTY)
     try:
         os.write(port, request)
-        came = b""
-        while len(came) < due and select((port,), (), (), patience)[0]:
-            came += os.read(port, 4096)
+        came: list[bytes] = []
+        while sum(map(len, came)) < due and select((port,), (), (), patience)[0]:
+            came.append(os.read(port, 4096))
         return came
     finally:
         os.close(port)
@@ -48,3 +53,16 @@ def test_only_every_so_manieth_servo_is_there() -> None:
     requests = b"".join(memory.packet(node, memory.PING) for node in (19, 20, 21, 40))
     with responder(build(), every=20) as wire:
         assert asked(wire, requests, 12) == memory.packet(20, 0) + memory.packet(40, 0)
+
+
+def test_an_answer_is_handed_over_whole_or_packet_by_packet_as_it_has_passed() -> None:
+    request = memory.packet(254, memory.SYNC_READ, bytes((memory.POSITION, 2, *IDS)))
+    expected = [memory.packet(node, 0, block(node, 0)[:2]) for node in IDS]
+    slow = 2000  # bit/s: 40 ms for each packet, longer than anybody is held up
+    with responder(build(), slow) as wire:
+        assert looks(wire, request, 8 * len(IDS)) == [b"".join(expected)]
+    with responder(build(), slow, pieces=True) as wire:
+        came = looks(wire, request, 8 * len(IDS))
+    assert b"".join(came) == b"".join(expected)
+    assert len(came) > 1
+    assert all(len(one) % 8 == 0 for one in came)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from bench.rounds import CANDIDATES, REPEATS, Candidate, Failed, in_memory, rounds
+from bench.rounds import CANDIDATES, REPEATS, Candidate, Failed, Wrong, in_memory, rounds
 from bench.workloads import WORKLOADS
 
 BARE = CANDIDATES["bare loop"]
@@ -15,13 +16,14 @@ BARE = CANDIDATES["bare loop"]
 class Flaky:
     """Fails this often before it works."""
 
-    def __init__(self, failures: int) -> None:
+    def __init__(self, failures: int, kind: type[Failed] = Failed) -> None:
         self.failures = failures
+        self.kind = kind
 
     def __call__(self, candidate: Candidate, workload: str, count: int) -> dict[str, Any]:
         if self.failures:
             self.failures -= 1
-            raise Failed("held up")
+            raise self.kind("held up")
         return {"processor": 1.0, "wall": 2.0}
 
 
@@ -64,6 +66,32 @@ def test_nobody_is_asked_for_what_it_has_no_call_for() -> None:
 def test_what_stays_spoiled_ends_the_run_if_it_is_ours() -> None:
     with pytest.raises(Failed, match="held up"):
         rounds(Flaky(REPEATS + 1), [CANDIDATES["motorbus"]], count=1, times=1, progress=silent)
+
+
+def test_ours_is_not_tried_again_when_it_was_wrong() -> None:
+    with pytest.raises(Wrong):
+        rounds(Flaky(1, Wrong), [CANDIDATES["motorbus"]], count=1, times=1, progress=silent)
+
+
+def test_another_is_tried_again_even_then() -> None:
+    samples = rounds(Flaky(1, Wrong), [BARE], 1, 1, silent, workloads=[WORKLOADS["read1"]])
+    assert [s.repeats for s in samples] == [1]
+
+
+def test_a_wrong_value_in_a_process_is_told_from_one_that_could_not_do_its_work(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def says(text: str) -> None:
+        done = SimpleNamespace(returncode=1, stderr=text, stdout="")
+        monkeypatch.setattr("bench.rounds.subprocess.run", lambda *words, **named: done)
+
+    says("wrong value: reading 7: [1], expected [2]")
+    with pytest.raises(Wrong, match="bare loop, read1: wrong value: reading 7"):
+        in_memory(BARE, "read1", 5)
+    says("1 answers were late; 1 readings of a servo left out")
+    with pytest.raises(Failed, match="late") as told:
+        in_memory(BARE, "read1", 5)
+    assert not isinstance(told.value, Wrong)
 
 
 def test_another_that_stays_spoiled_is_left_out_of_this_round_and_said() -> None:

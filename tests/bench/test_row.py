@@ -58,6 +58,11 @@ def test_the_verdict_says_how_well(value: float, words: str, counts: bool) -> No
     assert met(row._replace(margin=PROCESS))
 
 
+def test_a_row_without_a_goal_is_told_and_not_judged() -> None:
+    row = ROW._replace(value=99.0, goal="", stretch="")
+    assert (verdict(row), met(row)) == ("no goal", True)
+
+
 def test_ratios_are_taken_round_by_round() -> None:
     assert pairs([1.0, 10.0, 3.0], [2.0, 40.0, 3.0]) == (0.5, 0.25, 1.0)
 

@@ -21,7 +21,7 @@ def test_each_reads_what_is_said(name: str) -> None:
 
 
 def test_a_wrong_value_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asynchronous, "_blocking", lambda address, reads: ([0.0] * reads, 1.0))
+    monkeypatch.setattr(asynchronous, "_blocking", lambda address, reads: ([0.0] * reads, 1.0, 0))
     with pytest.raises(WrongValue, match="reading 0"):
         measured(BLOCKING, "nowhere", 5)
 

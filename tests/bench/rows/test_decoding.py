@@ -50,8 +50,12 @@ def test_the_rows_are_theirs_by_ours(monkeypatch: pytest.MonkeyPatch) -> None:
         return {"seconds": shares[job.name], "bytes": 1000, "decodable": 100, "found": found}
 
     monkeypatch.setattr(apart.rounds, "__defaults__", (told, 3))
-    streamed, bulk = decoding.rows(7, lambda text: None)
+    streamed, cut, bulk = decoding.rows(7, lambda text: None)
     assert (streamed.number, streamed.value, streamed.ours, streamed.theirs) == ("8", 4.0, 1.0, 4.0)
-    assert (bulk.number, bulk.value, bulk.samples) == ("9", 16.0, 7)
+    assert (cut.number, cut.value, cut.goal, cut.samples) == ("9", 8.0, ">= 15", 7)
+    assert (bulk.number, bulk.value, bulk.goal) == ("9", 16.0, "")
+    assert "the bytes of each packet cut out" in cut.measure
+    assert "columns only" in bulk.measure
     assert "90.0% of 100 packets" in streamed.note
-    assert "4.0 times as fast as our streaming decoder; 8.0 x with the bytes" in bulk.note
+    assert "bytes as a list: 2.0 times as fast as our streaming decoder" in cut.note
+    assert "as arrays: 4.0 times as fast as our streaming decoder" in bulk.note

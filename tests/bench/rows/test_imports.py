@@ -38,7 +38,8 @@ def test_the_rows_are_ours_by_theirs_and_a_count(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(imports, "quickest", said)
     monkeypatch.setattr(imports, "once_opened", lambda: ["asyncio"])
-    time, count = imports.rows(7, lambda text: None)
+    time, used, count = imports.rows(7, lambda text: None)
     assert (time.value, time.samples, time.number) == (0.5, 7, "14")
-    assert "2000.0 ms, 2.00 of theirs" in time.note
+    assert (used.value, used.goal, used.ours, used.number) == (2.0, "", 2.0, "14")
+    assert time.note == "60 modules, theirs 60"
     assert (count.value, count.goal) == (1.0, "<= 0")

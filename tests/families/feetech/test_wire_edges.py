@@ -261,3 +261,22 @@ def test_doubt_ends_with_the_good_packet_that_its_last_bytes_begin() -> None:
     assert receiver.feed(head + REPLY[:3]) == [Noise(head, "checksum")]
     assert receiver.feed(REPLY[3:]) == [Reply(0, 1, REPLY)]
     assert receiver.feed(b"\x33\x44") == [Noise(b"\x33\x44", "framing")]
+
+
+def test_the_read_request_that_is_made_most_is_the_packet_that_all_instructions_make() -> None:
+    for address in range(256):
+        for count in {1, 2, 3, 15, 253, 256 - address} & set(range(1, min(253, 256 - address) + 1)):
+            for id in (0, 1, 77, 252, 253):
+                parameters = bytes((address, count))
+                assert wire.read(id, address, count) == wire.encode_instruction(id, 2, parameters)
+    for id, address, count in (
+        (-1, 0, 1),
+        (254, 0, 1),
+        (1, -1, 1),
+        (1, 256, 1),
+        (1, 3, 254),
+        (1, 0, 0),
+        (1, 255, 2),
+    ):
+        with pytest.raises(RequestError):
+            wire.read(id, address, count)

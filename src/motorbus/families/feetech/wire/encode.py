@@ -23,6 +23,7 @@ from motorbus.families.feetech.wire.packets import (
     suits,
 )
 
+_READ: Final = int(Instruction.READ)
 _SHAPES: Final[dict[int, str]] = {
     Instruction.READ: "give the first register and how many bytes",
     Instruction.WRITE: "give the first register and at least one datum",
@@ -76,6 +77,9 @@ def ping(id: int, *, broadcast: bool = False) -> bytes:
 
 def read(id: int, address: int, count: int) -> bytes:
     """READ `count` bytes (1 to 253) from `address` on. One servo only: a broadcast READ has no answer."""
+    if 0 <= id <= MAX_ID and 0 <= address and 1 <= count <= 253 and address + count <= 256:
+        # the packet that is made most; whatever is wrong is told below
+        return bytes((0xFF, 0xFF, id, 4, _READ, address, count, ~(id + 4 + _READ + address + count) & 0xFF))
     _check_span(address, count)
     return encode_instruction(id, Instruction.READ, bytes((address, count)))
 
