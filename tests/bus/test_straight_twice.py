@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.bus.pump import Bus
 from tests.bus.responder import position
 from tests.bus.test_straight_ends import CALLS, flown, in_another_thread, unanswered
 from tests.conftest import Figures, Rounds
@@ -13,6 +14,14 @@ SOON = 1.0
 """s in which the lock is free."""
 LATER = 60
 """Lines after the first one at which the second may fall: by then the first one has been dealt with."""
+
+
+def is_free(bus: Bus) -> bool:
+    """Whether the lock can be had soon."""
+    free = bus.turns.lock.acquire(timeout=SOON)
+    if free:
+        bus.turns.lock.release()
+    return free
 
 
 def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list[str]]:
@@ -25,9 +34,7 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list
     wrong = [] if isinstance(came.error, KeyboardInterrupt) else [f"it ended with {came.error!r}"]
     if bus.relay.pumper is not None:
         return came, [*wrong, "nobody else may pump any more"]
-    if not in_another_thread(
-        lambda: bus.turns.lock.acquire(timeout=SOON) and (bus.turns.lock.release() or True)
-    ):
+    if not in_another_thread(lambda: is_free(bus)):
         return came, [*wrong, "the lock is held"]
     wrong += [f"{node} is believed" for node in unanswered(bus) if not bus.turns.trust.nodes[node].tainted]
     line.fault = line.fault if line.sent else ""

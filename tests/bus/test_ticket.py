@@ -88,3 +88,19 @@ def test_what_stops_and_what_everybody_answers_is_taken_one_by_one() -> None:
     data = reply(1)
     for exchange in (position(1, rank=Rank.STOP), Exchange(b"ask", ANY)):
         assert not Flight(exchange).take_all([Reply(0, 1, data)], ())
+
+
+# -- a group of which some are not waited for -------------------------------------------------------------------------
+
+
+def test_what_somebody_says_who_is_not_waited_for_is_passed_over() -> None:
+    flight = Flight(positions(1, 2, 3))
+    flight.unbelieved = (2, 3)
+    assert flight.take(Reply(0, 1, reply(1)))
+    assert flight.complete
+    assert flight.passes_over(Reply(0, 2, reply(2)))
+    assert not flight.passes_over(Reply(0, 1, reply(1)))
+    assert not flight.passes_over(Reply(0, 4, reply(4)))
+    assert not flight.passes_over(Reply(0, 3, reply(3) + b"x"))
+    flight.unbelieved = ()
+    assert not flight.passes_over(Reply(0, 2, reply(2)))

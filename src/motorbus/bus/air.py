@@ -195,7 +195,10 @@ class Air:
             flight.spoiled = "echo"
             self.statistics.other["echo"] += 1
         elif flight.complete:
-            flight.surplus |= not self._everyones(reply)
+            if flight.passes_over(reply):
+                self._late(reply)
+            else:
+                flight.surplus |= not self._everyones(reply)
         elif not self._is_stale(flight, reply) and not flight.take(reply):
             self._mismatch(flight, reply, now)
 

@@ -132,7 +132,7 @@ class Course(Flight):
         self.wait = self.least = self.thinks = self.settle = 0.0
         self.data: Data = b""
         self.at = self.held_at = -inf
-        self.held: list[bytes] = []
+        self.held: list[Data] = []
         self.pending = self.counting = False
         self.times = [0] * BUCKETS
         self.low = self.high = 0.0

@@ -159,7 +159,7 @@ def _is_it(turns: Turns, link: Link, course: Course, news: asyncio.Future[Any], 
             at = min(link.now(), course.deadline)  # a loop that was held up takes it in late
             if turns.aloft is course and not news.done():
                 if len(data) + sum(map(len, course.held)) < course.size:
-                    course.held.append(data)  # type: ignore[arg-type]  # bytes, as the bus is calm
+                    course.held.append(data)
                     course.held_at, is_it = at, True
                 else:
                     is_it = _ends(course, news, data, at)

@@ -40,7 +40,7 @@ def keeps(course: Course, arrived: list[Data], at: float) -> bool:
     kept = bool(arrived) and course.turns.aloft is course
     if kept:
         course.held_at = min(at, course.deadline)  # a host that was held up takes it in late
-        course.held += arrived  # type: ignore[arg-type]  # bytes, as the bus is calm
+        course.held += arrived
     lock.release()
     return kept
 
@@ -51,7 +51,7 @@ def _meant(bus: Bus, course: Course) -> Any:
     lock.acquire()
     at = min(bus.link.now(), course.deadline)
     if course.turns.aloft is course and at - course.sent_at >= course.least:
-        data = b"".join(course.held)
+        data = b"".join(course.held)  # type: ignore[arg-type]  # bytes, as the bus is calm
         value = course.whole(data, at)
         if value is not UNLIKE:
             course.held = []  # first, or after an interrupt in between they would be those of the next flight

@@ -202,6 +202,14 @@ class Flight(Ticket):
             index in self.got or due.node in self.unbelieved for index, due in enumerate(dues)
         )
 
+    def passes_over(self, reply: Reply) -> bool:
+        """Somebody says this who was asked with the others, and is not waited for."""
+        dues, unbelieved = self.exchange.replies, self.unbelieved
+        if dues is ANY or not unbelieved:
+            return False
+        told = reply.key, len(reply.data)
+        return any(due.node in unbelieved and (due.key, due.length) == told for due in dues)
+
     def hear_noise(self, fault: str, data: bytes) -> None:
         """Bytes of nobody: in front of the first reply they do no harm, behind one they cast doubt on it.
 
