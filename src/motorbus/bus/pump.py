@@ -40,17 +40,14 @@ class Bus(BusFace):
                 return usual(self, operation)
         relay = self.relay
         run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=relay.wake)
-        caught: BaseException | None = None
-        while True:
+        try:
             try:
-                if caught is not None:
-                    relay.recover()
-                    run.interrupt(caught)
                 while not run.advance():
                     relay.turn()
-                break
-            except BaseException as interruption:  # dealt with above, where a second one is caught too
-                caught = interruption
+            except BaseException as interruption:
+                relay.clean_up(run, interruption)
+        except BaseException as interruption:  # a second one fell between the first and what deals with it
+            relay.clean_up(run, interruption)
         return run.result()
 
     def volley(self, *exchanges: Exchange[Any]) -> list[Any]:

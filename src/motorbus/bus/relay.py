@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 from threading import Condition, get_ident
+from typing import Any
 
 from motorbus.bus.crank import IDLE, crank, launch, push, take_in
+from motorbus.bus.run import Run
 from motorbus.bus.ticket import Flight
 from motorbus.bus.turns import Turns
 from motorbus.errors import LinkError
@@ -101,6 +103,18 @@ class Relay:
         if self._waiting:
             with self._lock:
                 self.changed.notify_all()
+
+    def clean_up(self, run: Run[Any], caught: BaseException) -> None:
+        """Let what was interrupted come to its end; one more interrupt meanwhile makes it hurry."""
+        while True:
+            try:
+                self.recover()
+                run.interrupt(caught)
+                while not run.advance():
+                    self.turn()
+                return
+            except BaseException as interruption:
+                caught = interruption
 
     def recover(self) -> None:
         """After an interrupt: stop being the one that pumps, and let go of the lock as often as it is held."""

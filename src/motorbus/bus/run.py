@@ -56,6 +56,7 @@ class Branch:
         "looked",
         "owner",
         "started",
+        "thrown",
         "ticket",
         "value",
     )
@@ -72,7 +73,7 @@ class Branch:
             self.owner = self  # the outermost one owns the bus; what is nested in it belongs to it
         self.ticket: Ticket | None = None
         self.children: list[Branch] = []
-        self.started = self.finished = False
+        self.started = self.thrown = self.finished = False
         self.value: Any = None
         self.error: BaseException | None = None
 
@@ -162,6 +163,9 @@ class Run(Generic[T]):
                 self._await(branch, Flight(wish, branch.owner, self.wake))
         elif isinstance(wish, Together):
             branch.children = [Branch(operation, branch) for operation in wish.operations]
+            if not branch.children:
+                branch.ticket = Ticket()
+                branch.ticket.finish([])
         elif isinstance(wish, Alone):
             child = Branch(wish.operation, branch, alone=True)
             child.started = True
@@ -221,6 +225,9 @@ class Run(Generic[T]):
     def _join(self, branch: Branch) -> None:
         """All children have ended: their results, or the first error, go to the parent."""
         children, branch.children = branch.children, []
+        if not children and branch.thrown:  # what it waited for was lost to one more interrupt: it is told
+            self._step(branch, error=self.interruption)
+            return
         errors = [child.error for child in children if child.error is not None]
         if errors:
             said = {str(errors[0])}  # several that were cut off by one thing say the same
@@ -250,7 +257,7 @@ class Run(Generic[T]):
             self.thrown = True
 
     def _throw(self, branch: Branch, interruption: BaseException) -> None:
-        if branch.finished:
+        if branch.finished or branch.thrown:
             return
         if not branch.started:
             branch.started = True
@@ -261,13 +268,14 @@ class Run(Generic[T]):
             self._throw(child, interruption)
         if not branch.children:
             self._abandon(branch)
+            branch.thrown = True
             self._step(branch, error=interruption)
 
     def _abandon(self, branch: Branch) -> None:
-        ticket, branch.ticket = branch.ticket, None
-        if ticket is not None:
+        if branch.ticket is not None:
             with self.turns.lock:
-                self.turns.abandon(ticket)
+                self.turns.abandon(branch.ticket)
+            branch.ticket = None  # not before: one more interrupt would leave it to nobody
 
     def _give_up(self) -> None:
         """The clean-up took too long: whatever it still waits for fails at once."""
