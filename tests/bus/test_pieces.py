@@ -140,7 +140,9 @@ def test_who_sleeps_sleeps_until_the_last_bit_can_be_here(
         before, free = bus.link.now(), bus.turns.free_at
         assert where(bus.run(exchange)) == list(nodes)
         least = max(before, free) + FAMILY.air_time(exchange, 1_000_000)
-        assert least - TINY <= slept.pop() <= least + len(nodes) * 1e-5 + TINY, "a byte more in its other form"
+        assert least - TINY <= slept.pop() <= least + len(nodes) * 1e-5 + TINY, (
+            "a byte more in its other form"
+        )
     before = bus.link.now()
     bus.volley(order(), exchange)
     assert slept.pop() > before + FAMILY.air_time(exchange, 1_000_000), "the goals go before it"

@@ -9,7 +9,7 @@ import pytest
 from motorbus.bus.pump import Bus
 from motorbus.bus.volley import volley
 from motorbus.core.operation import Answer, Data, Effect, Exchange
-from motorbus.errors import LinkLost, MotorbusError, NoReply, Refused
+from motorbus.errors import LinkLost, MotorbusError, NoReply, Refused, RequestError
 from motorbus.families.feetech import wire
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.bus.responder import Responder, memory_bus, position, positions
@@ -165,3 +165,26 @@ def test_a_link_that_is_lost_in_the_write_is_told() -> None:
         for alone in (order(), iter(order())):  # nobody answers it, and it is no success all the same
             with pytest.raises(MotorbusError, match="gone"):
                 bus.run(alone)
+
+
+@pytest.mark.parametrize("together", [True, False])
+@pytest.mark.parametrize("wrong", [5, None, "ab", [order()], iter(())], ids=range(5))
+def test_what_is_no_exchange_is_refused_and_nothing_is_sent(wrong: Any, together: bool) -> None:
+    bus, _, line = heard_bus()
+    with bus:
+        for row in ((wrong,), (wrong, positions(1, 2)), (order(), wrong), (order(), position(1), wrong)):
+            with pytest.raises(RequestError, match="is no exchange") as caught:
+                volley(bus, row, together=together)
+            assert "nothing was sent" in caught.value.advice
+        assert line.sent == []
+        told = volley(bus, (order(), positions(1, 2)), together=together)
+    assert told[0] == 7
+
+
+def test_an_attribute_that_a_caller_lacks_is_told_as_it_is() -> None:
+    """What is raised in words of ours is only what concerns the exchanges themselves."""
+    bus, _, _ = heard_bus()
+    read = position(1)
+    lacking: Any = Exchange(read.request, read.replies, lambda answer: answer.nothing)  # type: ignore[attr-defined]
+    with bus, pytest.raises(AttributeError, match="nothing"):
+        volley(bus, (order(), lacking))

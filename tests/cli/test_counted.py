@@ -106,3 +106,25 @@ def test_nothing_to_count_ends_with_2(run: Run, tmp_path: Path) -> None:
         ran = run("decode", "--family", family, "--summary", "--file", str(tmp_path / name))
         assert (ran.code, ran.out) == (2, "")
         assert "there is nothing to count" in ran.err
+
+
+@pytest.mark.parametrize("how", ["at once", "piece by piece"])
+def test_damaged_lines_of_a_log_are_counted_and_the_others_too(
+    how: str, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(counted, "can_decode", lambda: how == "at once")
+    log = f"(1.0) can0 {GOAL}\n(1.1) can0 {GOAL[:-1]}\n(1.2) can0 {TAKEN}\n(1.3) can"
+    (tmp_path / "trace.log").write_text(log)
+    words = ("decode", "--family", "kst", "--summary")
+    ran = run(*words, "--file", str(tmp_path / "trace.log"))
+    assert ran.code == 1
+    assert ran.out.startswith("2 packets, 0 of 26 bytes are noise, damaged lines: 2\n")
+    assert f"the first damaged line, 2: {GOAL[:-1]!r} is no CAN frame" in ran.out
+    monkeypatch.setattr(sys, "stdin", io.StringIO(log))
+    ran = run(*words, "--json")
+    assert (ran.code, ran.document["packets"], ran.document["damaged_lines"]) == (1, 2, 2)
+    (tmp_path / "trace.log").write_text("(1.3) can")
+    ran = run(*words, "--file", str(tmp_path / "trace.log"), "--json")
+    assert (ran.code, ran.document["groups"], ran.document["damaged_lines"]) == (1, [], 1)
+    assert run(*words, GOAL[:-1]).code == 2, "what is typed is a question"
+    assert run(*words, GOAL, "--json").document["damaged_lines"] == 0

@@ -195,3 +195,31 @@ def test_a_file_that_is_no_recording_of_such_a_bus_ends_with_2(
     ran = run("decode", "--family", family, "--file", str(tmp_path / name))
     assert (ran.code, ran.out) == (2, "")
     assert words in ran.err
+
+
+def test_a_damaged_line_is_told_with_its_number_and_the_others_are_explained(
+    run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    log = LOG[: LOG.index("\n") - 3] + "\n" + LOG + "(1436509053.0) can0 5A5#60"[:-1]
+    (tmp_path / "trace.log").write_text(log)
+    words = ("decode", "--family", "kst")
+    ran = run(*words, "--file", str(tmp_path / "trace.log"))
+    assert ran.code == 1
+    assert "line 1: BAD: " in ran.out
+    assert "line 4: BAD: " in ran.out
+    assert ran.out.count(": good") == 2
+    monkeypatch.setattr(sys, "stdin", io.StringIO(log))
+    records = run(*words, "--json").records
+    assert [(one["start"], one["title"], one["valid"]) for one in (records[0], records[3])] == [
+        (0, "line 1", False),
+        (3, "line 4", False),
+    ]
+    assert [one["frame"] for one in records[1:3]] == [GOAL, TAKEN]
+
+
+def test_a_file_without_lines_is_refused(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "zeros").write_bytes(bytes(100_000))
+    for more in ([], ["--summary"]):
+        ran = run("decode", "--family", "kst", "--file", str(tmp_path / "zeros"), *more)
+        assert (ran.code, ran.out) == (2, "")
+        assert "line 1 is longer than 8192 characters" in ran.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 
@@ -10,7 +11,16 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.can_log import is_log, looks_like_can, parse_line, parse_word, read_lines, read_log
+from motorbus.link.can_log import (
+    LONGEST,
+    is_log,
+    lines_of,
+    looks_like_can,
+    parse_line,
+    parse_word,
+    read_lines,
+    read_log,
+)
 
 DATA = bytes.fromhex("2203600093FF0000")
 FRAMES = [CanFrame(0x625, DATA), CanFrame(0x625, DATA, extended=True), CanFrame(0x5A5, b"")]
@@ -86,12 +96,94 @@ def test_can_fd_is_told_as_such(line: str) -> None:
     assert "not classic CAN" in found.fault
 
 
-def test_lines_without_a_frame_are_passed_over_and_bad_ones_are_numbered() -> None:
+def test_lines_without_a_frame_are_passed_over_and_bad_ones_are_told_in_their_place() -> None:
     assert [one.frame for one in read_lines(["", "# a comment", "5A5#"])] == [FRAMES[2]]
-    with pytest.raises(RequestError, match="line 2: .*is no CAN frame"):
-        list(read_lines(["5A5#", "5A5"]))
-    with pytest.raises(RequestError, match="8 bytes are announced and 1 stand there"):
-        list(read_lines(["can0 625 [8] 22"]))
+    good, bad, short, last = read_lines(["5A5#", "5A5", "", "can0 625 [8] 22", "5A5#"])
+    assert [(one.frame, one.fault, one.line) for one in (good, last)] == [(FRAMES[2], "", 0)] * 2
+    assert (bad.frame, bad.line, bad.text) == (None, 2, "5A5")
+    assert "is no CAN frame" in bad.fault
+    assert (short.frame, short.line) == (None, 4)
+    assert "8 bytes are announced and 1 stand there" in short.fault
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "(1.0) can0 5A5#600360000000",
+        "(99999999999999) can0 5A5#",
+        "(1.2.3) can0 5A5 [0]",
+        f"can0 5A5 [{'9' * 5000}] 00",
+        "(" + "9" * 400 + ") can0 5A5#",
+        "\0" * 4096,
+        "\ufffd\x1b[31m",
+    ],
+    ids=range(7),
+)
+def test_no_line_stops_what_comes_behind_it(line: str) -> None:
+    *told, last = read_lines([line, "5A5#"])
+    assert last.frame == FRAMES[2]
+    assert len(told) == 1
+    assert told[0].line == (0 if "#6003" in line else 1)
+    assert told[0].fault.isprintable()
+
+
+def test_what_has_no_lines_is_refused_and_not_read_to_its_end(tmp_path: Path) -> None:
+    class Endless(io.TextIOBase):
+        """Zeros for ever, as of a device."""
+
+        taken = 0
+
+        def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+            assert size is not None
+            assert 0 < size <= LONGEST, "all of it was asked for"
+            self.taken += size
+            return "\0" * size
+
+    endless = Endless()
+    with pytest.raises(RequestError, match=f"line 1 is longer than {LONGEST} characters"):
+        list(read_lines(lines_of(endless)))  # type: ignore[arg-type]
+    assert endless.taken == LONGEST
+    for name in ("trace", "trace.log", "trace.asc", "trace.trc"):
+        (tmp_path / name).write_bytes(b"\n" + b"\0" * 3 * LONGEST)
+        with pytest.raises(RequestError, match="line 2 is longer"):
+            list(read_log(tmp_path / name))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_log(tmp_path: Path) -> None:
+    for name in ("trace.txt", "trace.log"):
+        (tmp_path / name).write_text("5A5#\n", encoding="utf-8-sig")
+        assert [one.frame for one in read_log(tmp_path / name)] == [FRAMES[2]]
+
+
+ASC = """date Mon Jan 1 00:00:00.000 2024
+base hex  timestamps absolute
+internal events logged
+   0.001000 1  625             Rx   d 8 22 03 60 00 93 FF 00 00
+   0.002000 1  625             Rx   d 8 22 XX 60 00 93 FF 00 00
+   0.003000 1  625             Rx   d 8 22 03
+   0.004000 1  5A5             Rx   d x
+   0.005000 1  5A5             Rx   d 0
+   0.006000 1  625             Rx   d 8 22 0"""
+TRC = """;$FILEVERSION=1.1
+;$STARTTIME=45000.5
+     1)         1.0  Rx         0625  8  22 03 60 00 93 FF 00 00
+     2)         2.0  Rx         0625  8  22 XX 60 00 93 FF 00 00
+     3)         3.0  Rx         05A5  0
+     4)         4.0  Rx         05A5  Q"""
+
+
+def test_python_can_reads_on_behind_a_damaged_line(tmp_path: Path) -> None:
+    (tmp_path / "trace.asc").write_text(ASC)
+    found = list(read_log(tmp_path / "trace.asc"))
+    assert [one.frame for one in found] == [FRAMES[0], None, None, None, FRAMES[2], None]
+    assert [one.line for one in found] == [0, 5, 6, 7, 0, 9]
+    assert [one.at for one in found if not one.line] == [0.001, 0.005]
+    assert [bool(one.fault) for one in found] == [bool(one.line) for one in found]
+    (tmp_path / "trace.trc").write_text(TRC)
+    found = list(read_log(tmp_path / "trace.trc"))
+    assert [one.frame for one in found] == [FRAMES[0], None, FRAMES[2], None]
+    assert [one.line for one in found] == [0, 4, 0, 6]
+    assert [one.at for one in found if not one.line] == pytest.approx([1678881600.001, 1678881600.003])
 
 
 def test_bytes_in_hexadecimal_are_no_can_text() -> None:
@@ -144,8 +236,10 @@ def test_errors_remotes_and_can_fd_of_a_file_are_told(tmp_path: Path) -> None:
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RequestError, match="no log of CAN frames"):
+    with pytest.raises(RequestError, match="no log of CAN frames") as caught:
         list(read_log(tmp_path / "trace.pcapng"))
+    for suffix in (".log", ".txt", ".candump", ".asc", ".blf", ".trc"):
+        assert suffix in caught.value.expected
 
 
 def test_a_file_that_is_not_there_is_told_by_the_system(tmp_path: Path) -> None:

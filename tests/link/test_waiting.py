@@ -63,7 +63,9 @@ def test_a_number_that_is_no_descriptor_is_refused(pipe: tuple[int, int]) -> Non
         wait_any([pipe[0], -1], 1.0)
 
 
-def test_a_doze_lasts_until_its_moment_and_one_that_is_over_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_doze_lasts_until_its_moment_and_one_that_is_over_takes_no_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     slept: list[float] = []
     monkeypatch.setattr(waiting, "sleep", slept.append)
     monkeypatch.setattr(waiting, "monotonic", lambda: 100.0)

@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from math import inf, nan
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import motorbus
 from motorbus.core.capture import PIECE, WAYS, Packet
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import MotorbusError, RequestError
@@ -169,9 +173,20 @@ def test_nothing_holds_nothing(name: str) -> None:
         ("feetech", [CanFrame(1, b"")], ""),
         ("kst", b"\xff", ""),
         ("kst", [b"\xff"], ""),
+        ("kst", None, ""),
+        ("kst", 5, ""),
+        ("kst", "", ""),
+        ("kst", b"", ""),
+        ("kst", CanFrame(1, b""), ""),
+        ("kst", (CanFrame(1, b"") for _ in range(3)), ""),
+        ("feetech", None, ""),
+        (None, b"", ""),
+        (5, b"", ""),
+        ([], b"", ""),
+        (motorbus.feetech, b"", ""),
     ],
 )
-def test_what_is_no_recording_is_refused(name: str, recording: Any, way: str) -> None:
+def test_what_is_no_recording_is_refused(name: Any, recording: Any, way: str) -> None:
     with pytest.raises(RequestError):
         decode(name, recording, way)
 
@@ -195,3 +210,69 @@ def test_numpy_is_loaded_when_it_is_needed() -> None:
         "assert 'numpy' not in sys.modules; decode('feetech', b'x'); assert 'numpy' in sys.modules"
     )
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, timeout=60)
+
+
+@pytest.mark.parametrize("name", BYTES)
+@given(data=st.data())
+def test_each_byte_may_have_its_time(name: str, data: st.DataObject) -> None:
+    """A packet has that of its first, as when each byte is fed by itself."""
+    line = data.draw(lines(name))
+    times = [0.5 + place / 4 for place in range(len(line))]
+    decoder = Decoder(FAMILIES[name])
+    one_by_one = [
+        packet for place, at in enumerate(times) for packet in decoder.feed(line[place : place + 1], at)
+    ]
+    one_by_one += decoder.flush()
+    found = decode(FAMILIES[name], line, at=times)
+    assert list(found) == one_by_one
+    assert [packet.at for packet in found] == [times[packet.start] for packet in found]
+
+
+@pytest.mark.parametrize("name", FRAMES)
+@given(data=st.data())
+def test_each_frame_may_have_its_time(name: str, data: st.DataObject) -> None:
+    bus = data.draw(buses(name))
+    times = [place / 4 for place in range(len(bus))]
+    decoder = Decoder(FAMILIES[name])
+    one_by_one = [packet for frame, at in zip(bus, times, strict=True) for packet in decoder.feed(frame, at)]
+    assert list(decode(FAMILIES[name], deque(bus), at=times)) == [*one_by_one, *decoder.flush()]
+
+
+PING = bytes.fromhex("ff ff 01 02 01 fb")
+
+
+@pytest.mark.parametrize("at", [[], [1.0], [1.0, 2.0], [1.0] * 4, np.ones(5)], ids=len)
+def test_times_are_as_many_as_what_they_belong_to(at: Any) -> None:
+    bus = [CanFrame(0x601, b"")] * 3
+    with pytest.raises(RequestError, match=f"{len(at)} times for 3 frames"):
+        decode("kst", bus, at=at)
+    with pytest.raises(RequestError, match=f"{len(at)} times for 12 bytes"):
+        decode("feetech", PING * 2, at=at)
+
+
+@pytest.mark.parametrize("wrong", ["x", "1.5", None, nan, inf, -inf, True, 1j, 10**400, [1.0], b"1"])
+def test_a_time_is_a_finite_number_all_at_once_and_piece_by_piece(wrong: Any) -> None:
+    frame = CanFrame(0x601, b"")
+    for at in ([wrong], [1.0, wrong], (wrong, wrong)):
+        with pytest.raises(RequestError, match="at: .* is no "):
+            decode("kst", [frame] * len(at), at=at)
+    decoder = Decoder("kst")
+    if wrong is not None:  # for a piece it says that nothing was noted
+        with pytest.raises(RequestError, match="at: .* is no time"):
+            decoder.feed(frame, wrong)
+        assert decoder.rest() == []
+
+
+@pytest.mark.parametrize("at", ["x", 1.0, {0: 1.0}, iter([1.0]), [[1.0], [2.0]], [[1.0], 2.0]])
+def test_what_is_no_row_of_times_is_refused(at: Any) -> None:
+    with pytest.raises(RequestError, match="is no row of times"):
+        decode("kst", [CanFrame(0x601, b"")], at=at)
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.float32, float, int])
+def test_times_may_be_numbers_of_any_kind(kind: Any) -> None:
+    bus, times = [CanFrame(0x601, b"")] * 2, np.array([1, 2], kind)
+    decoder = Decoder("kst")
+    fed = [packet for frame, at in zip(bus, times, strict=True) for packet in decoder.feed(frame, at)]
+    assert [packet.at for packet in fed] == [packet.at for packet in decode("kst", bus, at=times)] == [1, 2]  # type: ignore[arg-type]
+    assert [packet.at for packet in decode("kst", bus, at=list(times))] == [1, 2]

@@ -130,6 +130,8 @@ def test_bytes_may_be_any_buffer(kind: Any) -> None:
     decoder.feed(kind(buffer))
     buffer[:] = bytes(len(buffer))
     assert [packet.data for packet in decoder.feed(kind(READ[3:]))] == [b"\x00", READ]
+    twice = bytes(byte for one in READ for byte in (one, 0x55))
+    assert [packet.data for packet in Decoder("feetech").feed(memoryview(twice)[::2])] == [READ]  # type: ignore[arg-type]
 
 
 def test_an_unknown_way_is_refused() -> None:
@@ -144,3 +146,10 @@ def test_an_unknown_way_is_refused() -> None:
 def test_a_family_may_be_configured() -> None:
     family = motorbus.kst.FAMILY.configured(profile="xqpower")
     assert Decoder(family).family is family
+
+
+@pytest.mark.parametrize("family", [None, 5, [], b"feetech", motorbus.feetech, motorbus.kst.FAMILY.link])
+def test_what_is_no_family_is_refused(family: Any) -> None:
+    with pytest.raises(RequestError, match="is no family of devices") as caught:
+        Decoder(family)
+    assert "feetech" in caught.value.expected

@@ -47,3 +47,11 @@ def test_another_ending_is_refused_before_it_is_read(name: str, tmp_path: Path) 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read_bytes(tmp_path / "line.bin")
+
+
+@pytest.mark.parametrize("suffix", TEXT)
+def test_a_byte_order_mark_is_none_of_the_bytes(suffix: str, tmp_path: Path) -> None:
+    (tmp_path / f"line{suffix}").write_text("FF 0A", encoding="utf-8-sig")
+    assert read_bytes(tmp_path / f"line{suffix}") == b"\xff\x0a"
+    with pytest.raises(RequestError):
+        from_hex("FF \ufeff0A")

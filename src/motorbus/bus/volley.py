@@ -14,8 +14,9 @@ from motorbus.bus.look import questions
 from motorbus.bus.run import taken
 from motorbus.bus.straight import fly
 from motorbus.bus.ticket import Flight
+from motorbus.core.entry import shown
 from motorbus.core.operation import UNLIKE, Exchange
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, RequestError
 
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
@@ -29,11 +30,18 @@ def volley(
     """Carry these out in their order; the value of each, or the error, where that is one of those `forgiven`.
 
     Without `together` each leaves in a write of its own. Raises the first other error, as `Bus.run` does; what comes
-    behind has not been sent then.
+    behind has not been sent then. Raises RequestError, with nothing sent, when one is no exchange.
     """
     told: list[Any] = []
-    if together and len(exchanges) == 2 and _flown(bus, exchanges, forgiven, told):
-        return told
+    try:
+        if together and len(exchanges) == 2 and _flown(bus, exchanges, forgiven, told):
+            return told
+    except AttributeError:
+        _check(
+            exchanges
+        )  # only what is an exchange has what was asked of it, and it is asked before one leaves
+        raise
+    _check(exchanges)
     begin = 0
     for end, exchange in enumerate(exchanges, 1):
         if exchange.replies == () and end < len(exchanges) and isinstance(exchange.request, bytes):
@@ -49,6 +57,16 @@ def volley(
             except forgiven as error:
                 told.append(error)
     return told
+
+
+def _check(exchanges: Exchanges) -> None:
+    for one in exchanges:
+        if not isinstance(one, Exchange):
+            raise RequestError(
+                f"{shown(one)} is no exchange",
+                expected="as bus.volley(write(goals), sync_read_positions(servos)): each by itself, and made before",
+                advice="what asks several questions is carried out by run(); nothing was sent",
+            ) from None
 
 
 def _flown(bus: Bus, burst: Exchanges, forgiven: tuple[type[Exception], ...], told: list[Any]) -> bool:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.core.family import Family
     from motorbus.core.operation import CanFrame
+    from motorbus.link.can_log import Logged
 
 _PIECE: Final = 1 << 16
 """Bytes that are fed at a time where there is no numpy."""
@@ -36,9 +37,18 @@ class Group(NamedTuple):
     bytes: int
 
 
-def summary(family: Family, recording: bytes | Sequence[CanFrame], direction: str, output: Output) -> Exit:
-    """Print what is in it; FAILURE if anything is broken or belongs to no packet."""
-    if not recording:
+def summary(
+    family: Family,
+    recording: bytes | Sequence[CanFrame],
+    direction: str,
+    output: Output,
+    damaged: Sequence[Logged] = (),
+) -> Exit:
+    """Print what is in it; FAILURE if anything is broken or belongs to no packet.
+
+    `damaged` are the lines of a log of which nobody knows what was in them.
+    """
+    if not recording and not damaged:
         raise RequestError("there is nothing to count", expected="bytes, or frames for a CAN family")
     groups = counted(_taken_apart(family, recording, direction))
     noise = [group for group in groups if group.fault]
@@ -47,18 +57,22 @@ def summary(family: Family, recording: bytes | Sequence[CanFrame], direction: st
         "packets": sum(group.packets for group in groups if not group.fault),
         "bytes": sum(group.bytes for group in groups),
         "noise_bytes": sum(group.bytes for group in noise),
+        "damaged_lines": len(damaged),
         "code": captures_of(family).code,
         "groups": [_facts(group) for group in groups],
     }
     output.document("motorbus.decode.summary/1", facts)
+    lines = f", damaged lines: {len(damaged)}" if damaged else ""
     output.table(
-        f"{facts['packets']} packets, {facts['noise_bytes']} of {facts['bytes']} bytes are noise",
+        f"{facts['packets']} packets, {facts['noise_bytes']} of {facts['bytes']} bytes are noise{lines}",
         ("kind", ">node", ">code", ">packets", ">bytes"),
         [_row(group) for group in groups],
     )
     if facts["code"]:
         output.text(f"code: {facts['code']}")
-    return Exit.FAILURE if noise else Exit.OK
+    if damaged:
+        output.text(f"the first damaged line, {damaged[0].line}: {damaged[0].fault}")
+    return Exit.FAILURE if noise or damaged else Exit.OK
 
 
 def counted(found: Iterator[Packets]) -> list[Group]:

@@ -36,11 +36,12 @@ any, they are read from stdin. A CAN frame is written as candump writes it:
 IDENTIFIER#DATA, 3 digits for 11 bits, 8 for 29, #R for a remote frame. The
 text of candump on stdin is explained as it comes. --file reads a recording:
 of a serial line .bin and .raw (bytes), .hex and .txt (hexadecimal); of a CAN
-bus logs of candump, and ASC, BLF and TRC files (with python-can). Recordings
-give JSON Lines with --json, each with its start, in bytes or frames. Times
-that count from the beginning of a recording are shown with a +. --summary
-counts instead of explaining, quickly where numpy is installed. Ends with exit
-code 1 if any frame is bad or any byte belongs to none.
+bus the text of candump (.log, .candump, .txt or no ending), and ASC, BLF and
+TRC files (with python-can). A line that is damaged is told and passed.
+Recordings give JSON Lines with --json, each with its start, in bytes or
+frames. Times that count from the beginning of a recording are shown with a +.
+--summary counts instead of explaining, quickly where numpy is installed. Ends
+with exit code 1 if any frame is bad or any byte belongs to none.
 
 Examples:
 
@@ -74,7 +75,7 @@ def decode(
     family
         Whose protocol it is.
     file
-        A recording, by its ending: .bin, .raw, .hex, .txt of a line; .log, .asc, .blf, .trc of a CAN bus
+        A recording: .bin, .raw, .hex, .txt of a line; .log, .candump, .txt, .asc, .blf, .trc of a CAN bus
     summary
         Count the packets of each kind, node and code, and the noise, instead of explaining each.
     direction
@@ -93,9 +94,10 @@ def decode(
         return _file(file, found, output)
     if data:
         return _bytes_or_frames(data, found, output)
-    first = sys.stdin.readline() if found.link.kind == "frames" else ""
+    first = sys.stdin.readline(can_log.LONGEST) if found.link.kind == "frames" else ""
     if can_log.looks_like_can(first):
-        return _stream(_on_can(found, can_log.read_lines(chain([first], sys.stdin))), found, output)
+        lines = chain([first], can_log.lines_of(sys.stdin))
+        return _stream(_on_can(found, can_log.read_lines(lines)), found, output)
     return _document(found.explain(_bytes(first + sys.stdin.read())), found, output)
 
 
@@ -119,11 +121,17 @@ def _summary(data: Sequence[str], file: Path | None, family: Family, direction: 
 
     if file is not None and _is_serial(file, family):
         return summary(family, _serial(file), direction, output)
-    lines = data or ([] if file is not None else sys.stdin.read().splitlines())
     if family.link.kind == "bytes" and file is None:
-        return summary(family, _bytes(" ".join(lines)), direction, output)
-    logged = _recorded(file) if file is not None else can_log.read_lines(_words(lines))
-    return summary(family, [_classic(one) for one in _on_can(family, logged)], direction, output)
+        return summary(family, _bytes(" ".join(data) or sys.stdin.read()), direction, output)
+    if file is not None:
+        logged = _recorded(file)
+    elif data:
+        logged = _typed(data)
+    else:
+        logged = can_log.read_lines(_words(can_log.lines_of(sys.stdin)))
+    found = list(_on_can(family, logged))
+    damaged = [one for one in found if one.line]
+    return summary(family, [_classic(one) for one in found if not one.line], direction, output, damaged)
 
 
 def _classic(one: Logged) -> CanFrame:
@@ -148,10 +156,13 @@ def _spoken(family: Family, options: Mapping[str, str]) -> Family:
 def _bytes_or_frames(texts: Sequence[str], family: Family, output: Output) -> Exit:
     if not can_log.looks_like_can(" ".join(texts)):
         return _document(family.explain(_bytes(" ".join(texts))), family, output)
-    lines = _words(texts)
-    logged = [one for line in lines if (one := can_log.parse_line(line))]
-    frames = [_explained(one, family) for one in _on_can(family, logged)]
+    frames = [_explained(one, family) for one in list(_on_can(family, _typed(texts)))]
     return _document(list(chain.from_iterable(frames)), family, output)
+
+
+def _typed(texts: Sequence[str]) -> Iterator[Logged]:
+    """What somebody has typed is a question, not a recording: what is no frame in it is refused."""
+    return (one for line in _words(texts) if (one := can_log.parse_line(line)))
 
 
 def _words(texts: Iterable[str]) -> Iterator[str]:
@@ -168,6 +179,8 @@ def _on_can(family: Family, logged: Iterable[Logged]) -> Iterable[Logged]:
 
 
 def _explained(one: Logged, family: Family) -> list[Explanation]:
+    if one.line:
+        return [Explanation(b"", f"line {one.line}", (), one.fault)]
     if one.frame is None:
         return [Explanation(b"", f"CAN frame {one.text}", (), one.fault)]
     return family.explain(one.frame.flat())

@@ -1,21 +1,28 @@
 """CAN traffic that somebody has recorded: candump text read here, ASC, BLF and TRC by python-can's readers.
 
 Text needs nothing installed, so a line of candump can be explained anywhere; the other formats need python-can. What
-is no classic CAN frame is told as such, never dropped.
+is no classic CAN frame is told as such, never dropped, and so is a line that is damaged or cut off.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TextIO
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
 
 MOST: Final = 8
 """Data bytes of a classic CAN frame."""
+LONGEST: Final = 8192
+"""Characters of a line at most: far more than a frame takes, and than what a cut of power leaves in a file (a page of
+zeros). What goes on for longer has no lines, and would be read until the memory ends."""
+_SHOWN: Final = 60
+_GAPS: Final = {".asc": "\n", ".trc": ";\n"}
+"""By ending: what stands in for the header where python-can's reader is begun anew behind a damaged line."""
 _BY_PYTHON_CAN: Final = (".asc", ".blf", ".trc")
 _TEXT: Final = (".log", ".txt", ".candump", "")
 _HIGHEST: Final = {3: 0x7FF, 8: 0x1FFFFFFF}
@@ -24,11 +31,11 @@ _DATE: Final = 1e8
 
 _WORD: Final = re.compile(r"(?P<id>[0-9A-Fa-f]+)#(?P<data>.*)")
 _LOG: Final = re.compile(
-    r"\((?P<at>\d+\.?\d*)\)\s+(?P<channel>\S+)\s+(?P<word>\S+#\S*)(?:\s+(?P<way>[RT]))?\s*"
+    r"\((?P<at>\d{1,11}(?:\.\d*)?)\)\s+(?P<channel>\S+)\s+(?P<word>\S+#\S*)(?:\s+(?P<way>[RT]))?\s*"
 )
 _SCREEN: Final = re.compile(
-    r"\s*(?:\((?P<at>[\d.]+)\)\s+)?(?P<channel>\S+)\s+(?:(?P<way>RX|TX)\b[\s\-BE]*)?"
-    r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<fd>0?)(?P<length>\d+)\]\s*(?P<data>.*?)\s*(?:'.*')?"
+    r"\s*(?:\((?P<at>\d{1,11}(?:\.\d*)?)\)\s+)?(?P<channel>\S+)\s+(?:(?P<way>RX|TX)\b[\s\-BE]*)?"
+    r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<fd>0?)(?P<length>\d{1,3})\]\s*(?P<data>.*?)\s*(?:'.*')?"
 )
 _WAYS: Final = {"R": "rx", "T": "tx", "RX": "rx", "TX": "tx"}
 
@@ -39,6 +46,7 @@ class Logged(NamedTuple):
     `frame`      None for what is no classic CAN frame; `fault` says what it is instead
     `at`         s since 1970, or since some beginning if `relative`; None where nothing was noted
     `direction`  "rx" or "tx" as the recorder saw it, "" where it did not say
+    `line`       the number of the line, where that is damaged and nobody knows what was in it; `fault` says why
     """
 
     text: str
@@ -47,6 +55,7 @@ class Logged(NamedTuple):
     direction: str = ""
     channel: str = ""
     fault: str = ""
+    line: int = 0
 
     @property
     def relative(self) -> bool:
@@ -102,34 +111,42 @@ def is_log(path: Path) -> bool:
 
 
 def read_lines(lines: Iterable[str]) -> Iterator[Logged]:
-    """Every frame in the text of candump, as it comes. Raises RequestError with the number of a bad line."""
+    """Every frame in the text of candump, as it comes; a damaged line is told as such, in its place.
+
+    Raises RequestError for a line that is longer than `LONGEST`.
+    """
     for number, line in enumerate(lines, 1):
+        _bound(line, number)
         try:
             found = parse_line(line)
         except RequestError as error:
-            raise RequestError(
-                f"line {number}: {error.summary}", sent=error.sent, expected=error.expected
-            ) from None
+            found = _damaged(line, number, error.summary)
         if found is not None:
             yield found
+
+
+def lines_of(file: TextIO) -> Iterator[str]:
+    """Its lines as they come, cut where they are longer than `LONGEST`."""
+    return iter(partial(file.readline, LONGEST), "")
 
 
 def read_log(path: Path) -> Iterator[Logged]:
     """Every frame in a file of candump (`.log`), ASC, BLF or TRC, in order.
 
-    Raises RequestError for a file that is none of these, LinkError where its format needs python-can and that is
-    missing, OSError where it cannot be read.
+    A damaged line is told as such. Raises RequestError for a file that is none of these or has no lines, LinkError
+    where its format needs python-can and that is missing, OSError where it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in _TEXT:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            yield from read_lines(file)
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            yield from read_lines(lines_of(file))
     elif suffix in _BY_PYTHON_CAN:
         yield from _by_python_can(path)
     else:
         raise RequestError(
             f"{path}: no log of CAN frames that is known here",
-            expected=f"a name that ends in {', '.join((*_TEXT[:1], *_BY_PYTHON_CAN))}",
+            expected=f"a name that ends in {', '.join(filter(None, _TEXT))} or in nothing (text of candump), or in "
+            + ", ".join(_BY_PYTHON_CAN),
         )
 
 
@@ -138,16 +155,101 @@ def _by_python_can(path: Path) -> Iterator[Logged]:
 
     can = python_can(f"reading {path}")
     reader = {".asc": can.ASCReader, ".blf": can.BLFReader, ".trc": can.TRCReader}[path.suffix.lower()]
-    how: dict[str, Any] = (
-        {"mode": "rb"} if reader is can.BLFReader else {"encoding": "utf-8", "errors": "replace"}
-    )
-    with path.open(**how) as file:
+    if reader is can.BLFReader:
+        with path.open("rb") as binary:
+            yield from _until_broken(path, binary, reader)
+    else:
+        with path.open(encoding="utf-8-sig", errors="replace") as text:
+            yield from _line_by_line(path, _Lines(text, _GAPS[path.suffix.lower()]), reader)
+
+
+def _until_broken(path: Path, file: Any, reader: Any) -> Iterator[Logged]:
+    try:
+        yield from map(_from_message, reader(file))
+    except OSError:
+        raise
+    except Exception as error:  # what its readers raise for a broken file is theirs to choose
+        raise _unreadable(path, error) from error
+
+
+def _line_by_line(path: Path, lines: _Lines, reader: Any) -> Iterator[Logged]:
+    """What python-can's reader cannot read of a text is told with the number of the line, and it reads on behind it."""
+    begun = -1
+    messages = reader(lines)
+    while True:
         try:
-            yield from map(_from_message, reader(file))
-        except OSError:
+            for message in messages:
+                found = _from_message(message)
+                short = found.frame is not None and _is_short(message)
+                yield (
+                    _damaged(lines.last, lines.number, "more data bytes are announced than stand there")
+                    if short
+                    else found
+                )
+            return
+        except (OSError, RequestError):
             raise
-        except Exception as error:  # what its readers raise for a broken file is theirs to choose
-            raise RequestError(f"{path}: cannot be read as {path.suffix}: {error}") from error
+        except Exception as error:  # as above
+            if lines.number == begun:  # it is not the line that it cannot read
+                raise _unreadable(path, error) from error
+            yield _damaged(
+                lines.last, lines.number, f"{lines.last.strip()[:_SHOWN]!r} cannot be read: {error}"
+            )
+        begun = lines.number
+        lines.again()
+
+
+def _is_short(message: Any) -> bool:
+    plain = not (message.is_remote_frame or message.is_error_frame)
+    return plain and len(message.data or b"") < min(message.dlc, MOST)
+
+
+def _unreadable(path: Path, error: Exception) -> RequestError:
+    return RequestError(f"{path}: cannot be read as {path.suffix}: {error}")
+
+
+class _Lines:
+    """A text file as python-can's readers take one: they ask for its lines, and close it.
+
+    `last` is the line that was read last, and `number` says which. After `again` a reader is begun anew in the midst:
+    what looks for a header first gets `gap`, behind which its messages begin.
+    """
+
+    def __init__(self, file: TextIO, gap: str) -> None:
+        self.close: Final = file.close
+        self.last = ""
+        self.number = 0
+        self._lines: Final = lines_of(file)
+        self._gap: Final = gap
+        self._begun_anew = False
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        if self._begun_anew:
+            self._begun_anew = False
+            return self._gap
+        self.last = next(self._lines)
+        self.number += 1
+        _bound(self.last, self.number)
+        return self.last
+
+    def again(self) -> None:
+        """A reader begins anew."""
+        self._begun_anew = True
+
+
+def _bound(line: str, number: int) -> None:
+    if len(line) >= LONGEST:
+        raise RequestError(
+            f"line {number} is longer than {LONGEST} characters, so this is no text that holds CAN frames",
+            expected="a line for each frame",
+        )
+
+
+def _damaged(line: str, number: int, why: str) -> Logged:
+    return Logged(line.strip()[:_SHOWN], None, fault=why, line=number)
 
 
 def _from_message(message: Any) -> Logged:
@@ -215,6 +317,6 @@ def _data(digits: str, word: str) -> bytes:
 
 def _no_frame(word: str, why: str) -> RequestError:
     return RequestError(
-        f"{word.strip()[:60]!r} is no CAN frame: {why}",
+        f"{word.strip()[:_SHOWN]!r} is no CAN frame: {why}",
         expected="as 625#2203600084030000, 00000625#40, 625#R",
     )

@@ -7,14 +7,16 @@ it ends, so that the same bytes give the same packets in whatever pieces they co
 from __future__ import annotations
 
 from bisect import bisect_right
+from math import isfinite
 from operator import attrgetter
 from typing import Final
 
 from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
+from motorbus.core.entry import shown
 from motorbus.core.family import Family
 from motorbus.core.operation import CanFrame, Data, Noise
 from motorbus.errors import RequestError
-from motorbus.recorder.heard import captures_of, family_of
+from motorbus.recorder.heard import captures_of, spoken
 from motorbus.recorder.packets import Heard, Mark
 
 _OWN: Final = attrgetter("own")
@@ -30,7 +32,7 @@ class Decoder:
     """
 
     def __init__(self, family: str | Family, way: str = "") -> None:
-        self.family: Final = family_of(family) if isinstance(family, str) else family
+        self.family: Final = spoken(family)
         self._way: Final = checked(way)
         self._captures: Final[Captures] = captures_of(self.family)
         self._frames: Final = self.family.link.kind == "frames"
@@ -41,8 +43,11 @@ class Decoder:
     def feed(self, data: Data, at: float | None = None, way: str | None = None) -> Heard:
         """Take bytes, cut anywhere, or one CAN frame, and when (s) they came; give what is complete.
 
-        Raises RequestError for an unknown way, and for bytes where frames are due or the other way round.
+        Raises RequestError for an unknown way, for a time that is no finite number, and for bytes where frames are due
+        or the other way round.
         """
+        if at is not None and (at.__class__ is not float or at - at != 0.0):
+            timed(at)
         if data.__class__ is not self._usual:
             fitting(self._frames, data)
             if not self._frames:
@@ -146,6 +151,20 @@ def checked(way: str) -> str:
             f"there is no way {way!r}", expected='"rx" from the devices, "tx" to them, "" both'
         )
     return way
+
+
+def timed(at: object) -> None:
+    """Raise RequestError for what is no time (s)."""
+    try:
+        if not isinstance(at, bool) and isfinite(at):  # type: ignore[arg-type]  # it says so itself
+            return
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise RequestError(
+        f"at: {shown(at)} is no time",
+        expected="a finite number of seconds",
+        advice="leave it out where none was noted",
+    )
 
 
 def fitting(frames: bool, data: object) -> None:

@@ -37,7 +37,11 @@ def read_bytes(path: Path) -> bytes:
 
 
 def from_hex(text: str) -> bytes:
-    """Bytes in hexadecimal, with or without spaces, commas, colons or 0x. Raises RequestError for anything else."""
+    """Bytes in hexadecimal, with or without spaces, commas, colons or 0x. Raises RequestError for anything else.
+
+    A byte order mark in front, as some editors write it, is none of them.
+    """
+    text = text.removeprefix("\ufeff")
     try:
         return bytes.fromhex(re.sub(r"0[xX]|[\s,:;]", "", text))
     except ValueError:

@@ -6,14 +6,29 @@ from functools import cache
 
 from motorbus import families
 from motorbus.core.capture import NOBODY, NOTICE, REPLY, Captures, Run, Told
+from motorbus.core.entry import shown
 from motorbus.core.family import Family
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice
+from motorbus.errors import RequestError
 
 
 @cache
 def family_of(name: str) -> Family:
     """The family of this name, looked for once. Raises RequestError when there is none."""
     return families.load(name)
+
+
+def spoken(family: str | Family) -> Family:
+    """A family, or the one of this name. Raises RequestError when it is neither."""
+    if isinstance(family, str):
+        return family_of(family)
+    if not hasattr(family, "link"):
+        raise RequestError(
+            f"{shown(family)} is no family of devices",
+            expected=f"one of {', '.join(families.names())}, or a `FAMILY`",
+            advice='name whose packets they are, as "feetech"',
+        )
+    return family
 
 
 def captures_of(family: Family) -> Captures:

@@ -80,17 +80,18 @@ class Packets(Sequence[Packet]):
         return f"<Packets: {len(self)}, of which {sum(map(bool, self.fault))} are noise>"
 
     def _from(self, which: slice) -> Iterator[Packet]:
-        at = repeat(None) if self.at is None else _plain(self.at[which])
+        data = self.data[which]
+        at = repeat(None, len(data)) if self.at is None else _plain(self.at[which])
         columns = (
             _plain(self.start[which]),
-            self.data[which],
+            data,
             map(KINDS.__getitem__, _plain(self.kind[which])),
             _plain(self.node[which]),
             _plain(self.code[which]),
             map(FAULTS.__getitem__, _plain(self.fault[which])),
             at,
         )
-        return map(_new, repeat(Packet), zip(*columns, strict=False))
+        return map(_new, repeat(Packet), zip(*columns, strict=True))
 
 
 class Heard(Packets):

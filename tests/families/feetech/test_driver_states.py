@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ import motorbus
 from motorbus import feetech
 from motorbus.core.operation import UNLIKE, Exchange
 from motorbus.errors import RequestError
-from motorbus.families.feetech.driver import Node, sync_read_raw, sync_read_states
+from motorbus.families.feetech.driver import Node, sync_read_positions, sync_read_raw, sync_read_states
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
 from tests.families.feetech.driver_script import packet, play, sync_reads
 from tests.families.feetech.maps import met
@@ -111,3 +112,20 @@ def test_raw_bytes_come_whole_again_and_again_also_at_the_end_of_the_table(addre
 def test_raw_bytes_that_do_not_exist_are_refused(address: int, count: int) -> None:
     with pytest.raises(RequestError, match="do not exist"):
         sync_read_raw(address, count, [met("sts", 1)])
+
+
+@pytest.mark.parametrize("ask", [sync_read_states, sync_read_positions, partial(sync_read_raw, 56, 2)])
+@pytest.mark.parametrize("servos", [None, 5, met("sts", 1)])
+def test_what_is_no_list_of_servos_is_refused(ask: Any, servos: Any) -> None:
+    with pytest.raises(RequestError, match="is no list of servos") as caught:
+        ask(servos)
+    assert "nothing was sent" in caught.value.advice
+
+
+@pytest.mark.parametrize("wrong", ["56", 56.0, None, True, "present_position", [56], 1j])
+def test_an_address_and_a_count_are_whole_numbers(wrong: Any) -> None:
+    nodes = [met("sts", 1)]
+    for address, count, word in ((wrong, 2, "address"), (56, wrong, "count")):
+        with pytest.raises(RequestError, match=f"{word}: .* is not a whole number") as caught:
+            sync_read_raw(address, count, nodes)
+        assert "nothing was sent" in caught.value.advice

@@ -15,9 +15,13 @@ from motorbus.core.aimed import Aimed
 from motorbus.core.operation import Exchange
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError
 from motorbus.families.feetech.driver import Node, sync_write_positions, sync_writer
+from motorbus.families.feetech.driver.writer import SyncWriter
+from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import Line, packet, play
 from tests.families.feetech.maps import HEADS, met
 from tests.families.feetech.test_driver_mould import NAMES, NUMBERS, TIMES, fully
+
+EVERY_NAME = sorted({name for table in TABLES.values() for name in table})
 
 
 def told(make: Any) -> tuple[Any, ...] | str:
@@ -160,3 +164,71 @@ def test_servos_on_a_bus_go_where_they_are_told_and_nowhere_else() -> None:
         with pytest.raises(LimitExceeded):
             bus.run(write([3.0, 6.4]))
         assert [servo.read("goal_position")["goal_position"] for servo in servos] == goals
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (("goal_position", "goal_position"), "named twice: goal_position, goal_position"),
+        (("goal_position", "goal_time", "goal_position"), "named twice"),
+        (("present_position",), "can only be read"),
+        (("goal_position", "present_position"), "can only be read"),
+        (("id",), "would change how the servo is found"),
+        (("homing_offset",), "may not be copied"),
+        (("max_torque",), "adjoining RAM registers only, not max_torque"),
+        (
+            ("goal_position", "goal_velocity"),
+            "adjoining RAM registers only, not goal_position, goal_velocity",
+        ),
+        ((5,), "5 is no name of a register"),
+        ((["goal_position"],), "is no name of a register"),
+    ],
+)
+def test_what_could_never_be_written_is_refused_when_it_is_made(names: Any, words: str) -> None:
+    with pytest.raises(RequestError, match=words) as caught:
+        sync_writer([met("sts", 1), met("sts", 2)], *names)
+    assert "nothing was sent" in caught.value.advice
+
+
+@pytest.mark.parametrize(
+    "names", [("present_position",), ("id",), ("max_torque",), ("goal_position", "goal_velocity")]
+)
+def test_of_those_who_are_not_prepared_it_is_found_out_at_the_first_call(names: tuple[str, ...]) -> None:
+    """And it is said in the same words."""
+    node = Node(1)
+    write = sync_writer([node], *names)
+    row = 1.0 if len(names) == 1 else [1.0, 1.0]
+    with pytest.raises(RequestError, match="not prepared|can only be read|how the servo is found"):
+        write([row])
+    known = met("sts", 1)
+    node.identity, node.table, node.settings = known.identity, known.table, known.settings
+    with pytest.raises(RequestError) as late:
+        write([row])
+    with pytest.raises(RequestError) as early:
+        sync_writer([known], *names)
+    assert early.value.summary == late.value.summary
+
+
+@given(
+    st.sampled_from(list(HEADS)), st.lists(st.sampled_from(EVERY_NAME), min_size=1, max_size=3, unique=True)
+)
+def test_whatever_could_be_written_may_be_made(name: str, names: list[str]) -> None:
+    """What is refused when it is made would be refused with any value."""
+    node = met(name, 1)
+    bound = node.bound
+    try:
+        sync_writer([node], *names)
+    except RequestError:
+        for value in (0.0, 1.0, 2.0, 40.0, 1000.0):
+            row = value if len(names) == 1 else [value] * len(names)
+            with pytest.raises(MotorbusError):
+                SyncWriter([node], names)([row])
+    else:
+        assert node.bound == bound, "it changes nothing of what is known"
+
+
+@pytest.mark.parametrize("servos", [None, 5, met("sts", 1)])
+def test_what_is_no_list_of_servos_is_refused(servos: Any) -> None:
+    with pytest.raises(RequestError, match="is no list of servos") as caught:
+        sync_writer(servos, "goal_position")
+    assert "nothing was sent" in caught.value.advice

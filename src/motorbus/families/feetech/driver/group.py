@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Table, Value
+from motorbus.core.entry import Table, Value, shown
 from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, Whole, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
@@ -183,8 +183,17 @@ def trains(nodes: Sequence[Node], count: int, rate: int, air: float) -> Iterator
 
 
 def distinct(ids: Iterable[int | Node]) -> list[Node]:
-    """Each as a node. Raises RequestError when one is there twice or there is none."""
-    wanted = list(ids)
+    """Each as a node. Raises RequestError when one is there twice or there is none, and for what is no list of them."""
+    try:
+        wanted = list(ids)
+    except TypeError:
+        if isinstance(ids, Iterable):
+            raise
+        raise RequestError(
+            f"{shown(ids)} is no list of servos",
+            expected="a list of servos, also where there is only one",
+            advice="put it into brackets; nothing was sent",
+        ) from None
     nodes = as_nodes(wanted)
     if len(nodes) == len(wanted) > 0:
         return nodes

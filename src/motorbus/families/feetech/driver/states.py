@@ -7,10 +7,11 @@ exchange was made is taken apart by what was found out then; of every other, `st
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import index
 from struct import Struct
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Coding
+from motorbus.core.entry import Coding, shown
 from motorbus.core.family import Quality, State
 from motorbus.core.operation import UNLIKE, Answer, Exchange, Unlike, Whole
 from motorbus.errors import RequestError
@@ -67,9 +68,23 @@ def sync_read_raw(
 ) -> Exchange[dict[int, bytes]]:
     """The bytes of `count` registers from `address` on of all of these, by id, in one exchange that may be kept.
 
-    Who does not answer is missing. Raises as `sync_read_positions`.
+    Who does not answer is missing. Raises as `sync_read_positions`, and for what is no whole number of either.
     """
-    return block_of_each(_askable(servos, count, rate, air), address, count, kept=True)
+    first, size = _whole_number(address, "address"), _whole_number(count, "count")
+    return block_of_each(_askable(servos, size, rate, air), first, size, kept=True)
+
+
+def _whole_number(value: int, what: str) -> int:
+    try:
+        if not isinstance(value, bool):
+            return index(value)
+    except TypeError:
+        pass
+    raise RequestError(
+        f"{what}: {shown(value)} is not a whole number",
+        expected="as sync_read_raw(56, 15, servos)",
+        advice="registers with names are read by sync_read(); nothing was sent",
+    )
 
 
 def _askable(servos: Sequence[Node], count: int, rate: int, air: float) -> list[Node]:

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.operation import Exchange
+from motorbus.core.entry import Table, shown
+from motorbus.core.operation import Effect, Exchange
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.group import block_of, distinct, sync_writes
 from motorbus.families.feetech.driver.loop import check_ordered, known_row, one_packet
 from motorbus.families.feetech.driver.mould import Mould, mould
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.orders import check_names, check_values
+from motorbus.families.feetech.driver.orders import Order, check_names, check_values, only_block, orders_of
 
 Row: TypeAlias = "float | Sequence[float]"
 """The value of one servo where one register is written, else its values in the order of the names."""
@@ -104,9 +105,37 @@ def sync_writer(servos: Sequence[Node], *names: str) -> SyncWriter:
 
     `write = sync_writer(servos, "goal_position")` once, then `bus.run(write(goals))`. With several names, as
     "goal_position", "goal_time", "goal_velocity", each servo gets a row of values. Raises RequestError for an unknown
-    name, for none, and for a servo that is named twice.
+    name, for none, for one that is there twice, for a servo that is named twice, and for registers that are not
+    adjoining RAM or may not be written; whether they are says the map of a servo, so of those that are not prepared yet
+    it is found out at the first call.
     """
     if not names:
         raise RequestError("no register is named", expected='as "goal_position"', advice="nothing was sent")
+    for name in names:
+        if not isinstance(name, str):
+            raise RequestError(
+                f"{shown(name)} is no name of a register",
+                expected='as "goal_position"',
+                advice="nothing was sent",
+            )
     check_names(names)
-    return SyncWriter(distinct(servos), names)
+    if len(set(names)) < len(names):
+        raise RequestError(
+            f"a register is named twice: {', '.join(names)}",
+            expected="each name once, for it gets one value",
+            advice="nothing was sent",
+        )
+    nodes = distinct(servos)
+    for node in nodes:
+        if node.table is not None and node.settings is not None and node.writable:
+            _check_rows(node, node.table, names)
+    return SyncWriter(nodes, names)
+
+
+def _check_rows(node: Node, table: Table, names: Sequence[str]) -> None:
+    """Raise RequestError where whatever is to be written could not be, with the words of the first call."""
+    rows = [table[name] for name in names]
+    for row in rows:
+        if row.effect is Effect.IDENTITY or row.protected or not row.writable:
+            orders_of(node, table, {row.name: 0})  # says why
+    only_block(node, [Order(row, min(max(row.low, 0), row.high)) for row in rows], "SYNC WRITE")

@@ -77,7 +77,7 @@ def ping(id: int, *, broadcast: bool = False) -> bytes:
 
 def read(id: int, address: int, count: int) -> bytes:
     """READ `count` bytes (1 to 253) from `address` on. One servo only: a broadcast READ has no answer."""
-    if 0 <= id <= MAX_ID and 0 <= address and 1 <= count <= 253 and address + count <= 256:
+    if 0 <= id <= MAX_ID and address >= 0 and 1 <= count <= 253 and address + count <= 256:
         # the packet that is made most; whatever is wrong is told below
         return bytes((0xFF, 0xFF, id, 4, _READ, address, count, ~(id + 4 + _READ + address + count) & 0xFF))
     _check_span(address, count)
