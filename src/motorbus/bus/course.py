@@ -68,8 +68,8 @@ class Course(Flight):
     since they were counted last, by their buckets, of which the last one reached from `low` to `high` (s).
 
     An answer has `size` bytes, and before `thinks` (s) are left of its time nothing of it need be looked at. Of one
-    that comes in pieces, `held` has those that have come, the last one at `held_at`; a byte that is one too many would
-    be there `settle` (s) later.
+    that comes in pieces, `held` has what each look has brought, and when that was; a byte that is one too many would be
+    there `settle` (s) later.
     """
 
     __slots__ = (
@@ -81,7 +81,6 @@ class Course(Flight):
         "first",
         "group",
         "held",
-        "held_at",
         "high",
         "holder",
         "ids",
@@ -131,8 +130,8 @@ class Course(Flight):
         self.era = STALE
         self.wait = self.least = self.thinks = self.settle = 0.0
         self.data: Data = b""
-        self.at = self.held_at = -inf
-        self.held: list[Data] = []
+        self.at = -inf
+        self.held: list[tuple[float, list[Data]]] = []
         self.pending = self.counting = False
         self.times = [0] * BUCKETS
         self.low = self.high = 0.0
@@ -159,6 +158,11 @@ class Course(Flight):
         self.least = -inf if pace is None else EARLY * least_time(self.own, turns.family, turns.rate)
         self.era = turns.lock.era
         return True
+
+    def joined(self, *last: Data) -> bytes:
+        """What is held, and this behind it."""
+        pieces = [data for _, came in self.held for data in came]
+        return b"".join([*pieces, *last])  # type: ignore[list-item]  # bytes, as the bus is calm
 
     @property
     def is_detached(self) -> bool:
@@ -259,7 +263,8 @@ class Straight:
         turns.lock.owing = False
         if course_aloft is not None and course_aloft.held:
             held, course_aloft.held = course_aloft.held, []
-            turns.feed(held, course_aloft.held_at)
+            for at, data in held:
+                turns.feed(data, at)
 
     def regroup(self: Any, course: Course) -> None:
         """Another course is flown than the last one. How long the last answers of its nodes were must be known, to

@@ -158,9 +158,9 @@ def _is_it(turns: Turns, link: Link, course: Course, news: asyncio.Future[Any], 
             lock.acquire()
             at = min(link.now(), course.deadline)  # a loop that was held up takes it in late
             if turns.aloft is course and not news.done():
-                if len(data) + sum(map(len, course.held)) < course.size:
-                    course.held.append(data)
-                    course.held_at, is_it = at, True
+                if len(course.joined(data)) < course.size:
+                    course.held.append((at, [data]))
+                    is_it = True
                 else:
                     is_it = _ends(course, news, data, at)
             lock.release()
@@ -178,7 +178,7 @@ def _ends(course: Course, news: asyncio.Future[Any], last: Data, at: float) -> b
     as its last packet came in pieces: then a byte may follow that is one too many."""
     if at - course.sent_at < course.least or (course.held and len(last) < course.length):
         return False
-    data = b"".join((*course.held, last)) if course.held else last  # type: ignore[arg-type]
+    data = course.joined(last) if course.held else last
     value = course.whole(data, at)
     if value is UNLIKE:
         return False

@@ -23,7 +23,7 @@ def gathered(bus: Bus, course: Course, arrived: list[Data]) -> Any:
     """
     link = bus.link
     while keeps(course, arrived, link.now()):
-        if course.size <= sum(map(len, course.held)):
+        if course.size <= len(course.joined()):
             last = len(arrived[-1])
             arrived.clear()
             if last < course.length:  # the last packet came in pieces
@@ -39,8 +39,7 @@ def keeps(course: Course, arrived: list[Data], at: float) -> bool:
     lock.acquire()
     kept = bool(arrived) and course.turns.aloft is course
     if kept:
-        course.held_at = min(at, course.deadline)  # a host that was held up takes it in late
-        course.held += arrived
+        course.held.append((at, list(arrived)))
     lock.release()
     return kept
 
@@ -51,7 +50,7 @@ def _meant(bus: Bus, course: Course) -> Any:
     lock.acquire()
     at = min(bus.link.now(), course.deadline)
     if course.turns.aloft is course and at - course.sent_at >= course.least:
-        data = b"".join(course.held)  # type: ignore[arg-type]  # bytes, as the bus is calm
+        data = course.joined()
         value = course.whole(data, at)
         if value is not UNLIKE:
             course.held = []  # first, or after an interrupt in between they would be those of the next flight

@@ -271,6 +271,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
         (BAD_ONE, 0),
         (LOW_PLACE + SOUND_ONE, 0),
         (b"\x00\x01" + SOUND_ONE, 0),
+        (b"\x00" + SOUND_ONE, 0),
         (SOUND_ONE + b"\x00" + SOUND_ONE, 0),
         (BEGUN, 0),
         (SOUND_ONE + BEGUN, 0),
