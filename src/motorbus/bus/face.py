@@ -50,7 +50,7 @@ class BusFace:
             family,
             rate=link.rate,
             latency=link.latency,
-            paced=link.paced or (None if family.link.kind == "frames" and not link.simulated else False),
+            paced=link.paced or (None if family.link.kind == "frames" and _takes_time(link) else False),
             listen_only=bool(getattr(link, "listen_only", False)),
             admit=self._armed(admit) if admit is not None else None,
         )
@@ -144,3 +144,8 @@ class BusFace:
         """Take the latch of an emergency stop off. Nothing is sent and nothing moves."""
         with self.turns.lock:
             self.turns.reset()
+
+
+def _takes_time(link: Link) -> bool:
+    """Frames may need their time here; whether they do will show."""
+    return not link.simulated and not getattr(link, "timeless", False)

@@ -26,6 +26,7 @@ from motorbus.link.can_slcan import SlcanWire, command_of, open_slcan
 from motorbus.link.can_socketcand import open_socketcand
 from motorbus.link.can_wire import BusWire, Wire, build, refuse_bus_off
 from motorbus.link.foreign import who_holds
+from motorbus.link.identity import PSEUDO_TERMINALS
 from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, not_found
 from motorbus.link.serial import could_be_a_port, ports
@@ -70,6 +71,7 @@ class CanLink:
     paced = False  # adapters say nothing of when a frame was on the wire
     virtual = False
     simulated = False
+    timeless = False  # behind a pseudo-terminal frames need no time: how soon an answer comes says nothing
 
     def __init__(
         self,
@@ -146,6 +148,7 @@ class CanLink:
 
     def _opened_slcan(self, rate: int, listen_only: bool) -> SlcanWire:
         device = device_of(self._config)
+        self.timeless = os.path.realpath(device).startswith(PSEUDO_TERMINALS) if device else False
         if device and os.name != "nt":
             if not os.path.exists(device):
                 raise not_found(self.name, ports())
