@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 
 from bench import responder, rounds, syscalls
+from bench.figures import cost, ratio
 from bench.rounds import CANDIDATES, OURS, Candidate, Sample
-from bench.row import Say
+from bench.row import SINGLE, Row, Say
 from bench.workloads import WORKLOADS, Workload
 
 MEMORY_COUNT, WIRE_COUNT = 2000, 2000
@@ -95,3 +97,35 @@ def best(samples: Sequence[Sample], workload: str) -> str:
         if one.workload == workload and one.contender != OURS:
             costs.setdefault(one.contender, []).append(one.processor)
     return min(costs, key=lambda name: sorted(costs[name])[len(costs[name]) // 2])
+
+
+def compared(
+    number: str,
+    kind: str,
+    found: Sequence[Sample],
+    workload: str,
+    peer: str,
+    goal: str,
+    stretch: str,
+    margin: float = SINGLE,
+) -> Row:
+    """The row of our processor time by theirs in this workload, of samples of this kind."""
+    processor = attrgetter("processor")
+    return Row(
+        number,
+        f"{kind}: {workload}",
+        peer,
+        "x",
+        *ratio(found, OURS, peer, workload, processor),
+        goal,
+        stretch,
+        ours=cost(found, OURS, workload, processor).median,
+        theirs=cost(found, peer, workload, processor).median,
+        samples=len(of_ours(found, workload)),
+        margin=margin,
+    )
+
+
+def of_ours(found: Sequence[Sample], workload: str) -> list[Sample]:
+    """Our samples of this workload."""
+    return [one for one in found if (one.contender, one.workload) == (OURS, workload)]

@@ -8,15 +8,12 @@ is left out of it. servolab is the only one that gives every quantity in SI unit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
 
 from bench import samples
-from bench.figures import cost, ratio
-from bench.rounds import OURS, Sample
+from bench.rounds import Sample
 from bench.row import SAMPLES, Row, Say
 
 NUMBERS = ("1", "2")
-processor = attrgetter("processor")
 FIRST = {
     "read1": ("<= 0.85", "<= 0.7"),
     "sync-read-6x2": ("<= 0.40", "<= 0.30"),
@@ -33,27 +30,16 @@ def rows(rounds: int, say: Say) -> list[Row]:
     second = samples.in_process(samples.BLOCKS, times, say)
     return [
         *(against("1", first, load, *goal) for load, goal in FIRST.items()),
-        *(against("2", second, load, *goal) for load, goal in SECOND.items() if _ours(second, load)),
+        *(
+            against("2", second, load, *goal)
+            for load, goal in SECOND.items()
+            if samples.of_ours(second, load)
+        ),
     ]
-
-
-def _ours(found: Sequence[Sample], workload: str) -> list[Sample]:
-    return [one for one in found if (one.contender, one.workload) == (OURS, workload)]
 
 
 def against(number: str, found: Sequence[Sample], workload: str, goal: str, stretch: str) -> Row:
     """Ours by the best other in this workload."""
-    peer = samples.best(found, workload)
-    spread = ratio(found, OURS, peer, workload, processor)
-    return Row(
-        number,
-        f"in process: {workload}",
-        peer,
-        "x",
-        *spread,
-        goal,
-        stretch,
-        ours=cost(found, OURS, workload, processor).median,
-        theirs=cost(found, peer, workload, processor).median,
-        samples=len(_ours(found, workload)),
+    return samples.compared(
+        number, "in process", found, workload, samples.best(found, workload), goal, stretch
     )

@@ -7,16 +7,13 @@ which the kernel wakes two processes. A row that misses its goal is measured onc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
 
 from bench import samples
-from bench.figures import cost, ratio
 from bench.rounds import CANDIDATES, OURS, Sample
 from bench.row import PROCESS, ROUNDS, Row, Say, met
 from bench.workloads import WORKLOADS
 
 NUMBERS = ("3", "4", "5")
-processor = attrgetter("processor")
 VENDOR, RUST = "feetech-servo-sdk", "rustypot"
 GOALS = (
     ("4", "sync-read-6x2", RUST, "<= 0.80", "<= 0.65"),
@@ -55,20 +52,8 @@ def _twice(
 
 def against(number: str, found: Sequence[Sample], workload: str, peer: str, goal: str, stretch: str) -> Row:
     """Ours by theirs in this workload."""
-    spread = ratio(found, OURS, peer, workload, processor)
-    return Row(
-        number,
-        f"pseudo-terminal, processor time: {workload}",
-        peer,
-        "x",
-        *spread,
-        goal,
-        stretch,
-        ours=cost(found, OURS, workload, processor).median,
-        theirs=cost(found, peer, workload, processor).median,
-        samples=len([one for one in found if (one.contender, one.workload) == (OURS, workload)]),
-        margin=PROCESS,
-    )
+    kind = "pseudo-terminal, processor time"
+    return samples.compared(number, kind, found, workload, peer, goal, stretch, PROCESS)
 
 
 def calls(say: Say) -> list[Row]:

@@ -264,7 +264,8 @@ def _interrupted(bus: Any, servo: feetech.AsyncServo) -> None:
         coroutine.close()
 
 
-async def _settled(bus: Any, servo: feetech.AsyncServo, where: object = None) -> None:
+def is_free(bus: Any) -> bool:
+    """Whether another thread gets the lock within a second."""
     taken: list[bool] = []
 
     def take() -> None:
@@ -275,5 +276,9 @@ async def _settled(bus: Any, servo: feetech.AsyncServo, where: object = None) ->
     thread = Thread(target=take)
     thread.start()
     thread.join()
-    assert taken == [True], f"somebody holds the lock, cut at {where}"
+    return taken == [True]
+
+
+async def _settled(bus: Any, servo: feetech.AsyncServo, where: object = None) -> None:
+    assert is_free(bus), f"somebody holds the lock, cut at {where}"
     assert await servo.position() == 2048 * STEP

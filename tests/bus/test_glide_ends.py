@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import math
-from threading import Thread
 from typing import Any
 
 import pytest
 
 from motorbus import feetech
-from tests.bus.test_glide import kept, there
+from tests.bus.test_glide import is_free, kept, there
 from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 
@@ -27,21 +26,6 @@ def left(bus: Any, servo: feetech.AsyncServo) -> None:
         coroutine.throw(asyncio.CancelledError())
     finally:
         coroutine.close()
-
-
-def is_free(bus: Any) -> bool:
-    """Whether another thread gets the lock within a second."""
-    taken: list[bool] = []
-
-    def take() -> None:
-        taken.append(bus.turns.lock.acquire(timeout=1.0))
-        if taken[0]:
-            bus.turns.lock.release()
-
-    thread = Thread(target=take)
-    thread.start()
-    thread.join()
-    return taken == [True]
 
 
 async def cut_twice(far: Any, bus: Any, servo: feetech.AsyncServo, at: int, later: int) -> Outcome:
