@@ -59,6 +59,16 @@ def leaving(frame: FrameType) -> bool:
     return set(code) == {opmap["LOAD_CONST"]}
 
 
+def putting_away(frame: FrameType) -> bool:
+    """Whether an error is about to be taken up by a `with` or `except`, or to be put away by it.
+
+    No signal is looked at there either; and what a tracer throws there leaves that error behind for good as the one
+    that is dealt with, and with it every bus and thread of its frames.
+    """
+    now, *later = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]
+    return now == opmap["PUSH_EXC_INFO"] or opmap["POP_EXCEPT"] in later
+
+
 class Scissors:
     """Raises this before the nth executed line, and `later` lines on once more.
 
@@ -91,7 +101,7 @@ class Scissors:
         return self._world
 
     def _line(self, frame: FrameType, event: str, argument: object) -> Any:
-        if event == "line" and not (self.error is MemoryError and leaving(frame)):
+        if event == "line" and not putting_away(frame) and not (self.error is MemoryError and leaving(frame)):
             self.count += 1
             if self.at == NEVER:
                 self.walked.append((frame.f_code, frame.f_lineno))
@@ -149,7 +159,7 @@ def cut(
     scissors: type[Scissors] = Scissors,
 ) -> Outcome:
     """Do it, cut at this line, and so many lines later once more; for sure where the `scissors` are `Twice`."""
-    tracer, before = scissors(at, error, later), sys.gettrace()
+    tracer, before, dealt_with = scissors(at, error, later), sys.gettrace(), sys.exception()
     value, raised = None, None
     gc.disable()  # what an earlier call has left behind is no line of this one
     sys.settrace(tracer)
@@ -161,6 +171,9 @@ def cut(
         sys.setprofile(None)
         sys.settrace(before)
         gc.enable()
+    assert sys.exception() is dealt_with, (
+        f"cut at {tracer.where} and {tracer.second}, an error was left behind"
+    )
     return Outcome(value, raised, tracer.where, tracer.walked, tracer.second)
 
 
