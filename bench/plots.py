@@ -76,7 +76,7 @@ def goals(path: Path, rows: Sequence[Row]) -> None:
     panel.minorticks_off()
     low, high = panel.get_xlim()
     panel.set_xlim(max(low, 0.02), min(max(high, 1.5), 100))
-    panel.set_xlabel("figure by goal: left of 1 is better than the goal; a tick is the stretch")
+    panel.set_xlabel("figure by goal; left of 1 is better; tick: stretch")
     figure.savefig(path, dpi=130)
 
 

@@ -25,7 +25,6 @@ from motorbus.motion.safety import Gate
 from tests.conftest import Figures
 from tests.families.stepper.test_power_cuts import KINDS, MEANT, OTHER
 from tests.families.stepper.written import LONGER, PICK, Supply, program, stored
-from tests.faults.off import are_off
 
 BYTE = 10 / 9600
 """s for one byte."""
@@ -148,60 +147,71 @@ def is_thorough(rounds: Rounds) -> bool:
     return rounds(1_000_000) == 1_000_000
 
 
-def judged(world: Callable[[], World], cut: Cut) -> bool:
-    """Cut it so, and look; cut it so, and write again. Whether it held neither old nor new, which was told."""
+def cuts(found: Iterator[Cut], rounds: Rounds, usual: int, first: int) -> Iterator[Cut]:
+    """Every one of them in a long run, else every so manyth."""
+    return found if is_thorough(rounds) else islice(found, first % usual, None, usual)
+
+
+def judged(world: Callable[[], World], cut: Cut, recovered: set[object]) -> World:
+    """Cut it so, and look; and write again, unless one that remembered just the same has been written to already."""
     one = world()
-    assert one.faults(one.write(cut)) == [], cut
-    other = world()
-    other.write(cut)
-    assert other.mended() == [], cut
-    return one.told
+    told, state = one.write(cut), one.state
+    assert one.faults(told) == [], cut
+    if state not in recovered:
+        recovered.add(state)
+        other = world()
+        other.write(cut)
+        assert other.state == state, "the same cut leaves the same behind"
+        assert other.mended() == [], cut
+    return one
 
 
-@pytest.mark.timeout(10_800)
-def test_d10_a_write_cut_at_every_byte(rounds: Rounds, figures: Figures) -> None:
-    counted, told, states = 0, 0, set()
-    for number, kind in enumerate(KINDS[: 1 if are_off() else None]):
-        found = every_byte(kind)
-        for cut in found if is_thorough(rounds) else islice(found, 37 * number, None, 1283):
-            told += judged(lambda kind=kind: World(kind), cut)  # type: ignore[misc]
-            world = World(kind)
-            world.write(cut)
-            states.add((number, world.state))
-            counted += 1
-    assert len(states) > 2 * len(KINDS), "cuts leave it in different states"
+def named(kind: dict[str, Any]) -> str:
+    """This kind in words, for a name."""
+    return " ".join(f"{name}={value}" for name, value in kind.items())
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("kind", KINDS, ids=named)
+def test_d10_a_write_cut_at_every_byte(kind: dict[str, Any], rounds: Rounds, figures: Figures) -> None:
+    recovered: set[object] = set()
+    ends = [
+        judged(lambda: World(kind), cut, recovered).told
+        for cut in cuts(every_byte(kind), rounds, 419, 37 * KINDS.index(kind))
+    ]
+    assert len(recovered) > 1, "cuts leave it in different states"
+    what = f"D10 project write cut at every byte, {named(kind)}"
+    states = len(recovered)
     figures(
-        "D10 project write, cut at every byte",
-        family="stepper",
-        promise=4,
-        cuts=counted,
-        neither_but_told=told,
-        lost=0,
+        what, family="stepper", promise=4, states=states, cuts=len(ends), neither_but_told=sum(ends), lost=0
     )
 
 
-@pytest.mark.timeout(14_400)
-def test_d10_a_write_cut_and_cut_again_while_it_is_mended(rounds: Rounds, figures: Figures) -> None:
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("kind", BRIEF, ids=named)
+def test_d10_a_write_cut_and_cut_again_while_it_is_mended(
+    kind: dict[str, Any], rounds: Rounds, figures: Figures
+) -> None:
     """From each state that a first cut can leave, every exchange of the next write, and one more write after that."""
-    counted, told, seen = 0, 0, set()
-    thorough = is_thorough(rounds)
-    for number, kind in enumerate(BRIEF[: 1 if are_off() else None]):
-        first = every_byte(kind)
-        for cut in first if thorough else islice(first, 37 * number, None, 1283):
+    seen: set[object] = set()
+    recovered: set[object] = set()
+    ends = []
+    for cut in cuts(every_byte(kind), rounds, 419, 37 * BRIEF.index(kind)):
 
-            def wreck(cut: Cut = cut, kind: dict[str, Any] = kind) -> World:
-                world = World(kind)
-                world.write(cut)
-                return world
+        def wreck(cut: Cut = cut) -> World:
+            world = World(kind)
+            world.write(cut)
+            return world
 
-            state = number, wreck().state
-            if state in seen:
-                continue
-            seen.add(state)
-            found = every_exchange(wreck())
-            for second in found if thorough else islice(found, len(seen) % 50, None, 97):
-                told += judged(wreck, second)
-                counted += 1
-    assert len(seen) > len(BRIEF)
-    what = "D10 project write, cut, and cut again at every exchange while it is mended"
-    figures(what, family="stepper", promise=4, states=len(seen), cuts=counted, neither_but_told=told, lost=0)
+        state = wreck().state
+        if state in seen:
+            continue
+        seen.add(state)
+        again = cuts(every_exchange(wreck()), rounds, 31, len(seen))
+        ends += [judged(wreck, second, recovered).told for second in again]
+    assert len(seen) > 1, "cuts leave it in different states"
+    what = f"D10 project write cut and cut again while it is mended, {named(kind)}"
+    states = len(seen)
+    figures(
+        what, family="stepper", promise=4, states=states, cuts=len(ends), neither_but_told=sum(ends), lost=0
+    )
