@@ -9,6 +9,7 @@ from pathlib import Path
 import can
 import pytest
 
+from motorbus.cli.exits import Exit
 from motorbus.link.can_log import parse_word
 from tests.cli.conftest import Run
 
@@ -223,3 +224,12 @@ def test_a_file_without_lines_is_refused(run: Run, tmp_path: Path) -> None:
         ran = run("decode", "--family", "kst", "--file", str(tmp_path / "zeros"), *more)
         assert (ran.code, ran.out) == (2, "")
         assert "line 1 is longer than 8192 characters" in ran.err
+
+
+def test_stdin_without_end_is_refused(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motorbus.cli.decode.MOST", 40)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("FF " * 1000))
+    said = run("decode", "--family", "feetech")
+    assert said.code == Exit.USAGE
+    assert "more than 40 characters" in said.err
+    assert "--file" in said.err

@@ -21,6 +21,10 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     assert len(script_of("")) == 0
     with pytest.raises(RequestError, match="neither a file nor a script"):
         script_of(str(tmp_path / "nothing"))
+    for nothing in ("", "# nothing yet\n", "seed 3\n"):
+        file.write_text(nothing)
+        with pytest.raises(RequestError, match="there is no fault in it"):
+            script_of(str(file))
     file.write_text("seed 3\nexchange 1: explode\n")
     with pytest.raises(RequestError, match="^line 2: "):
         script_of(str(file))
@@ -48,6 +52,9 @@ def test_help_lists_every_word(run: Run) -> None:
         (("--faults", "exchange 1: unplug 1"), "no port here that could be pulled"),
         (("--faults", "exchange 1 on adapter: drop"), "text of an adapter"),
         (("--faults", "nothing-there"), "neither a file nor a script"),
+        (("--faults", "# no fault: yet"), "there is no fault in it"),
+        (("--faults", "exchange 1: clock-step 1e308"), "a year at most"),
+        (("--faults", "at 1e300 s: unplug 1"), "a year of them at most"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_served(

@@ -71,6 +71,9 @@ def test_a_bad_script_leaves_the_one_that_is_set() -> None:
         for wrong in ("exchange 1: explode", "exchange 1: power-cycle 9", "exchange 1 on adapter: drop"):
             with pytest.raises(RequestError):
                 hall.faulted.set(wrong)
+        for nothing in ("seed 3", "# nothing"):
+            with pytest.raises(RequestError, match="no fault in it"):
+                read_order(hall.faulted, nothing)
         assert hall.mount.course.line is line
         assert read_order(hall.faulted, "off") is None
         assert hall.mount.course.line is not line

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from motorbus.core.family import Family
     from motorbus.link.can_log import Logged
 
+MOST = 1 << 25
+"""Characters of hexadecimal on stdin: 16 MiB of bytes without spaces, which are explained as a whole."""
+
 app = App(
     name="decode",
     usage="Usage: motorbus decode --family FAMILY [HEX...] [OPTIONS]",
@@ -98,13 +101,23 @@ def decode(
     if can_log.looks_like_can(first):
         lines = chain([first], can_log.lines_of(sys.stdin))
         return _stream(_on_can(found, can_log.read_lines(lines)), found, output)
-    return _document(found.explain(_bytes(first + sys.stdin.read())), found, output)
+    return _document(found.explain(_bytes(first + _piped())), found, output)
 
 
 def _file(file: Path, family: Family, output: Output) -> Exit:
     if _is_serial(file, family):
         return _told(((one, {}, None) for one in family.explain(_serial(file))), family, output)
     return _stream(_on_can(family, _recorded(file)), family, output)
+
+
+def _piped() -> str:
+    """All that stands on stdin, which may be without end."""
+    text = sys.stdin.read(MOST + 1)
+    if len(text) > MOST:
+        raise RequestError(
+            f"more than {MOST:,} characters on stdin", advice="keep them in a file, and decode it with --file"
+        )
+    return text
 
 
 def _is_serial(file: Path, family: Family) -> bool:
@@ -122,7 +135,7 @@ def _summary(data: Sequence[str], file: Path | None, family: Family, direction: 
     if file is not None and _is_serial(file, family):
         return summary(family, _serial(file), direction, output)
     if family.link.kind == "bytes" and file is None:
-        return summary(family, _bytes(" ".join(data) or sys.stdin.read()), direction, output)
+        return summary(family, _bytes(" ".join(data) or _piped()), direction, output)
     if file is not None:
         logged = _recorded(file)
     elif data:

@@ -9,6 +9,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.errors import RequestError
 from motorbus.simulation.faults import WORDS, Script, parse
+from motorbus.simulation.faults.script import short
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -31,9 +32,13 @@ PLACES = (
 
 
 def script_of(said: str) -> Script:
-    """What the flag says: a script, or the name of a file that is there; "" is none. RequestError for neither."""
+    """What the flag says: a script, or the name of a file that is there; "" is none.
+
+    Raises RequestError for neither, and for a script without a fault: its user believes that one is at work.
+    """
     if not said:
         return Script()
+    flag = said
     if _is_file(said):
         with usable(Path(said), "read"):
             said = Path(said).read_bytes().decode("utf-8-sig", errors="replace")
@@ -43,7 +48,14 @@ def script_of(said: str) -> Script:
             expected='a file, or a script as "exchange 17 byte 3: drop"',
             advice="`--faults help` lists what can be said",
         )
-    return parse(said)
+    script = parse(said)
+    if not script:
+        raise RequestError(
+            f"--faults {short(flag)}: there is no fault in it",
+            expected="at least one",
+            advice="`--faults help` lists what can be said; leave --faults out for none",
+        )
+    return script
 
 
 def _is_file(said: str) -> bool:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine, Script, World
-from motorbus.simulation.faults.script import script_of
+from motorbus.simulation.faults.script import script_of, short
 from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.mount import Mount
 
@@ -122,11 +122,16 @@ class Faulted:
 def read_order(faults: Faulted | None, text: str) -> dict[str, Any] | None:
     """Carry out an order of a control socket: a script, `off`, or nothing, which asks for the facts.
 
-    Raises RequestError as `Faulted.set` does, and where a simulation takes no faults.
+    Raises RequestError as `Faulted.set` does, for a script without a fault, and where a simulation takes no faults.
     """
     if faults is None:
         raise RequestError("this simulation takes no faults")
     if not text:
         return faults.facts()
-    faults.set("" if text == "off" else text)
+    given = script_of("" if text == "off" else text)
+    if not given and text != "off":
+        raise RequestError(
+            f"faults {short(text)}: there is no fault in it", expected="at least one, or `off`"
+        )
+    faults.set(given)
     return None

@@ -24,6 +24,8 @@ _VALUES: Final[Mapping[Takes, range]] = MappingProxyType(
         Takes.PERHAPS_COUNT: range(1 << 16),
     }
 )
+LONGEST: Final = 366 * 86_400.0
+"""s that a fault may take or be away: a leap year. Longer ones are slips, and clocks lose their digits over them."""
 _TIMED: Final = (Takes.SECONDS, Takes.SPAN, Takes.SECONDS_NODE)
 
 
@@ -119,8 +121,10 @@ def _check_place(fault: Fault) -> None:
         raise RequestError(f"fault {fault}: a byte is counted within an exchange")
     if not (isfinite(fault.percent) and 0 <= fault.percent <= 100):
         raise RequestError(f"fault {fault}: impossible chance", expected="more than 0 and at most 100 %")
-    if fault.moment is not None and not (isfinite(fault.moment) and fault.moment >= 0):
-        raise RequestError(f"fault {fault}: impossible moment", expected="seconds from the beginning")
+    if fault.moment is not None and not 0 <= fault.moment <= LONGEST:
+        raise RequestError(
+            f"fault {fault}: impossible moment", expected="seconds from the beginning, a year of them at most"
+        )
     if (fault.byte is not None or fault.per_byte) and not fault.word.byte:
         raise RequestError(f"fault {fault}: {fault.action} is for a whole packet", expected="no byte")
     if fault.action == "echo" and fault.to is not Side.DEVICE:
@@ -134,9 +138,7 @@ def _check_what(fault: Fault) -> None:
     if possible is not None and fault.value not in possible and not chance:
         raise RequestError(f"fault {fault}: impossible value", expected=takes.value)
     spans = (fault.seconds, fault.until)
-    if not all(isfinite(seconds) and seconds >= 0 for seconds in spans) or (
-        takes in _TIMED and not fault.seconds
-    ):
+    if not all(0 <= seconds <= LONGEST for seconds in spans) or (takes in _TIMED and not fault.seconds):
         raise RequestError(f"fault {fault}: impossible {fault.action}", expected=takes.value)
     if fault.until and (takes not in (Takes.SPAN, Takes.PERHAPS_SPAN) or fault.until <= fault.seconds):
         raise RequestError(f"fault {fault}: impossible span", expected="the lower one first, as 0.02-0.5")

@@ -21,14 +21,14 @@ class Takes(Enum):
     BITS = "the bits to turn over, in hex, 01 to FF"
     BIT = "a bit, 0 to 7"
     BYTE = "the byte in front, in hex, 00 to FF"
-    SECONDS = "seconds, more than 0"
-    SPAN = "seconds, more than 0, or two as 0.02-0.5 for anything between them"
+    SECONDS = "seconds, more than 0, a year at most"
+    SPAN = "seconds, more than 0, a year at most, or two as 0.02-0.5 for anything between them"
     PERHAPS_SPAN = "nothing, or seconds as 0.02 or 0.02-0.5"
     PERHAPS_SECONDS = "nothing, or seconds"
     PERHAPS_COUNT = "nothing, or how many bytes of it"
     NODE = "the id of a device"
     NODES = "the id of a device, or `all`"
-    SECONDS_NODE = "seconds, more than 0, and the id of a device, or none for all"
+    SECONDS_NODE = "seconds, more than 0, a year at most, and the id of a device, or none for all"
 
 
 class Word(NamedTuple):
