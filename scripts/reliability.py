@@ -64,7 +64,7 @@ PROMISES: Final = {
     " acknowledgement of a stepper controller. No call hangs, the second exchange after the last fault is right, and"
     " what met no fault is right at its first try.",
     3: "A million exchanges of each family with 1 % of the replies late: no stale value. What programs of others make"
-    " of the same fault stands beside it.",
+    " of the same fault stands beside it; `python -m bench.stale_replies` does that again.",
     4: "Power or program cut at every byte and every step of a change of id or rate, of provisioning and of writing a"
     " project, and again during the recovery: old or new, reachable, locked, at most one device with an id.",
     5: "A day of jogging, monitoring and reconnecting writes nothing to an EEPROM.",
@@ -142,7 +142,7 @@ def _shown(value: object) -> str:
 
 
 def _run(run: dict[str, Any]) -> str:
-    where = run["test"].removeprefix("tests/").partition("[")[0]
+    where = run["test"].partition("[")[0]
     return f"`{where}` {run['date']} {run['commit']}".strip()
 
 
@@ -162,7 +162,7 @@ def tests_of_rows() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for file in sorted(TESTS.rglob("test_*.py")):
         for name, row in NAMED.findall(file.read_text("utf-8")):
-            found.setdefault(row.upper(), []).append(f"{file.relative_to(TESTS)}::{name}")
+            found.setdefault(row.upper(), []).append(f"{file.relative_to(soaked.ROOT)}::{name}")
     return found
 
 

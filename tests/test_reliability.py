@@ -37,7 +37,7 @@ def test_what_a_run_tells_is_on_the_page(apart: Path, monkeypatch: pytest.Monkey
     )
     page = written(monkeypatch, "--take")
     part = page[page.index("## Promise 3") : page.index("## Promise 4")]
-    assert "| L7 late replies | kst | exchanges 12 345, wrong 0 | `x.py::y` 2" in part
+    assert "| L7 late replies | kst | exchanges 12 345, wrong 0 | `tests/x.py::y` 2" in part
 
 
 def test_figures_come_in_one_order(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
