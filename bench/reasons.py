@@ -32,8 +32,9 @@ REASONS: Final[dict[str, dict[str, str]]] = {
     "4": {
         "sync-read": "writing, waking up and reading are the kernel's and cost both the same; what remains of "
         "ours is in row 1, and theirs is compiled",
-        "cycle": "the goals leave in one write with the question, so both make few system calls; what remains is "
-        "the judging of goals in row 1, which rustypot does not do, and what it does is compiled",
+        "cycle": "the goals leave in one write with the question, which saves most of the system calls that "
+        "rustypot makes; what that saves is spent on judging the goals in an interpreter, as in row 1, while what "
+        "rustypot does is compiled, and judges nothing",
     },
     "5": {
         "rustypot": "an answer of one packet leaves nothing to be saved by reading all of it at once, so an "
@@ -42,10 +43,12 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "at once; writing, waking up and reading cost both the same",
     },
     "6": {
-        "in one burst: of the wire limit": "what the kernel takes to wake two processes is not on the wire: the "
-        "bare loop of the same round shows it",
-        "in pieces: of the wire limit": "what the kernel takes to wake two processes is not on the wire, and "
-        "here it may do so for each packet: the bare loop of the same round shows it",
+        "in one burst: of the wire limit": "what the kernel takes to wake two processes is not on the wire: that "
+        "is what the bare loop of the same round lacks too. The rest is ours, between an answer and the next "
+        "request; after each wait that runs with cold caches, and takes longer than in row 1",
+        "in pieces: of the wire limit": "what the kernel takes to wake two processes is not on the wire: that is "
+        "what the bare loop of the same round lacks too. The rest is ours, between the last piece of an answer and "
+        "the next request, and each piece is looked at by itself",
         "cycle rate": "between the last byte of one cycle and the first of the next the answer is checked and "
         "the goals are judged; what that costs is in row 1, and rustypot's is compiled and judges nothing",
     },
@@ -66,7 +69,8 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "row of columns only leaves that out",
     },
     "10": {
-        "read request": "id, address and count are checked before a packet is made of them; the peers check nothing",
+        "read request": "the first reading of a servo makes more than a packet: which packet is due, how long it may "
+        "take, and what its bytes mean in SI units are found out, and kept for all further ones",
         "sync write": "goals come in rad, s and rad/s, are rounded, and are judged by the limits of their "
         "servos; the peers are given counts",
     },

@@ -37,7 +37,8 @@ ROWS: Final = {
     "D7": "the acknowledgement of a new id comes from the old or the new one: right either way",
     "D8": "a template that spoils servos: reserved, read-only and factory registers are refused",
     "D9": "wear of an EEPROM: what is so already is not written again",
-    "D10": "power lost during a write, a save or a change of id: old or new in the end, reachable and locked",
+    "D10": "power lost during a write, a save or a change of id: old or new in the end, reachable and locked; where a"
+    " project of a stepper controller is left with neither, its host is told",
     "D11": "a save that nobody acknowledges and that counts after a restart: never called saved before it is seen",
     "D12": "scanning a running CAN bus at a wrong bit rate: nothing is sent before the rate is known",
     "D13": "bus off, adapter down, nobody acknowledges: told within a second, and what waited is not sent later",

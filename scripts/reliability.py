@@ -66,7 +66,10 @@ PROMISES: Final = {
     3: "A million exchanges of each family with 1 % of the replies late: no stale value. What programs of others make"
     " of the same fault stands beside it; `python -m bench.stale_replies` does that again.",
     4: "Power or program cut at every byte and every step of a change of id or rate, of provisioning and of writing a"
-    " project, and again during the recovery: old or new, reachable, locked, at most one device with an id.",
+    " project, and again during the recovery: old or new, reachable, locked, at most one device with an id. A"
+    " project is written number by number and saved at the end, by a controller that forgets which one is selected when"
+    " its supply goes: so it can be left with neither. Then its host is told, never of a success, and the next write"
+    " mends it; how often a cut has left neither, told to its host or an earlier one, is *neither but told*.",
     5: "A day of jogging, monitoring and reconnecting writes nothing to an EEPROM.",
     6: "Ten minutes of garbage as fast as the line carries it, of five kinds: nothing hangs, no buffer has more than"
     " 4 KiB, and four times the garbage is about four times the work. What processor time it takes is told.",

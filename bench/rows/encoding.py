@@ -5,10 +5,11 @@ public call of its own that ends in a packet: ours by the name of what is read, 
 written; theirs by address, count and raw counts. The figure is our processor time by that of the best peer of the same
 round. Every packet is compared with what it must be.
 
-A read by name is made an exchange once and kept, so there are three rows of it. What is judged is the bytes alone, from
-id, address and count, by the encoder that the others use: that is all that the peers do. Beside it, without a goal: the
-first reading of a position of a servo that has just been prepared, where all of it is built, the packet and what is
-done with its answer; and the same once it is kept, as a loop runs it, where nothing is built any more.
+A read by name is made an exchange once and kept, so there are three rows of it. What is judged is the first reading of
+a position of a servo that has just been prepared, where all of it is built, the packet and what is done with its
+answer: a public call by name. Beside it, without a goal: the same once it is kept, as every reading behind the first
+has it, where nothing is built any more; and the bytes alone, from id, address and count, which is all that the peers
+make.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ TIMES: Final = {READ: 20_000, SYNC_WRITE: 4_000}
 FRESH: Final = 1_000
 """Servos that are prepared for the first reading of each."""
 GOALS: Final = {
-    BYTES: ("<= 1.0", "<= 0.8"),
-    READ: ("", ""),
+    BYTES: ("", ""),
+    READ: ("<= 1.0", "<= 0.8"),
     KEPT: ("", ""),
     SYNC_WRITE: ("<= 0.75", "<= 0.6"),
 }
 TEXT: Final = {
-    BYTES: "encoding a read request: its bytes from id, address and count",
-    READ: "by name, the whole exchange of a read built",
-    KEPT: "by name, the exchange of a read kept: nothing is built",
+    BYTES: "encoding a read request, its bytes alone from id, address and count",
+    READ: "encoding a read request by name, the first of a servo: the whole exchange is built",
+    KEPT: "encoding a read request by name, every further one: the exchange is kept",
     SYNC_WRITE: "encoding a sync write 6x6",
 }
 POSITION, GOAL, SPEED = 56, 42, 1000

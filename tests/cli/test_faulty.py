@@ -18,7 +18,9 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     file = tmp_path / "noise"
     file.write_text("seed 3\n1%: drop  # now and then\n")
     assert script_of(str(file)) == script_of("seed 3; 1%: drop") == parse("seed 3; 1%: drop")
-    assert len(script_of("")) == 0
+    assert len(script_of(None)) == 0
+    with pytest.raises(RequestError, match="neither a file nor a script"):
+        script_of("")  # as of a variable of a shell that is not set
     with pytest.raises(RequestError, match="neither a file nor a script"):
         script_of(str(tmp_path / "nothing"))
     for nothing in ("", "# nothing yet\n", "seed 3\n"):

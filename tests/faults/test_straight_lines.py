@@ -5,18 +5,20 @@ As in `test_lines`, for what a control loop keeps.
 
 from __future__ import annotations
 
+import heapq
 from random import Random
 
 import pytest
 
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
+from motorbus.families.feetech import wire
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from tests.bus.struck import Landings
 from tests.conftest import Figures, Rounds
 from tests.faults.single import tried_again
-from tests.faults.straight import KEPT, StraightRig
+from tests.faults.straight import GROUP, KEPT, StraightRig
 from tests.faults.test_lines import Doubled
 
 NAMES = list(KEPT)
@@ -120,6 +122,32 @@ def test_l7_what_comes_sooner_than_its_bits_can_travel_answers_an_older_question
     assert rig.struck > total / 50
     assert len(landings.ids) > 0.5 * total
     assert good > 0.9 * total
+
+
+@pytest.mark.parametrize("watched", [False, True], ids=["straight", "usual"])
+@pytest.mark.parametrize("later", [300, 330, 400, 470])
+def test_l7_what_comes_before_the_question_behind_an_order_can_be_answered_is_none(
+    later: int, watched: bool
+) -> None:
+    """The question of a volley passes behind its order, and cannot be answered sooner than that."""
+    rig = StraightRig(ids=GROUP, options={"pace": True})
+    for _ in range(3):
+        KEPT["volley"].act(rig)
+    if watched:  # then it goes the usual way
+        rig.bus.trace.subscribe()
+    rig.stir()
+    places = [rig.servos[node].raw_position for node in GROUP]
+    old = [(place + 1000) % 4096 for place in places]
+    length = rig.bus.turns.trust.nodes[GROUP[0]].length
+    packets = (
+        wire.encode_status(node, 0, (place.to_bytes(2, "little") + b"\0")[: length - 6])
+        for node, place in zip(GROUP, old, strict=True)
+    )
+    order = rig.order([float(rig.row.to_value(place)) for place in places])
+    came = rig.link.now() + later * 1e-6
+    heapq.heappush(rig.link._under_way, (came, -1, Side.HOST, b"".join(packets)))
+    _, told = rig.bus.volley(order, rig.positions)
+    assert [rig.row.to_raw(angle) for angle in told.values.values()] == places
 
 
 @pytest.mark.parametrize("name", NAMES)

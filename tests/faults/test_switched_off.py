@@ -24,7 +24,11 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 OTHERS = ("tests/families/stepper/test_faults.py", "tests/families/stepper/test_single_faults.py")
 """Tests of faults that stand with their family, and have no row in their names."""
-PROCESSES = ("link/test_lock.py", "motion/safety/test_killed.py", "session/test_attended_frozen.py")
+PROCESSES = (
+    "tests/link/test_lock.py",
+    "tests/motion/safety/test_killed.py",
+    "tests/session/test_attended_frozen.py",
+)
 NO_FAULTS = {
     "D8": "somebody asks for what is refused",
     "D9": "the same is written again",
@@ -46,8 +50,8 @@ def elsewhere() -> Iterator[str]:
     for row, tests in reliability.tests_of_rows().items():
         for test in tests:
             file = test.partition("::")[0]
-            if not file.startswith("faults/") and row not in NO_FAULTS and file not in PROCESSES:
-                yield f"tests/{test}"
+            if not file.startswith("tests/faults/") and row not in NO_FAULTS and file not in PROCESSES:
+                yield test
 
 
 @pytest.mark.faultless("this is where it is judged")

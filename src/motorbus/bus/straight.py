@@ -120,7 +120,9 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
                 return None
             turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
             request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
-        course.sent_at, course.deadline = now, start + course.wait
+        # an answer cannot come before its question has passed, which does so behind what is ahead of it
+        course.sent_at = start if turns.takes_time else now
+        course.deadline = start + course.wait
         lock.owing, bus.relay.pumper = True, get_ident()
         turns.aloft = turns.flying[course.lane] = course
         turns.echo.recent.append(course.request)  # type: ignore[arg-type]
@@ -201,9 +203,12 @@ def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
 def _is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
     if turns.passes is None or not exchange.sure:
         return False
-    return (exchange.refusal is None or exchange.refusal(turns.known.stops) is None) and turns.passes(
-        exchange
-    )
+    if exchange.refusal is not None and exchange.refusal(turns.known.stops) is not None:
+        return False
+    try:
+        return turns.passes(exchange)
+    except MotorbusError:  # who goes the usual way is told why
+        return False
 
 
 def _admitted(turns: Turns, exchange: Exchange[Any]) -> bool:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.errors import RequestError
-from motorbus.simulation.faults import WORDS, Script, parse
-from motorbus.simulation.faults.script import short
+from motorbus.simulation.faults import WORDS, Script
+from motorbus.simulation.faults.script import meant
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -31,14 +31,13 @@ PLACES = (
 """Where a fault can stand, and what that means."""
 
 
-def script_of(said: str) -> Script:
-    """What the flag says: a script, or the name of a file that is there; "" is none.
+def script_of(said: str | None) -> Script:
+    """What the flag says: a script, or the name of a file that is there; None is none.
 
     Raises RequestError for neither, and for a script without a fault: its user believes that one is at work.
     """
-    if not said:
+    if said is None:
         return Script()
-    flag = said
     if _is_file(said):
         with usable(Path(said), "read"):
             said = Path(said).read_bytes().decode("utf-8-sig", errors="replace")
@@ -48,14 +47,7 @@ def script_of(said: str) -> Script:
             expected='a file, or a script as "exchange 17 byte 3: drop"',
             advice="`--faults help` lists what can be said",
         )
-    script = parse(said)
-    if not script:
-        raise RequestError(
-            f"--faults {short(flag)}: there is no fault in it",
-            expected="at least one",
-            advice="`--faults help` lists what can be said; leave --faults out for none",
-        )
-    return script
+    return meant(said or "# nothing")
 
 
 def _is_file(said: str) -> bool:

@@ -79,6 +79,7 @@ Flag = Annotated[bool, Parameter(negative="")]
 Inputs = Annotated[
     Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
 ]
+Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file with one, or help.")]
 Switched = Annotated[
     tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
 ]
@@ -125,7 +126,7 @@ def simulate(
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
     inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
-    faults: Annotated[str, Parameter(help="What goes wrong: a script, a file with one, or help.")] = "",
+    faults: Faults = None,
     quiet: Annotated[Flag, Parameter(help="Do not say on stderr what they remark.")] = False,
     switch: Switched = (),
     switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,

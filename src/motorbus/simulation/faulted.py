@@ -12,7 +12,7 @@ from typing import Any, Final
 from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine, Script, World
-from motorbus.simulation.faults.script import script_of, short
+from motorbus.simulation.faults.script import meant
 from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.mount import Mount
 
@@ -56,7 +56,7 @@ class Faulted:
         A script that leaves anything to chance and says no seed gets one. Raises RequestError for a bad script, and for
         what cannot happen here; what was set goes on then.
         """
-        given = script_of(script)
+        given = meant(script)
         if given.by_chance:
             given = given.seeded(secrets.randbelow(1 << 32))
         if not self._mount.texts:
@@ -128,10 +128,5 @@ def read_order(faults: Faulted | None, text: str) -> dict[str, Any] | None:
         raise RequestError("this simulation takes no faults")
     if not text:
         return faults.facts()
-    given = script_of("" if text == "off" else text)
-    if not given and text != "off":
-        raise RequestError(
-            f"faults {short(text)}: there is no fault in it", expected="at least one, or `off`"
-        )
-    faults.set(given)
+    faults.set("" if text == "off" else text)
     return None

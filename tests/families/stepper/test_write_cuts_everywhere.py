@@ -6,16 +6,17 @@ what it holds; the next write ends with what was meant. `make test` takes some o
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import islice
-from math import ceil
+from math import ceil, inf
 from typing import Any, NamedTuple
 
 import pytest
 
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Data
-from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
+from motorbus.errors import LinkLost, MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver.writing import Proof, Written
 from motorbus.families.stepper.simulator import simulate
@@ -25,6 +26,7 @@ from motorbus.motion.safety import Gate
 from tests.conftest import Figures
 from tests.families.stepper.test_power_cuts import KINDS, MEANT, OTHER
 from tests.families.stepper.written import LONGER, PICK, Supply, program, stored
+from tests.faults.off import are_off
 
 BYTE = 10 / 9600
 """s for one byte."""
@@ -59,7 +61,7 @@ class World:
     """A controller that outlives its hosts. `length` is how long the last of them took (s), `sent` when it spoke.
 
     `before` is what it had stored when the last of them began, `told` whether it holds neither old nor new in the end,
-    which its host was told.
+    which its host was told, or an earlier one. `struck` says that the last cut has come.
     """
 
     def __init__(self, kind: dict[str, Any]) -> None:
@@ -68,7 +70,7 @@ class World:
         self.simulated.put(1, OTHER)
         self.simulated.put(2, LONGER)
         self.before = LONGER
-        self.told = False
+        self.told = self.struck = False
         self.now = 0.0
         self.length = 0.0
         self.sent: list[float] = []
@@ -85,8 +87,11 @@ class World:
         try:
             return Controller(bus).write_project(program(PICK))
         except MotorbusError as error:
+            self.struck = isinstance(error, LinkLost)
             return error
         finally:
+            if isinstance(link.simulator, Supply):
+                self.struck = link.simulator.at == inf and not are_off()
             self.length = link.now() - self.now
             self.sent = [at - self.now for at in link.sent_at]
             bus.close()
@@ -175,10 +180,15 @@ def named(kind: dict[str, Any]) -> str:
 @pytest.mark.parametrize("kind", KINDS, ids=named)
 def test_d10_a_write_cut_at_every_byte(kind: dict[str, Any], rounds: Rounds, figures: Figures) -> None:
     recovered: set[object] = set()
-    ends = [
-        judged(lambda: World(kind), cut, recovered).told
-        for cut in cuts(every_byte(kind), rounds, 419, 37 * KINDS.index(kind))
-    ]
+    whole = World(kind)
+    whole.write()
+    ends, struck = [], Counter[str]()
+    for cut in cuts(every_byte(kind), rounds, 419, 37 * KINDS.index(kind)):
+        end = judged(lambda: World(kind), cut, recovered)
+        assert end.struck == (cut.after < whole.length), cut
+        struck[cut.who] += end.struck
+        ends.append(end.told)
+    assert min(struck[who] for who in WHO) > 0
     assert len(recovered) > 1, "cuts leave it in different states"
     what = f"D10 project write cut at every byte, {named(kind)}"
     states = len(recovered)
@@ -195,7 +205,8 @@ def test_d10_a_write_cut_and_cut_again_while_it_is_mended(
     """From each state that a first cut can leave, every exchange of the next write, and one more write after that."""
     seen: set[object] = set()
     recovered: set[object] = set()
-    ends = []
+    ends: list[bool] = []
+    struck = Counter[str]()
     for cut in cuts(every_byte(kind), rounds, 419, 37 * BRIEF.index(kind)):
 
         def wreck(cut: Cut = cut) -> World:
@@ -208,7 +219,11 @@ def test_d10_a_write_cut_and_cut_again_while_it_is_mended(
             continue
         seen.add(state)
         again = cuts(every_exchange(wreck()), rounds, 31, len(seen))
-        ends += [judged(wreck, second, recovered).told for second in again]
+        for second in again:
+            end = judged(wreck, second, recovered)
+            struck[second.who] += end.struck
+            ends.append(end.told)
+    assert min(struck[who] for who in WHO) > 0.3 * len(ends), "nearly all cuts of either kind have come"
     assert len(seen) > 1, "cuts leave it in different states"
     what = f"D10 project write cut and cut again while it is mended, {named(kind)}"
     states = len(seen)

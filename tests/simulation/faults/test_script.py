@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import motorbus
 from motorbus.errors import RequestError
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, Fault, Script, parse
-from motorbus.simulation.faults.script import script_of
+from motorbus.simulation.faults.script import meant, script_of
 from tests.simulation.faults.scripts import scripts
 
 
@@ -179,3 +182,16 @@ def test_numbers_beyond_all_measure_are_refused_in_few_words(line: str) -> None:
     with pytest.raises(RequestError, match="^line 2: ") as caught:
         parse(f"seed\t1\n{line}" if not line.startswith("seed") else f"\n{line}")
     assert len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize("text", ["seed 3", "# nothing", "\n"])
+def test_who_asks_for_a_script_without_a_fault_is_told(text: str) -> None:
+    assert len(parse(text)) == len(meant("")) == len(meant(())) == 0
+    asks: list[Callable[[], object]] = [
+        lambda: meant(text),
+        lambda: motorbus.simulate("feetech", faults=text),
+        lambda: motorbus.open("feetech:sim,ids=1", faults=text),
+    ]
+    for ask in asks:
+        with pytest.raises(RequestError, match="there is no fault in it"):
+            ask()

@@ -92,6 +92,17 @@ def script_of(script: Script | str | Iterable[Fault]) -> Script:
     return script if isinstance(script, Script) else Script(tuple(script))
 
 
+def meant(script: Script | str | Iterable[Fault]) -> Script:
+    """The same of what somebody has asked for; "" is none.
+
+    Raises RequestError for another text without a fault: its writer believes that something goes wrong.
+    """
+    made = script_of(script)
+    if script and isinstance(script, str) and not made:
+        raise RequestError(f"{short(script)!r}: there is no fault in it", expected=EXAMPLES)
+    return made
+
+
 def _one_seed(before: int | None, said: str, count: int) -> int:
     if before is not None:
         raise RequestError(
