@@ -43,8 +43,10 @@ class Ledger:
     def call(self, act: Callable[[], object]) -> None:
         """`act` raises AssertionError for what is wrong, MotorbusError when it fails honestly."""
         link, faults, again = self.rig.link, self.line.count, tried_again(self.rig.bus)
-        held = any(at > link.now() + 1e-3 for at, *_ in link._under_way)
         began = link.now()
+        held = any(
+            at > began for at, *_ in link._under_way
+        )  # what is late strikes the call in which it arrives
         self.calls += 1
         try:
             act()

@@ -1,7 +1,9 @@
 """Rows L1 and L2 toward the stepper controller: a request that is damaged is met with silence, and never obeyed amiss.
 
-Its requests have a sum of 8 bits, as FEETECH packets have, and always eleven bytes. So a byte too many or too few never
-makes another request of one, and a changed one does not get past the sum.
+Its requests have a sum of 8 bits, as FEETECH packets have, and always eleven bytes. So a changed one does not get past
+the sum, and a byte too few never makes another request of one. A byte too many moves the others on: once in 256 times
+the first eleven of twelve have a right sum by chance, and are another order, which is obeyed. Nobody on the host can
+know that of an order by itself; who writes a project reads back what is held.
 """
 
 from __future__ import annotations
@@ -67,9 +69,13 @@ def suffered(name: str, values: Iterable[int]) -> Tally:
         at_most=LONGEST,
         misleading=another_request,
     )
-    assert (tally.false, tally.misled) == (0, 0)
+    assert tally.false <= tally.misled, (
+        "nothing is told that is not so, unless the controller heard another order"
+    )
     if ORDERS[name].repeatable and name not in STOPS:
-        assert tally.succeeded == tally.faults, "what may be said again gets over any single fault"
+        assert tally.succeeded + tally.false == tally.faults, (
+            "what may be said again gets over any other fault"
+        )
     else:
         assert 0 < tally.succeeded < tally.faults, "a byte too many in front does no harm"
     return tally
@@ -78,18 +84,20 @@ def suffered(name: str, values: Iterable[int]) -> Tally:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_l1_l2_a_damaged_request_is_never_obeyed_amiss(name: str) -> None:
     values = TELLING[:1] if name == "read_project" else TELLING
-    assert suffered(name, values).faults == number_of(wire.REQUEST_LENGTH, len(values))
+    tally = suffered(name, values)
+    assert (tally.faults, tally.misled) == (number_of(wire.REQUEST_LENGTH, len(values)), 0)
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(7200)
 def test_l1_l2_every_fault_of_every_request(figures: Figures) -> None:
-    total = succeeded = 0
+    total = succeeded = false = 0
     for name in COMMANDS:
         tally = suffered(name, EVERY if name != "read_project" else TELLING)
-        total, succeeded = total + tally.faults, succeeded + tally.succeeded
+        total, succeeded, false = total + tally.faults, succeeded + tally.succeeded, false + tally.false
     figures(
         "L1 L2 single byte faults, 27 commands, toward the device",
-        family="stepper", faults=total, wrong=0, succeeded=succeeded,
+        family="stepper", faults=total, wrong=false, succeeded=succeeded,
     )  # fmt: skip
+    assert false < 26 * 11 * 256 / 256, "of the bytes too many, one in 256 passes at most"
     assert total == 26 * number_of(11) + number_of(11, len(TELLING))
