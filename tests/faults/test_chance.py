@@ -44,9 +44,8 @@ class Ledger:
         """`act` raises AssertionError for what is wrong, MotorbusError when it fails honestly."""
         link, faults, again = self.rig.link, self.line.count, tried_again(self.rig.bus)
         began = link.now()
-        held = any(
-            at > began for at, *_ in link._under_way
-        )  # what is late strikes the call in which it arrives
+        # what is late strikes the call in which it arrives
+        held = any(at > began for at, *_ in link._under_way)
         self.calls += 1
         try:
             act()

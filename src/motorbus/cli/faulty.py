@@ -47,7 +47,7 @@ def script_of(said: str | None) -> Script:
             expected='a file, or a script as "exchange 17 byte 3: drop"',
             advice="`--faults help` lists what can be said",
         )
-    return meant(said or "# nothing")
+    return meant(said or "#")  # a file with nothing in it is no "none"
 
 
 def _is_file(said: str) -> bool:
