@@ -43,7 +43,7 @@ WHY = (
     "no loop stands around that: no grid of time, no state of each axis, no brakes.\n"
 )
 """Why it misses where it does; what system calls alone achieve on the same line is in row 6."""
-KINDS = ("followed", "direct")
+KINDS = ("followed", "direct", "followed ahead", "direct ahead")
 COLUMNS = (
     "",
     "asked for, Hz",
@@ -117,7 +117,7 @@ def measured(port: str, kind: str, rate: float, seconds: float) -> dict[str, Any
 def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
     goals = course(int(rate * seconds) + 1)
     positions: list[Any] = []
-    with robot.loop(rate, direct=kind == "direct") as loop:
+    with robot.loop(rate, direct="direct" in kind, ahead="ahead" in kind) as loop:
         base = dict(next(loop).position)
         loop.goal.update(base)
         next(loop)  # torque on, in a cycle of its own

@@ -117,7 +117,9 @@ def test_l16_two_threads_that_share_one_kept_exchange_get_values_true_inside_the
     wrong: list[str] = []
 
     def poll() -> None:
-        for _ in range(count):
+        asked = 0
+        while asked < count or left.straight < count / 10:  # how often they meet is the affair of the machine
+            asked += 1
             before = line.heard
             try:
                 (((_, _, _, value),), _) = bus.run(shared)

@@ -98,6 +98,17 @@ class Relay:
             for ring in tuple(self.bells):
                 ring()
 
+    def pass_on(self) -> None:
+        """The same while something is on the straight way, which it stays on unless somebody waits for this.
+
+        Whoever comes to wait later has taken the lock before, and so has made a usual flight of it.
+        """
+        self._lock.acquire()
+        self.pumper = None
+        self._lock.release()
+        if self._waiting or self.bells:
+            self.hand_over()
+
     def wake(self) -> None:
         """Something has been settled."""
         if self._waiting:

@@ -2,8 +2,9 @@
 
 When the bus is as it was when it was found idle and clean, the request leaves, the whole answer comes at one look, or
 piece by piece, and all there is to do is to check it and to say what it means: `fly`. What nobody answers just leaves:
-`cast`. Whatever is otherwise goes the usual way; an answer that is not exactly the one that is due finds a flight in
-the air like any other. A test proves that both ways give the same.
+`cast`. Who has something to do meanwhile lets it `loose`, and comes back to `land` it. Whatever is otherwise goes the
+usual way; an answer that is not exactly the one that is due finds a flight in the air like any other. A test proves
+that both ways give the same.
 
 Here microseconds count, so what elsewhere would be three functions is one.
 """
@@ -49,7 +50,7 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
 
     `ahead` is what nobody answers and leaves in the same write, in front of it. Raises what `Bus.run` does.
     """
-    turns, lock = bus.turns, bus.turns.lock
+    turns = bus.turns
     course: Course | None = exchange.course
     if (course is None or course.turns is not turns) and (course := _found(bus, exchange)) is None:
         return UNLIKE
@@ -60,33 +61,93 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
             if launched is None:
                 return UNLIKE
             course = launched
-            if bus.sleeps:
-                bus.link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
-            arrived = bus.link.read(course.deadline)
-            if len(arrived) == 1:
-                lock.acquire()  # let go of it below, or where the flight falls
-                at = bus.link.now()
-                if at > course.deadline:  # a host that was held up takes it in late
-                    at = course.deadline
-                if turns.aloft is course and at - course.sent_at >= course.least:
-                    value: T | Unlike = course.whole(arrived[0], at)
-                    if value is not UNLIKE:
-                        course.lands(arrived[0], at)
-                        bus.relay.pumper = None
-                        lock.release()
-                        return value
-                lock.release()
-            if (value := gathered(bus, course, arrived)) is not UNLIKE:
-                return value  # type: ignore[no-any-return]
-            _astray(bus, course, arrived)
+            value: T | Unlike = _brought(bus, course)
+            if value is not UNLIKE:
+                return value
         except BaseException as error:
-            _fallen(bus, launched, error)
+            _fallen(bus, _mine(bus, launched), error)
             raise
     except BaseException:  # a second interrupt may fall into what the first one has brought about
         bus.relay.recover()
         raise
     answer: Any = course.result()
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
+
+
+def loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None) -> Course | None:
+    """Send this as `fly` does, and come back at once; what has left must be given to `land`. None as `UNLIKE` there.
+
+    Meanwhile the bus is free: whoever else wants something of it makes a usual flight of this one.
+    """
+    course: Course | None = exchange.course
+    if (course is None or course.turns is not bus.turns) and (course := _found(bus, exchange)) is None:
+        return None
+    launched = None
+    try:
+        try:
+            launched = _launched(bus, course, ahead)
+            if launched is not None:
+                launched.wake = bus.relay.wake
+                bus.relay.pass_on()
+            return launched
+        except BaseException as error:
+            own = bus.turns.aloft if bus.relay.pumper == get_ident() else launched
+            _fallen(bus, own, error)
+            raise
+    except BaseException:  # as in `fly`
+        bus.relay.recover()
+        raise
+
+
+def land(bus: Bus, course: Course) -> Any:
+    """Wait for the answer of what was let `loose` on this bus, and return its value. Raises what `Bus.run` does."""
+    turns, relay, lock = bus.turns, bus.relay, bus.turns.lock
+    try:
+        try:
+            lock.acquire()
+            if turns.aloft is course and relay.pumper is None:
+                relay.pumper = get_ident()
+            lock.release()
+            if relay.pumper == get_ident():
+                value = _brought(bus, course)
+                if value is not UNLIKE:
+                    return value
+            while not course.done:  # others have made a usual flight of it
+                relay.turn()
+        except BaseException as error:
+            _fallen(bus, course if turns.flying.get(course.lane) is course else None, error)
+            raise
+    except BaseException:  # as in `fly`
+        relay.recover()
+        raise
+    return taken(turns, course.exchange, course.result())
+
+
+def _brought(bus: Bus, course: Course) -> Any:
+    """Wait for the answer of what is in the air, and return what it means; `UNLIKE` where it has ended otherwise.
+
+    The caller pumps, and lets go of the lock.
+    """
+    turns, lock, link = course.turns, course.lock, bus.link
+    if bus.sleeps:
+        link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
+    arrived = link.read(course.deadline)
+    if len(arrived) == 1:
+        lock.acquire()  # let go of it below, or where the flight falls
+        at = link.now()
+        if at > course.deadline:  # a host that was held up takes it in late
+            at = course.deadline
+        if turns.aloft is course and at - course.sent_at >= course.least:
+            value = course.whole(arrived[0], at)
+            if value is not UNLIKE:
+                course.lands(arrived[0], at)
+                bus.relay.pumper = None
+                lock.release()
+                return value
+        lock.release()
+    if (value := gathered(bus, course, arrived)) is UNLIKE:
+        _astray(bus, course, arrived)
+    return value
 
 
 def _found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
@@ -143,7 +204,7 @@ def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
             moment = _thrown(bus, exchange)
             lock.release()
         except BaseException as error:
-            _fallen(bus, None, error)
+            _fallen(bus, _mine(bus, None), error)
             raise
     except BaseException:  # as in `fly`
         bus.relay.recover()
@@ -241,9 +302,8 @@ def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:
         relay.turn()
 
 
-def _fallen(bus: Bus, launched: Course | None, error: BaseException) -> None:
+def _fallen(bus: Bus, course: Course | None, error: BaseException) -> None:
     """The flight has ended by this: where the link is lost all learn it, and whatever happens the bus is let go."""
-    course = _mine(bus, launched)
     try:
         if isinstance(error, LinkError):
             with bus.turns.lock:

@@ -72,12 +72,7 @@ def _check(exchanges: Exchanges) -> None:
 def _flown(bus: Bus, burst: Exchanges, forgiven: tuple[type[Exception], ...], told: list[Any]) -> bool:
     """The straight way of an order and a question: are both over? What came of them is told then."""
     order, question = burst
-    if (
-        question.whole is None
-        or not order.sure
-        or order.replies != ()
-        or not isinstance(order.request, bytes)
-    ):
+    if question.whole is None or not rides(order):
         return False
     value: Any
     try:
@@ -90,6 +85,11 @@ def _flown(bus: Bus, burst: Exchanges, forgiven: tuple[type[Exception], ...], to
         return False
     told += (None, value)  # nothing comes of an order that is sure, but that it has left
     return True
+
+
+def rides(order: Exchange[Any]) -> bool:
+    """Whether this may leave in one write with a question, and nothing but its leaving comes of it."""
+    return order.sure and order.replies == () and isinstance(order.request, bytes)
 
 
 def _sent(bus: Bus, burst: Exchanges) -> list[Flight]:

@@ -12,7 +12,8 @@ from motorbus.bus.turns import Turns
 from motorbus.core.operation import CanFrame, Effect, Exchange, Rank
 from motorbus.errors import Interrupted, NoReply
 from motorbus.motion.command import Command
-from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
+from motorbus.motion.loop.cycle import Part, train_of
+from motorbus.motion.loop.errors import silence, stopped
 from motorbus.motion.loop.place import Place
 from motorbus.session.robot import Robot
 from tests.motion.machines import Heard, machine

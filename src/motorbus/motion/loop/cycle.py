@@ -17,16 +17,15 @@ from motorbus.core.family import Positions, Quality, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import (
     Faulted,
-    Interrupted,
     LimitExceeded,
     MotionError,
     MotorbusError,
-    NoReply,
     Overloaded,
 )
 from motorbus.motion import capabilities as single
 from motorbus.motion.capabilities import AxisVerbs, cap
 from motorbus.motion.command import Command
+from motorbus.motion.loop.errors import stopped
 from motorbus.motion.loop.place import Place
 from motorbus.motion.moving.forgiving import LOST
 from motorbus.motion.safety import canary
@@ -46,9 +45,10 @@ class Part:
 
     `origin` is what the clock of its link showed when that of the robot was at 0. Those who wait `exactly` burn the
     processor for the last bit. `command` is over those who are led; `refused` are those of the last orders that could
-    not be given, and stay where they are. While `unsure`, it may be that nobody knows where one of them is: `left_out`
-    are those whom the last orders left out for that, `doubts` has by name how far the last reading of those can be
-    believed for whom that is in question. A `watch` asks now and then, where there is time, how those fare who are led.
+    not be given, and stay where they are; `to` are the angles of the last orders (rad), by node. While `unsure`, it may
+    be that nobody knows where one of them is: `left_out` are those whom the last orders left out for that, `doubts` has
+    by name how far the last reading of those can be believed for whom that is in question. A `watch` asks now and then,
+    where there is time, how those fare who are led.
     """
 
     def __init__(
@@ -73,6 +73,7 @@ class Part:
         self.watch = watch
         self.unsure = False
         self.left_out: list[str] = []
+        self.to: dict[int, float] = {}
         self.doubts: dict[str, Quality] = {}
         self._sure: Final = TREMBLING + FASTEST * MARGIN * HALF * (places[0].period if places else 0.0)
 
@@ -99,10 +100,23 @@ class Part:
                     except LimitExceeded as error:
                         to[node] = place.stay()
                         self.refused.append(error)
+        self.to = to
+        return self.ordering(to)
+
+    def ordering(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
+        """The exchanges that order these angles (rad), by node. Raises RequestError as `orders`."""
         if not to:
             return ()
         guarded = self.command.guarded
         return [guarded(exchange) for exchange in self.train.goals(to)]
+
+    def withheld(self) -> list[str]:
+        """Take out of the last orders, which have not left, who cannot be believed since; their names."""
+        lost = [place for node, place in self.places.items() if place.unsure and node in self.to]
+        for place in lost:
+            del self.to[place.node]
+            place.left += 1
+        return [place.name for place in lost]
 
     def _of_some(self, periods: int) -> dict[int, float]:
         """The same while it may be that nobody knows where one is: those are left out, and the others go on."""
@@ -155,6 +169,13 @@ class Part:
 
         There is nothing to clean up, so an interruption is raised at once.
         """
+        self.await_slot(bus, moment)
+        told = volley(bus, (*orders, *self.reads), LOST, together=self.exactly)
+        self.ended = self.link.now() - self.origin
+        return told
+
+    def await_slot(self, bus: Bus, moment: float) -> None:
+        """Look how those fare who are due, where there is time, and wait for this moment: a cycle has `began` then."""
         link, begins = self.link, moment + self.origin
         if (watch := self.watch) is not None:
             now = link.now()
@@ -166,9 +187,6 @@ class Part:
                 bus.run(iter(pause))
             now = link.now()
         self.began = now - self.origin
-        told = volley(bus, (*orders, *self.reads), LOST, together=self.exactly)
-        self.ended = link.now() - self.origin
-        return told
 
     def _wait(self, moment: float) -> Iterator[Pause]:
         link = self.link
@@ -364,29 +382,9 @@ def train_of(bus: BusFace, axes: Sequence[AxisVerbs]) -> Operation[Train]:
     return train
 
 
-def stopped(names: Sequence[str]) -> Interrupted:
-    """The error for axes that somebody else has stopped, let go or told to move while they were led."""
-    return Interrupted(
-        f"{', '.join(names)}: stopped from elsewhere, so the loop gives no more goals",
-        cause="while the loop led it, it was stopped, held, let go or told to move by somebody else",
-        advice="set a new goal to lead it again; after an emergency stop, reset() first",
-    )
-
-
 def _kept(exchange: Exchange[Any]) -> Operation[Any]:
     """Its value, or the error by which it was lost; every other error is raised when all have ended."""
     found = yield from outcome(exchange)
     if isinstance(found, MotorbusError) and not isinstance(found, LOST):
         raise found
     return found
-
-
-def silence(names: Sequence[str], cycles: int, places: Mapping[str, Place], now: float) -> NoReply:
-    """The error for axes that have not been heard for so many cycles."""
-    ages = ", ".join(f"{name} for {now - places[name].heard:.3g} s" for name in names)
-    return NoReply(
-        f"{', '.join(names)}: no reading in {cycles} cycles of the loop",
-        expected="a position of each axis in each cycle",
-        cause=f"no power, a loose cable, or too much noise; silent: {ages}",
-        advice="see to that; the other axes were left where their goals are",
-    )

@@ -36,6 +36,8 @@ from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, 
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
+from motorbus.motion.loop.ahead import RoundsAhead
+from motorbus.motion.loop.errors import not_ahead
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
@@ -97,8 +99,9 @@ class LoopFace:
         exactly: bool = False,
         policy: Policy = "reject",
         watch: bool = True,
+        ahead: bool = False,
     ) -> None:
-        self._rounds = Rounds(
+        self._rounds = (RoundsAhead if ahead else Rounds)(
             body, rate, axes, direct=direct, jerk=jerk, exactly=exactly, policy=policy, watch=watch
         )
         self.goal = Goals(self._rounds)
@@ -153,6 +156,8 @@ class Loop(LoopFace):
         buses = [part.bus for part in self._rounds.parts.values()]
         if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
             self._rounds.only = buses[0]
+        elif isinstance(self._rounds, RoundsAhead):
+            raise not_ahead(list(self._rounds.parts))
         return self
 
     def __iter__(self) -> Self:
@@ -216,6 +221,7 @@ def blocking_loop(
     jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
+    ahead: bool = False,
 ) -> Loop:
     """A control loop of `rate` (Hz) over these axes, for a `with` and a `for` in it; see `motorbus.motion.loop`.
 
@@ -225,9 +231,15 @@ def blocking_loop(
     A goal that goes too far is refused; with the policy `clamp` it is brought to the nearest that is allowed, which is
     counted, and told as a `Clamped` event where it has not been lately. What is no finite number is refused always.
     While axes are led, each is asked now and then how it fares, where the wire is free for that; `watch=False` leaves
-    that out. Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
+    that out.
+
+    With `ahead` the loop is one cycle ahead of what it tells: while the body of the `for` is at work, the next cycle is
+    on the wire already, so the wire need not wait for the program, and a goal leaves a cycle later than it would. That
+    is for a loop near the limit of its wire, and for the axes of one serial bus.
+
+    Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
     """
-    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
+    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch, "ahead": ahead}
     return Loop(robot, robot.conductor, rate, axes, **how)
 
 

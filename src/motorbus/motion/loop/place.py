@@ -43,7 +43,7 @@ class Place:
     `asked` is the goal that was set and `sent` the position that was ordered last; None: none. `begun` is true once it
     has got torque here, and until then `claim` is the command over it from when its goal was set. `endures` is in how
     many cycles in a row it may be silent and is ordered all the same, `left` in how many it was not ordered. What is
-    brought within its limits is put into `clamps`.
+    brought within its limits is put into `clamps`. With a `lag` a goal is made by a reading so many cycles older.
     """
 
     __slots__ = (
@@ -86,6 +86,7 @@ class Place:
         direct: bool,
         jerk: float | None,
         policy: Policy = "reject",
+        lag: int = 0,
     ) -> None:
         spec = axis.spec
         found = limits.bounds(spec, device)
@@ -105,7 +106,7 @@ class Place:
         self._direct: Final = direct
         self._jerk: Final = jerk
         self._policy: Final = policy
-        self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1))
+        self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1 - lag))
         self._follower: Follower | None = None
         self._passed: float | None = None
         self.position = 0.0

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Quality
-from motorbus.motion.loop.cycle import silence
+from motorbus.motion.loop.errors import silence
 
 if TYPE_CHECKING:
     from motorbus.motion.loop.cycle import Part

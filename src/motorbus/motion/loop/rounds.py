@@ -12,7 +12,6 @@ gets no goal any more: who told it last has the command. So it is with two loops
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from math import isfinite
 from typing import Any, Final
 
 from motorbus.bus.pump import Bus
@@ -27,7 +26,8 @@ from motorbus.motion.clamping import Clamped, Policy, Tidings, check_policy
 from motorbus.motion.command import Command
 from motorbus.motion.limits import Device
 from motorbus.motion.loop.braking import Works, braked, latest, refusals
-from motorbus.motion.loop.cycle import Part, silence, stopped, train_of
+from motorbus.motion.loop.cycle import Part, train_of
+from motorbus.motion.loop.errors import as_number, check_loop, silence, stopped
 from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
 from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState, state_of
@@ -42,8 +42,11 @@ class Rounds:
     """The work of one loop over a machine; `exactly` as `Part` says.
 
     `places` and `statistics` are there once it has been entered; `only` is set by a blocking loop on the only bus there
-    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop.
+    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop. A goal is made
+    by readings that are `lag` cycles older than the last ones when it leaves.
     """
+
+    lag = 0
 
     def __init__(
         self,
@@ -57,7 +60,7 @@ class Rounds:
         policy: Policy = "reject",
         watch: bool = True,
     ) -> None:
-        _check(rate, direct, jerk)
+        check_loop(rate, direct, jerk)
         check_policy(policy)
         led, self.without = divided(body.chosen(axes))
         if not led:
@@ -143,7 +146,7 @@ class Rounds:
         return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
 
     def _place(self, axis: AxisVerbs, device: Device) -> Place:
-        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy)
+        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy, self.lag)
         place.clamps = self._clamps
         return place
 
@@ -183,7 +186,7 @@ class Rounds:
             known = ", ".join(self._led)
             why = "cannot be led" if name in self.without else "is not in this loop"
             raise RequestError(f"{name} {why}", expected=f"one of {known}", advice="nothing was sent")
-        return _number(name, goal)
+        return as_number(name, goal)
 
     def round(self) -> Generator[Abreast[Any], Any, LoopState]:
         """One cycle. Raises LimitExceeded for a goal that must not be sent: then nothing was, and it may go on.
@@ -295,35 +298,37 @@ class Rounds:
         self.statistics.begun += 1
 
     def _taken(self, told: Mapping[str, Any], moment: float, number: int) -> LoopState:
+        return self._state(told, self._heard(told, moment), number)
+
+    def _heard(self, told: Mapping[str, Any], moment: float) -> list[str]:
+        """Note what a cycle brought that was to begin at that moment; who was not heard. Raises what went wrong."""
         statistics = self.statistics
         statistics.cycles += 1
         parts = self.parts
-        if len(parts) == 1:
-            ((bus, part),) = parts.items()
-            first, last = part.began, part.ended
-            statistics.buses[bus].add(last - first)
-        else:
-            first = min([part.began for part in parts.values()])
-            last = max([part.ended for part in parts.values()])
-            for bus, part in parts.items():
-                statistics.buses[bus].add(part.ended - part.began)
+        for bus, part in parts.items():
+            statistics.buses[bus].add(part.ended - part.began)
+        first = min([part.began for part in parts.values()])
+        last = max([part.ended for part in parts.values()])
         statistics.lateness.add(max(0.0, first - moment))
         statistics.cycle.add(last - first)
         missing: list[str] = []
-        failed = refused = False
+        failed = False
         for bus, part in parts.items():
             found = told[bus]
             if isinstance(found, MotorbusError):
                 failed = True
             else:
                 missing += part.take(found)
-            if part.refused:
-                refused = True
         if failed:
             self._fail(told)
-        state = state_of(parts, told, self._all, missing, last, number, statistics)
-        if refused:
-            settled(refusals(parts))
+        return missing
+
+    def _state(self, told: Mapping[str, Any], missing: list[str], number: int) -> LoopState:
+        """What is told of a cycle. Raises LimitExceeded for who is held back, NoReply for who is silent too long."""
+        parts = self.parts
+        last = max([part.ended for part in parts.values()])
+        state = state_of(parts, told, self._all, missing, last, number, self.statistics)
+        settled(refusals(parts))
         return state
 
     def _fail(self, told: Mapping[str, Any]) -> None:
@@ -369,28 +374,6 @@ class Rounds:
             )
 
 
-def _check(rate: float, direct: bool, jerk: float | None) -> None:
-    """Raise RequestError for what cannot be."""
-    if not (isfinite(rate) and rate > 0):
-        raise RequestError(
-            f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
-        )
-    if direct and jerk is not None:
-        raise RequestError(
-            "jerk is said of goals that are sent as they are",
-            expected="jerk, or direct=True",
-            advice="leave direct out; nothing was sent",
-        )
-
-
 def _reported(events: Iterable[Clamped]) -> Operation[None]:
     for event in events:
         yield from Report(event)
-
-
-def _number(name: str, goal: object) -> float:
-    if isinstance(goal, bool) or not isinstance(goal, int | float):
-        raise RequestError(
-            f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent"
-        )
-    return float(goal)

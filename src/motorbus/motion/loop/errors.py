@@ -1,0 +1,69 @@
+"""What a loop says went wrong: it was asked for what cannot be, somebody else has the command, nobody was heard."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from motorbus.errors import Interrupted, NoReply, RequestError
+
+if TYPE_CHECKING:
+    from motorbus.motion.loop.place import Place
+
+
+def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
+    """Raise RequestError for what cannot be."""
+    if not (isfinite(rate) and rate > 0):
+        raise RequestError(
+            f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
+        )
+    if direct and jerk is not None:
+        raise RequestError(
+            "jerk is said of goals that are sent as they are",
+            expected="jerk, or direct=True",
+            advice="leave direct out; nothing was sent",
+        )
+
+
+def as_number(name: str, goal: object) -> float:
+    if isinstance(goal, bool) or not isinstance(goal, int | float):
+        raise RequestError(
+            f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent"
+        )
+    return float(goal)
+
+
+def not_ahead(buses: Sequence[str]) -> RequestError:
+    """The error for a loop that cannot be a cycle ahead on these buses."""
+    return RequestError(
+        "this loop cannot be a cycle ahead",
+        expected="axes of one serial bus",
+        cause=f"these are on {', '.join(buses)}: "
+        + (
+            "each bus waits for itself"
+            if len(buses) > 1
+            else "there the answers of several are awaited at once"
+        ),
+        advice="leave ahead out, or make a loop of its own for the axes of one serial bus; nothing was ordered",
+    )
+
+
+def stopped(names: Sequence[str]) -> Interrupted:
+    """The error for axes that somebody else has stopped, let go or told to move while they were led."""
+    return Interrupted(
+        f"{', '.join(names)}: stopped from elsewhere, so the loop gives no more goals",
+        cause="while the loop led it, it was stopped, held, let go or told to move by somebody else",
+        advice="set a new goal to lead it again; after an emergency stop, reset() first",
+    )
+
+
+def silence(names: Sequence[str], cycles: int, places: Mapping[str, Place], now: float) -> NoReply:
+    """The error for axes that have not been heard for so many cycles."""
+    ages = ", ".join(f"{name} for {now - places[name].heard:.3g} s" for name in names)
+    return NoReply(
+        f"{', '.join(names)}: no reading in {cycles} cycles of the loop",
+        expected="a position of each axis in each cycle",
+        cause=f"no power, a loose cable, or too much noise; silent: {ages}",
+        advice="see to that; the other axes were left where their goals are",
+    )
