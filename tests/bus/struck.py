@@ -5,9 +5,11 @@ Status packets that begin at the same moment reach the host as one delivery, as 
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 from motorbus.bus.course import Course
+from motorbus.bus.loosed import Loosed
 from motorbus.bus.pump import Bus
 from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.operation import UNLIKE, Data, Due, Exchange, Goal, Unlike
@@ -149,6 +151,20 @@ AIM = Aim((1, 2), _goals, never_refused)
 def order() -> Aimed:
     """What a control loop sends two nodes, and nobody answers."""
     return Aimed(wire.sync_write(42, [(1, b"\x07\x00"), (2, b"\x07\x00")]), AIM, (7, 7))
+
+
+def passing(_: Any) -> bool:
+    return True
+
+
+def one_behind_the_other(bus: Bus, read: Any) -> Any:
+    """Two volleys, of which the second leaves right behind the answer to the first where it can."""
+    volley = Loosed(bus, (order(), read))
+    behind = volley.behind((order(),), -inf, passing)
+    told = volley.land(behind)
+    if behind is None or behind.at is None:
+        volley = Loosed(bus, (order(), read))
+    return told, volley.land()
 
 
 def struck_bus(**options: Any) -> tuple[Bus, Train, Struck]:

@@ -8,15 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.bus import pump, volley
+from motorbus.bus import loosed, pump, volley
+from motorbus.bus.loosed import Loosed
 from motorbus.bus.pump import Bus
 from motorbus.bus.trust import GROUP_RUN
 from motorbus.core.operation import UNLIKE, Answer, Operation, Tune, Unlike
 from motorbus.errors import MotorbusError
 from tests.bus.responder import position
-from tests.bus.struck import FAULTS, Landings, kept, order, struck_bus
+from tests.bus.struck import FAULTS, Landings, kept, one_behind_the_other, order, passing, struck_bus
 
 Step = tuple[str, str, float]
+VOLLEYS = ("volley group", "volley one", "loosed group", "loosed one", "behind group", "behind one")
 READS = {
     "one": (1,),
     "two": (2,),
@@ -75,6 +77,11 @@ def carried_out(steps: list[Step], *, looks: bool = False) -> Any:
             told.append(said(lambda: bus.run(order())))
         elif what.startswith("volley"):
             told.append(said(lambda read=what[7:]: bus.volley(order(), reads[read])))
+        elif what.startswith("loosed"):
+            told.append(said(lambda read=what[7:]: Loosed(bus, (order(), reads[read])).land()))
+        elif what.startswith("behind"):
+            bus.turns.passes = passing
+            told.append(said(lambda read=what[7:]: one_behind_the_other(bus, reads[read])))
         else:
             told.append(said(lambda what=what: bus.run(reads[what])))
         bus.link.advance(rest)  # type: ignore[attr-defined]
@@ -87,11 +94,16 @@ def never(*_: Any) -> Unlike:
     return UNLIKE
 
 
+def nothing(*_: Any) -> None:
+    return None
+
+
 def usually(steps: list[Step], **options: Any) -> Any:
     """The same without the straight way."""
     with pytest.MonkeyPatch.context() as patch:
         for module, name in ((pump, "fly"), (pump, "cast"), (volley, "fly")):
             patch.setattr(module, name, never)
+        patch.setattr(loosed, "loose", nothing)
         return carried_out(steps, **options)
 
 
@@ -102,7 +114,7 @@ def compare(steps: list[Step], **options: Any) -> None:
 
 STEPS = st.lists(
     st.tuples(
-        st.sampled_from((*READS, *READS, "plain", "look, cast", "volley group", "volley one", "volley far")),
+        st.sampled_from((*READS, *READS, "plain", "look, cast", *VOLLEYS, "volley far")),
         st.sampled_from(("",) * 2 * len(FAULTS) + FAULTS),
         st.sampled_from((0.0, 0.0, 0.001, 0.1)),
     ),
@@ -121,7 +133,7 @@ def test_both_ways_are_the_same_whenever_somebody_looks(steps: list[Step]) -> No
     compare(steps, looks=True)
 
 
-CLEAN = st.lists(st.sampled_from((*READS, "cast", "volley group", "volley one")), min_size=1, max_size=12)
+CLEAN = st.lists(st.sampled_from((*READS, "cast", *VOLLEYS)), min_size=1, max_size=12)
 
 
 @given(CLEAN, st.integers(1, 3 * GROUP_RUN))
@@ -138,6 +150,8 @@ def test_loops_of_groups_and_single_ones_are_the_same(cycle: list[str], cycles: 
         ("two", "group", "five"),
         ("group", "one", "disjoint", "five", "inside"),
         ("volley group", "volley far", "one"),
+        ("loosed group", "loosed far", "one"),
+        ("behind group",),
     ],
 )
 def test_groups_go_straight_and_take_turns_with_their_other_form(
@@ -149,7 +163,7 @@ def test_groups_go_straight_and_take_turns_with_their_other_form(
     reads = [what for what in cycle if what != "cast"] * 3 * GROUP_RUN
     # The first of a kind may find that the bus has still to be looked at.
     assert len(landings.ids) >= len(reads) - len(set(cycle)) - 2
-    groups = [what for what in reads if len(READS[what.removeprefix("volley ")]) > 1]
+    groups = [what for what in reads if len(READS[what.split()[-1]]) > 1]
     assert len(landings.groups) >= len(groups) - len(set(cycle)) - 2
     assert {8, 9} <= set(landings.lengths)
     before = len(landings.ids)
@@ -212,7 +226,7 @@ def test_the_same_at_length(rounds: Any) -> None:
 
     random = Random(10)
     for _ in range(rounds(20_000, 20)):
-        names = random.choices((*READS, "plain", "look, cast", "volley group"), k=4)
+        names = random.choices((*READS, "plain", "look, cast", "volley group", *VOLLEYS[2:]), k=4)
         faults = ("",) * 4 * len(FAULTS) + FAULTS
         compare(
             [(random.choice(names), random.choice(faults), random.choice((0.0, 0.03))) for _ in range(60)]

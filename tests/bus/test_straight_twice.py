@@ -41,7 +41,7 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list
     for node in nodes:
         simulator.memory[node][57] = 99
     value = in_another_thread(lambda: bus.run(exchange))
-    value = value if value[0] else bus.run(exchange)  # a group says that they are missing, and does not wait
+    value = bus.run(exchange) if value[1] else value  # a group says that they are missing, and does not wait
     if value != ([(node, 0, node, 99) for node in nodes], ()):
         wrong.append(f"a wrong value: {value}")
     if bus.run(position(6)) != 6:

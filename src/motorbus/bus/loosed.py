@@ -1,15 +1,16 @@
 """A volley in two halves: goals and question leave, and whoever let them go does something else until the answer is in.
 
-A control loop that has been told its next goals before the answer to the last question is in wastes no time on the
-wire. Only what goes straight can be halved so; whatever is otherwise is over when it has been let loose.
+A control loop that knows its next goals before the answer to the last question is in wastes no time on the wire: they
+leave `Behind` that answer, before anything else is done. Only what goes straight can be halved so; whatever is
+otherwise is over when it has been let loose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from motorbus.bus.straight import land, loose
+from motorbus.bus.straight import foreseen, land, loose
 from motorbus.bus.volley import rides, volley
 from motorbus.core.operation import Exchange
 from motorbus.errors import LinkError
@@ -19,6 +20,24 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
 
 Forgiven = tuple[type[Exception], ...]
+
+
+class Behind:
+    """An order that may leave right behind an answer, with the same question again.
+
+    Not before `begins` (s on the link's clock), and only if that answer `fits`, which is asked of what it means. It was
+    judged when it was made, by what was known then. `at` is when it has left, None where it has not; its `course` is
+    that of the question.
+    """
+
+    __slots__ = ("at", "begins", "course", "fits", "order")
+
+    def __init__(self, order: Exchange[Any], begins: float, fits: Callable[[Any], bool]) -> None:
+        self.order = order
+        self.begins = begins
+        self.fits = fits
+        self.at: float | None = None
+        self.course: Course | None = None
 
 
 class Loosed:
@@ -37,17 +56,32 @@ class Loosed:
         if self._course is None:
             self._told = volley(bus, exchanges, forgiven)
 
-    def land(self) -> list[Any]:
-        """The value of each, or the error where it is forgiven. Waits for the answer. Raises the error that is not."""
-        course, self._course = self._course, None
-        if course is not None:
-            try:
-                self._told.append(land(self._bus, course))
-            except LinkError:
-                raise
-            except self._forgiven as error:
-                self._told.append(error)
-        return self._told
+    def behind(
+        self, orders: Sequence[Exchange[Any]], begins: float, fits: Callable[[Any], bool]
+    ) -> Behind | None:
+        """These, ready to leave right behind the answer; None where they cannot, or it is not sure that they may."""
+        if self._course is None or len(orders) != 1 or not rides(orders[0]):
+            return None
+        return Behind(orders[0], begins, fits) if foreseen(self._bus, orders[0]) else None
+
+    def land(self, behind: Behind | None = None) -> list[Any]:
+        """The value of each, or the error where it is forgiven. Waits for the answer. Raises the error that is not.
+
+        Where something has left `behind` it, that is what lands here next.
+        """
+        course, told = self._course, self._told
+        if course is None:
+            return told
+        self._course = None
+        try:
+            told = [*told, land(self._bus, course, behind)]
+        except LinkError:
+            raise
+        except self._forgiven as error:
+            return [*told, error]
+        if behind is not None and behind.course is not None:
+            self._course, self._told = behind.course, [None]
+        return told
 
 
 def _gone(bus: Bus, exchanges: Sequence[Exchange[Any]]) -> Course | None:

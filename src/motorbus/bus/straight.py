@@ -23,6 +23,7 @@ from motorbus.core.operation import UNLIKE, Answer, Data, Exchange, Rank, Unlike
 from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
+    from motorbus.bus.loosed import Behind
     from motorbus.bus.pump import Bus
     from motorbus.bus.turns import Turns
     from motorbus.link.base import Link
@@ -99,8 +100,28 @@ def loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None)
         raise
 
 
-def land(bus: Bus, course: Course) -> Any:
-    """Wait for the answer of what was let `loose` on this bus, and return its value. Raises what `Bus.run` does."""
+def foreseen(bus: Bus, order: Exchange[Any]) -> bool:
+    """Whether this may surely leave, by what is known while an answer is on its way; it is noted as given then."""
+    lock = bus.turns.lock
+    try:
+        try:
+            lock.acquire()
+            found = _is_sure(bus.turns, order)
+            lock.release()
+        except BaseException:
+            bus.relay.recover()
+            raise
+    except BaseException:  # as in `fly`
+        bus.relay.recover()
+        raise
+    return found
+
+
+def land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
+    """Wait for the answer of what was let `loose` on this bus, and return its value. Raises what `Bus.run` does.
+
+    Where it comes straight, what is to leave `behind` it does so before anything else is done.
+    """
     turns, relay, lock = bus.turns, bus.relay, bus.turns.lock
     try:
         try:
@@ -109,7 +130,7 @@ def land(bus: Bus, course: Course) -> Any:
                 relay.pumper = get_ident()
             lock.release()
             if relay.pumper == get_ident():
-                value = _brought(bus, course)
+                value = _brought(bus, course, behind)
                 if value is not UNLIKE:
                     return value
             while not course.done:  # others have made a usual flight of it
@@ -123,10 +144,10 @@ def land(bus: Bus, course: Course) -> Any:
     return taken(turns, course.exchange, course.result())
 
 
-def _brought(bus: Bus, course: Course) -> Any:
+def _brought(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
     """Wait for the answer of what is in the air, and return what it means; `UNLIKE` where it has ended otherwise.
 
-    The caller pumps, and lets go of the lock.
+    The caller pumps, and lets go of the lock. What has left `behind` it is in the air then, and nobody pumps.
     """
     turns, lock, link = course.turns, course.lock, bus.link
     if bus.sleeps:
@@ -141,6 +162,8 @@ def _brought(bus: Bus, course: Course) -> Any:
             value = course.whole(arrived[0], at)
             if value is not UNLIKE:
                 course.lands(arrived[0], at)
+                if behind is not None and at >= behind.begins and behind.fits(value):
+                    _follow(bus, course, behind)
                 bus.relay.pumper = None
                 lock.release()
                 return value
@@ -148,6 +171,28 @@ def _brought(bus: Bus, course: Course) -> Any:
     if (value := gathered(bus, course, arrived)) is UNLIKE:
         _astray(bus, course, arrived)
     return value
+
+
+def _follow(bus: Bus, last: Course, behind: Behind) -> None:
+    """This order and the same question leave right behind an answer, where nothing is against it."""
+    turns, link = last.turns, bus.link
+    course: Course | None = last.holder.course
+    if course is None or turns.flying or turns.chores or turns.trace.subscriptions:
+        return
+    if course.first.length == course.length and course.first.run >= course.most:
+        course = course.twin
+    if course.era != turns.lock.era and not course.fits():
+        return
+    order = behind.order
+    if order.refusal is not None and order.refusal(turns.known.stops) is not None:
+        return
+    now = link.now()
+    if (turns.free_at > now and turns.takes_time) or _stale(turns, link):
+        return
+    _noted(turns, order, now)
+    course.wake = bus.relay.wake
+    _off(bus, course, order, now)
+    behind.at, behind.course = now, course
 
 
 def _found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
@@ -175,22 +220,28 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
         now, free = link.now(), turns.free_at
         if bus.relay.pumper is not None or (free > now and turns.takes_time) or _stale(turns, link):
             return None
-        start, request = free if free > now else now, course.request
-        if ahead is not None:
-            if not _may_leave(turns, ahead, now):
-                return None
-            turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
-            request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
-        # an answer cannot come before its question has passed, which does so behind what is ahead of it
-        course.sent_at = start if turns.takes_time else now
-        course.deadline = start + course.wait
-        lock.owing, bus.relay.pumper = True, get_ident()
-        turns.aloft = turns.flying[course.lane] = course
-        turns.echo.recent.append(course.request)  # type: ignore[arg-type]
-        link.write(request)
+        if ahead is not None and not _may_leave(turns, ahead, now):
+            return None
+        _off(bus, course, ahead, now)
         return course
     finally:
         lock.release()
+
+
+def _off(bus: Bus, course: Course, ahead: Exchange[Any] | None, now: float) -> None:
+    """This leaves, with what is ahead of it, and may. The caller holds the lock."""
+    turns, free = course.turns, course.turns.free_at
+    start, request = free if free > now else now, course.request
+    if ahead is not None:
+        turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
+        request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
+    # an answer cannot come before its question has passed, which does so behind what is ahead of it
+    course.sent_at = start if turns.takes_time else now
+    course.deadline = start + course.wait
+    turns.lock.owing, bus.relay.pumper = True, get_ident()
+    turns.aloft = turns.flying[course.lane] = course
+    turns.echo.recent.append(course.request)  # type: ignore[arg-type]
+    bus.link.write(request)
 
 
 def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
@@ -249,16 +300,25 @@ def usual(bus: Bus, exchange: Exchange[T]) -> T:
 
 def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
     """Note that this leaves, which nobody answers; False where it must not, or something has to be asked before."""
-    if exchange.effect or exchange.goals or exchange.later is not None:
-        if not _is_sure(turns, exchange) and not _admitted(turns, exchange):
-            return False
+    if _matters(exchange) and not _is_sure(turns, exchange) and not _admitted(turns, exchange):
+        return False
+    _noted(turns, exchange, now)
+    return True
+
+
+def _matters(exchange: Exchange[Any]) -> bool:
+    return bool(exchange.effect or exchange.goals or exchange.later is not None)
+
+
+def _noted(turns: Turns, exchange: Exchange[Any], now: float) -> None:
+    """This leaves, which nobody answers, and may."""
+    if _matters(exchange):
         if exchange.aim in turns.aims:
             turns.aims[exchange.aim] = now
         else:
             turns.orders(exchange, now)
     turns.statistics.other["sent"] += 1
     turns.echo.recent.append(exchange.request)  # type: ignore[arg-type]  # bytes, as the bus is calm
-    return True
 
 
 def _is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:

@@ -13,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
 
-from motorbus.bus.loosed import Loosed
+from motorbus.bus.loosed import Behind, Loosed
 from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.loop.braking import Works
+from motorbus.motion.loop.grid import Grid
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
 from motorbus.motion.moving.forgiving import LOST
@@ -36,14 +37,15 @@ class RoundsAhead(Rounds):
 
     lag = 1
     _air: Air | None = None
+    _missing: list[str] | None = None
 
     def round(self) -> Generator[Abreast[Any], Any, LoopState]:
         """One cycle leaves, and it is told what the one before it brought. Raises as `Rounds.round`.
 
         At first, for torque, and after an error it is one cycle that leaves and is told, and another one that leaves.
         """
-        air = self._air
-        if air is None or self._fresh:
+        air, grid = self._air, self._grid
+        if air is None or grid is None or self._fresh:
             self._come_down()
             state = yield from super().round()
             self._judge(1)
@@ -51,17 +53,14 @@ class RoundsAhead(Rounds):
             self._stepped += 1
             self._leave(self._believed(orders))
             return state
-        grid, now = self._grid, self.now
-        assert grid is not None
+        now = self.now
         slot = grid.upcoming(now)
         periods = max(1, slot - self._stepped)
         self._judge(periods)
         if self._clamps:
             yield from self._tell_clamps(now)
         orders, self._stepped = self._orders(periods), slot
-        told = self._landed(air)
-        missing = self._heard(told, air.moment)
-        self._leave(self._believed(orders))
+        told, missing = self._relayed(air, grid, orders)
         return self._state(told, missing, air.number)
 
     def leaving(self) -> Works:
@@ -71,20 +70,48 @@ class RoundsAhead(Rounds):
         finally:
             yield from super().leaving()
 
+    def _relayed(
+        self, air: Air, grid: Grid, orders: dict[str, Sequence[Exchange[Any]]]
+    ) -> tuple[dict[str, Any], list[str]]:
+        """What is in the air comes down, and the next cycle leaves: at once, where its slot has begun by then."""
+        ((bus, part),) = self.parts.items()
+        self._missing = None
+        behind = None
+        if part.watch is None or part.watch.due(part.link.now(), 0.0) is None:
+            behind = air.volley.behind(orders[bus], grid.begins(grid.number + 1) + part.origin, self._fits)
+        told = self._landed(air, behind)
+        self._count(air.moment)
+        missing = self._heard(told) if self._missing is None else self._missing
+        if behind is None or behind.at is None:
+            self._leave(self._believed(orders))
+        else:
+            part.began = behind.at - part.origin
+            moment = grid.take(part.began)
+            self._air = Air(grid.number, moment, air.volley)
+        return told, missing
+
+    def _fits(self, found: Any) -> bool:
+        """Note this reading; whether everybody may be ordered who was before it."""
+        (part,) = self.parts.values()
+        self._missing = part.take((found,))
+        return not part.unsure
+
     def _come_down(self) -> None:
         if self._air is not None:
             moment = self._air.moment
-            self._heard(self._landed(self._air), moment)
+            told = self._landed(self._air)
+            self._count(moment)
+            self._heard(told)
 
-    def _landed(self, air: Air) -> dict[str, Any]:
+    def _landed(self, air: Air, behind: Behind | None = None) -> dict[str, Any]:
         ((bus, part),) = self.parts.items()
         self._air = None
         found: Any
         try:
-            found = air.volley.land()
+            found = air.volley.land(behind)
         except MotorbusError as failure:
             found = failure
-        part.ended = part.now
+        part.ended = part.now if behind is None or behind.at is None else behind.at - part.origin
         return {bus: found}
 
     def _believed(self, orders: dict[str, Sequence[Exchange[Any]]]) -> Sequence[Exchange[Any]]:

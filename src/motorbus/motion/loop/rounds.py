@@ -298,22 +298,25 @@ class Rounds:
         self.statistics.begun += 1
 
     def _taken(self, told: Mapping[str, Any], moment: float, number: int) -> LoopState:
-        return self._state(told, self._heard(told, moment), number)
+        self._count(moment)
+        return self._state(told, self._heard(told), number)
 
-    def _heard(self, told: Mapping[str, Any], moment: float) -> list[str]:
-        """Note what a cycle brought that was to begin at that moment; who was not heard. Raises what went wrong."""
-        statistics = self.statistics
+    def _count(self, moment: float) -> None:
+        """A cycle is over that was to begin at that moment."""
+        statistics, parts = self.statistics, self.parts.values()
         statistics.cycles += 1
-        parts = self.parts
-        for bus, part in parts.items():
+        for bus, part in self.parts.items():
             statistics.buses[bus].add(part.ended - part.began)
-        first = min([part.began for part in parts.values()])
-        last = max([part.ended for part in parts.values()])
+        first = min([part.began for part in parts])
+        last = max([part.ended for part in parts])
         statistics.lateness.add(max(0.0, first - moment))
         statistics.cycle.add(last - first)
+
+    def _heard(self, told: Mapping[str, Any]) -> list[str]:
+        """Note what a cycle brought; who was not heard. Raises what went wrong."""
         missing: list[str] = []
         failed = False
-        for bus, part in parts.items():
+        for bus, part in self.parts.items():
             found = told[bus]
             if isinstance(found, MotorbusError):
                 failed = True
