@@ -6,6 +6,7 @@ turns in the usual way meanwhile finds it taken in, as the pieces of any other f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from motorbus.bus.course import Course
@@ -14,9 +15,12 @@ from motorbus.core.operation import UNLIKE, Data
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
 
+Then = Callable[[Any, float], None]
+"""Is told what an answer means, and when it was there (s), as soon as it has landed."""
 
-def gathered(bus: Bus, course: Course, arrived: list[Data]) -> Any:
-    """Wait for the rest of the answer that has begun to come, and return what it means.
+
+def gathered(bus: Bus, course: Course, arrived: list[Data], then: Then | None = None) -> Any:
+    """Wait for the rest of the answer that has begun to come, and return what it means; `then` is done before that.
 
     `UNLIKE` when it is none as it should be, or does not come: then `arrived` is what is not taken in yet. Raises
     LinkError; the caller lets go of the lock.
@@ -28,7 +32,7 @@ def gathered(bus: Bus, course: Course, arrived: list[Data]) -> Any:
             arrived.clear()
             if last < course.length:  # the last packet came in pieces
                 arrived += link.read(link.now() + course.settle)
-            return UNLIKE if arrived else _meant(bus, course)
+            return UNLIKE if arrived else _meant(bus, course, then)
         arrived[:] = link.read(course.deadline)
     return UNLIKE
 
@@ -44,7 +48,7 @@ def keeps(course: Course, arrived: list[Data], at: float) -> bool:
     return kept
 
 
-def _meant(bus: Bus, course: Course) -> Any:
+def _meant(bus: Bus, course: Course, then: Then | None) -> Any:
     """What the answer means of which all pieces have come."""
     lock, value = course.lock, UNLIKE
     lock.acquire()
@@ -55,6 +59,8 @@ def _meant(bus: Bus, course: Course) -> Any:
         if value is not UNLIKE:
             course.held = []  # first, or after an interrupt in between they would be those of the next flight
             course.lands(data, at)
+            if then is not None:
+                then(value, at)
             bus.relay.pumper = None
     lock.release()
     return value

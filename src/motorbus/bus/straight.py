@@ -11,6 +11,7 @@ Here microseconds count, so what elsewhere would be three functions is one.
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -162,19 +163,22 @@ def _brought(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
             value = course.whole(arrived[0], at)
             if value is not UNLIKE:
                 course.lands(arrived[0], at)
-                if behind is not None and at >= behind.begins and behind.fits(value):
-                    _follow(bus, course, behind)
+                if behind is not None:
+                    _follow(bus, course, behind, value, at)
                 bus.relay.pumper = None
                 lock.release()
                 return value
         lock.release()
-    if (value := gathered(bus, course, arrived)) is UNLIKE:
+    then = None if behind is None else partial(_follow, bus, course, behind)
+    if (value := gathered(bus, course, arrived, then)) is UNLIKE:
         _astray(bus, course, arrived)
     return value
 
 
-def _follow(bus: Bus, last: Course, behind: Behind) -> None:
-    """This order and the same question leave right behind an answer, where nothing is against it."""
+def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
+    """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
+    if at < behind.begins or not behind.fits(value):
+        return
     turns, link = last.turns, bus.link
     course: Course | None = last.holder.course
     if course is None or turns.flying or turns.chores or turns.trace.subscriptions:

@@ -11,11 +11,12 @@ any other loop. Goals that were made ready for somebody who was not heard then, 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from motorbus.bus.loosed import Behind, Loosed
 from motorbus.core.operation import Exchange
-from motorbus.errors import MotorbusError
+from motorbus.errors import Interrupted, MotorbusError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.loop.braking import Works
 from motorbus.motion.loop.grid import Grid
@@ -56,7 +57,14 @@ class RoundsAhead(Rounds):
         now = self.now
         slot = grid.upcoming(now)
         periods = max(1, slot - self._stepped)
-        self._judge(periods)
+        try:
+            self._judge(periods)
+        except (
+            Interrupted
+        ):  # whoever has stopped them may have ended the question too, which is not told once more
+            with suppress(MotorbusError):
+                self._come_down()
+            raise
         if self._clamps:
             yield from self._tell_clamps(now)
         orders, self._stepped = self._orders(periods), slot
