@@ -25,7 +25,7 @@ from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
-from motorbus.simulation.faulted import Faulted
+from motorbus.simulation.faulted import SCHEMA, Faulted
 from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
@@ -57,7 +57,8 @@ turns on 2.5 s after power-on.
 --faults takes a script of what goes wrong, one fault a line or between
 semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
 corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
-happened is said on stderr, and at the end how to have it again.
+happened is said on stderr, and at the end how to have it again and which
+of them have not happened.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
@@ -159,6 +160,8 @@ def simulate(
         buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
         _ready(output, buses, family, sorted(simulator.nodes), ids)
         _serve(mount, stop, faulted, None if quiet else output)
+        if faulted.used:
+            output.document(SCHEMA, faulted.facts())
     return Exit.OK
 
 
@@ -187,17 +190,20 @@ def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> 
         mount.serve(stop)
         return
     remarks = Remarks(mount.simulator)
-    if faulted.script.by_chance:
-        output.note(f"faults: seed {faulted.script.seed}")
+    _note(output, faulted.news())
     while not mount.step(stop):
         now = time.monotonic()
-        for line in (*remarks.lines(now), *faulted.remarks(now)):
-            output.note(line)
+        _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
     now = time.monotonic()
-    for line in (*remarks.lines(now), *faulted.remarks(now), *remarks.rest(), *faulted.rest()):
+    _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
+    _note(
+        output, (*remarks.rest(), *faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened())
+    )
+
+
+def _note(output: Output, lines: Iterable[str]) -> None:
+    for line in lines:
         output.note(line)
-    if said := faulted.replay():
-        output.note(said)
 
 
 def _scripted(simulator: object, path: Path | None, family: str) -> None:
