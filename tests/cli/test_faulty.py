@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
+from motorbus.cli import faulty
 from motorbus.cli.exits import Exit
-from motorbus.cli.faulty import script_of
+from motorbus.cli.faulty import MOST, script_of
 from motorbus.errors import RequestError
 from motorbus.simulation.faults import WORDS, parse
 from tests.cli.conftest import Run
@@ -36,6 +41,66 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     assert len(script_of(long)) == 1000
     with pytest.raises(RequestError, match="neither a file nor a script"):
         script_of("\0")
+
+
+def test_a_file_without_end_is_not_read_to_its_end(tmp_path: Path) -> None:
+    file = tmp_path / "noise"
+    line = b"exchange 1: drop # " + b"x" * (MOST // 1000) + b"\n"
+    whole = line * (MOST // len(line))
+    file.write_bytes(whole + b"#" * (MOST - len(whole)))
+    assert len(script_of(str(file))) == MOST // len(line)
+    with file.open("ab") as script:
+        script.truncate(1 << 40)  # a hole: it takes no room, and reading it all would take hours
+    with pytest.raises(RequestError, match=r"at most 1,048,576 bytes"):
+        script_of(str(file))
+
+
+@contextmanager
+def piped(pipe: Path, *pieces: bytes) -> Iterator[None]:
+    """Somebody writes this into a pipe, and closes it."""
+
+    def write() -> None:
+        with suppress(BrokenPipeError), pipe.open("wb", buffering=0) as end:
+            for piece in pieces:
+                end.write(piece)
+
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=write)
+    writer.start()
+    yield
+    writer.join()
+
+
+def test_a_pipe_is_as_good_as_a_file(tmp_path: Path) -> None:
+    with piped(tmp_path / "pipe", b"seed 3; exchange 1: ", b"drop\n", b"exchange 2: drop"):
+        assert script_of(str(tmp_path / "pipe")) == parse("seed 3; exchange 1: drop; exchange 2: drop")
+
+
+def test_a_pipe_that_says_too_much_is_not_read_to_its_end(tmp_path: Path) -> None:
+    with (
+        piped(tmp_path / "pipe", b"#" * MOST, b"#"),
+        pytest.raises(RequestError, match="at most 1,048,576 bytes"),
+    ):
+        script_of(str(tmp_path / "pipe"))
+
+
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for_without_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(faulty, "PATIENCE", 0.01)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RequestError, match=r"nothing has come out of this pipe for 0\.01 s"):
+        script_of(str(tmp_path / "pipe"))
+    holder = os.open(tmp_path / "pipe", os.O_RDWR)  # there is a writer, and it says nothing
+    os.write(holder, b"exchange 1: drop")
+    with pytest.raises(RequestError, match="nothing has come out of this pipe"):
+        script_of(str(tmp_path / "pipe"))
+    os.close(holder)
+
+
+def test_a_device_is_not_opened_for_a_script() -> None:
+    with pytest.raises(RequestError, match="neither a file nor a script"):
+        script_of("/dev/zero")
 
 
 def test_help_lists_every_word(run: Run) -> None:

@@ -281,11 +281,11 @@ def test_what_has_happened_once_is_no_longer_named() -> None:
             assert "1 exchange was seen" in hall.faulted.unhappened()[0]
             asked(client.fileno(), PING, 6)
             asked(client.fileno(), PING, 6)
-        assert hall.faulted.unhappened() == [
-            "faults: `exchange 2 byte 9: drop` has not happened"
-            " (exchange 2 has passed, and nothing was in it that this could change)",
-            "faults: `1e-09%: drop` has not happened (3 exchanges were seen)",
-        ]
+        passed, seen = hall.faulted.unhappened()
+        assert passed.startswith(
+            "faults: `exchange 2 byte 9: drop` has not happened (exchange 2 has passed, and"
+        )
+        assert seen == "faults: `1e-09%: drop` has not happened (3 exchanges were seen)"
         assert hall.faulted.facts()["never"] == ["1e-09%: drop"]
 
 

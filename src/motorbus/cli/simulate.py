@@ -55,8 +55,9 @@ The file of --inputs has one change on each line, as "2.5 1 on": input 1
 turns on 2.5 s after power-on.
 
 --faults takes a script of what goes wrong, one fault a line or between
-semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
-corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
+semicolons, or a file or a pipe with one, of 1 MiB at most: `exchange 17
+byte 3: drop`, `1% of bytes: corrupt`, `at 2.5 s: unplug 0.5`. `--faults
+help` lists all of them. A pipe that is silent for 10 s is an error. What
 happened is said on stderr, and at the end how to have it again and which
 of them have not happened.
 
@@ -80,7 +81,7 @@ Flag = Annotated[bool, Parameter(negative="")]
 Inputs = Annotated[
     Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
 ]
-Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file with one, or help.")]
+Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file or pipe with one, or help.")]
 Switched = Annotated[
     tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
 ]

@@ -64,9 +64,8 @@ class Faulted:
     def set(self, script: Script | str) -> None:
         """Let this happen from now on, in place of what was set; moments count from now.
 
-        A script that leaves anything to chance and says no seed gets one. What came of the one before, and that seed, is
-        in `news`. Raises RequestError for a bad script, and for
-        what cannot happen here; what was set goes on then.
+        A script that leaves anything to chance and says no seed gets one. What came of the one before, and that seed,
+        is in `news`. Raises RequestError for a bad script, and for what cannot happen here; what was set goes on then.
         """
         given = meant(script)
         if given.by_chance:
