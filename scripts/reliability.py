@@ -41,7 +41,8 @@ It takes hours; a part of it, as `make soak ARGS=tests/faults/test_chance.py`, r
 **Wrong** is judged by what the simulated devices really held, which they keep a history of. A value is right if the
 device held it at some moment between the call and its return. A write that succeeds is right if the device has carried
 it out within the call. A call that fails is right if what it says is so: *not sent*, *rejected by the device*, or
-*outcome unknown*; a reading that fails gives no value. Every run asserts that its faults have happened.
+*outcome unknown*; a reading that fails gives no value. Every run asserts that its faults have happened. A row without
+*wrong* is that of a run that ends at the first one, and tells no figures then.
 
 What no program on the host can tell apart is no fault that a promise covers; it is measured too, and written down as a
 [known limit](explanation/taint.md): such are faults *toward the device*, and those in the text of a CAN adapter, that

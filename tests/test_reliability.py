@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -102,3 +104,46 @@ def test_every_kind_of_fault_has_its_tests() -> None:
 
 def test_the_rows_are_those_of_the_matrix() -> None:
     assert list(ROWS) == [*(f"L{n}" for n in range(1, 19)), *(f"D{n}" for n in range(1, 16))]
+
+
+def telling() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Every test that tells figures, with its name."""
+    for file in sorted(reliability.TESTS.rglob("test_*.py")):
+        text = file.read_text("utf-8")
+        if "figures" not in text:
+            continue
+        found = [
+            one
+            for one in ast.walk(ast.parse(text))
+            if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef) and one.name.startswith("test_")
+        ]
+        for one in found:
+            if "figures" in taken(one):
+                yield f"{file.relative_to(soaked.ROOT)}::{one.name}", one
+
+
+def taken(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
+    return {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
+
+
+def test_whoever_tells_figures_is_in_the_long_runs_which_bring_them_to_the_page() -> None:
+    told = dict(telling())
+    assert len(told) > 40
+    never = [
+        name
+        for name, one in told.items()
+        if "rounds" not in taken(one) and not any("soak" in ast.unparse(mark) for mark in one.decorator_list)
+    ]
+    assert never == []
+
+
+def test_a_figure_that_is_0_was_counted() -> None:
+    zeros = [
+        f"{name}: {word.arg}"
+        for name, one in telling()
+        for call in ast.walk(one)
+        if isinstance(call, ast.Call) and ast.unparse(call.func) == "figures"
+        for word in call.keywords
+        if word.arg != "promise" and isinstance(word.value, ast.Constant) and word.value.value == 0
+    ]
+    assert zeros == []
