@@ -161,8 +161,7 @@ def simulate(
         buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
         _ready(output, buses, family, sorted(simulator.nodes), ids)
         _serve(mount, stop, faulted, None if quiet else output)
-        if faulted.used:
-            output.document(SCHEMA, faulted.facts())
+        _ended(output, faulted)
     return Exit.OK
 
 
@@ -200,6 +199,12 @@ def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> 
     _note(
         output, (*remarks.rest(), *faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened())
     )
+
+
+def _ended(output: Output, faulted: Faulted) -> None:
+    """With --json, what came of the faults, if there was ever a script."""
+    if faulted.used:
+        output.document(SCHEMA, faulted.facts())
 
 
 def _note(output: Output, lines: Iterable[str]) -> None:
