@@ -12,7 +12,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.errors import RequestError
 from motorbus.simulation.faults import WORDS, Script
-from motorbus.simulation.faults.script import meant
+from motorbus.simulation.faults.script import requested
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -38,7 +38,7 @@ PLACES = (
 """Where a fault can stand, and what that means."""
 
 
-def script_of(said: str | None) -> Script:
+def from_option(said: str | None) -> Script:
     """What the flag says: a script, or the name of a file or a pipe that is there; None is none.
 
     Raises RequestError for neither, for one that is too long, for a pipe that stays silent, and for a script without a
@@ -54,7 +54,7 @@ def script_of(said: str | None) -> Script:
             expected='a file, or a script as "exchange 17 byte 3: drop"',
             advice="`--faults help` lists what can be said",
         )
-    return meant(said or "#")  # a file with nothing in it is no "none"
+    return requested(said or "#")  # a file with nothing in it is no "none"
 
 
 def _is_file(said: str) -> bool:

@@ -140,7 +140,7 @@ def simulate(
     found = families.load(family)
     if switches or faults == "help":
         return _list(found, output) if switches else faulty.listed(output)
-    script = faulty.script_of(faults)
+    script = faulty.from_option(faults)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)

@@ -13,7 +13,7 @@ from typing import Any, Final
 from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
-from motorbus.simulation.faults.script import meant
+from motorbus.simulation.faults.script import requested
 from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.mount import Mount
 
@@ -67,7 +67,7 @@ class Faulted:
         A script that leaves anything to chance and says no seed gets one. What came of the one before, and that seed,
         is in `news`. Raises RequestError for a bad script, and for what cannot happen here; what was set goes on then.
         """
-        given = meant(script)
+        given = requested(script)
         if given.by_chance:
             given = given.seeded(secrets.randbelow(1 << 32))
         if not self._mount.texts:

@@ -12,7 +12,7 @@ import motorbus
 from motorbus.errors import RequestError
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, Fault, Script, parse
-from motorbus.simulation.faults.script import meant, script_of
+from motorbus.simulation.faults.script import as_script, requested
 from tests.simulation.faults.scripts import scripts
 
 
@@ -157,9 +157,9 @@ def test_chance_needs_a_seed_and_a_place_does_not() -> None:
 
 def test_a_script_is_text_faults_or_itself() -> None:
     fault = Fault(1, 2, "drop")
-    assert script_of("exchange 1 byte 2: drop") == script_of([fault]) == script_of(Script((fault,)))
-    assert list(script_of([fault])) == [fault]
-    assert len(script_of([fault])) == 1
+    assert as_script("exchange 1 byte 2: drop") == as_script([fault]) == as_script(Script((fault,)))
+    assert list(as_script([fault])) == [fault]
+    assert len(as_script([fault])) == 1
 
 
 @pytest.mark.parametrize(
@@ -250,9 +250,9 @@ def test_a_number_that_people_write_in_other_ways(line: str, fault: Fault) -> No
 
 @pytest.mark.parametrize("text", ["seed 3", "# nothing", "\n"])
 def test_who_asks_for_a_script_without_a_fault_is_told(text: str) -> None:
-    assert len(parse(text)) == len(meant("")) == len(meant(())) == 0
+    assert len(parse(text)) == len(requested("")) == len(requested(())) == 0
     asks: list[Callable[[], object]] = [
-        lambda: meant(text),
+        lambda: requested(text),
         lambda: motorbus.simulate("feetech", faults=text),
         lambda: motorbus.open("feetech:sim,ids=1", faults=text),
     ]

@@ -19,7 +19,7 @@ from motorbus.link.memory import Fired
 from motorbus.simulation.faults.fault import SOMEWHERE, Fault
 from motorbus.simulation.faults.harm import GAP, INSTANT, Strike, harmed
 from motorbus.simulation.faults.luck import Luck, chance
-from motorbus.simulation.faults.script import Script, script_of
+from motorbus.simulation.faults.script import Script, as_script
 
 if TYPE_CHECKING:
     from motorbus.simulation.faults.world import World
@@ -75,7 +75,7 @@ class FaultyLine:
         most: int | None = None,
         began: float | None = None,
     ) -> None:
-        given = script_of(script)
+        given = as_script(script)
         self.faults = tuple(fault for fault in given if fault.adapter is adapter)
         self.script = Script(self.faults, given.seed)
         if self.script.by_chance:

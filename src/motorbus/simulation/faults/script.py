@@ -89,19 +89,19 @@ def parse(text: str) -> Script:
     return Script(tuple(faults), seed)
 
 
-def script_of(script: Script | str | Iterable[Fault]) -> Script:
+def as_script(script: Script | str | Iterable[Fault]) -> Script:
     """Whatever says a script as one."""
     if isinstance(script, str):
         return parse(script)
     return script if isinstance(script, Script) else Script(tuple(script))
 
 
-def meant(script: Script | str | Iterable[Fault]) -> Script:
+def requested(script: Script | str | Iterable[Fault]) -> Script:
     """The same of what somebody has asked for; "" is none.
 
     Raises RequestError for another text without a fault: its writer believes that something goes wrong.
     """
-    made = script_of(script)
+    made = as_script(script)
     if script and isinstance(script, str) and not made:
         raise RequestError(f"{short(script)!r}: there is no fault in it", expected=EXAMPLES)
     return made
