@@ -1,7 +1,8 @@
 """Makes docs/reliability.md: what is promised, the figures of the last long runs, and the tests of each kind of fault.
 
-`make soak` measures and calls this with `--take`, which takes over what its runs have told. `--check` sees that the
-page is the one that its figures and the tests there are would make.
+`make soak` measures and calls this with `--take`, which takes over what its runs have told; but nothing at all of it
+when some of it was measured with files that differ from their commit, for nobody could measure that again. `--dirty`
+takes it all the same. `--check` sees that the page is the one that its figures and the tests there are would make.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ TESTS: Final = soaked.ROOT / "tests"
 NAMED: Final = re.compile(r"^(?:async )?def (test_([ld]\d+)_\w+)", re.M)
 FIRST: Final = ("seed", "kinds", "exchanges", "reads", "faults", "wrong")
 """Figures that come first in a table; the others follow in the order in which a run has told them."""
+REFUSED: Final = 2
+"""How this ends when it takes nothing of what it was given; a long run has not failed for that."""
 MANY: Final = 4
 """So many runs of one kind are one row."""
 
@@ -36,12 +39,14 @@ make soak
 ```
 
 It takes hours; a part of it, as `make soak ARGS=tests/faults/test_chance.py`, renews the figures of that part alone.
-`make test` runs the same tests with fewer rounds, in virtual time. A commit with a plus had files that differed.
+`make test` runs the same tests with fewer rounds, in virtual time. A commit with a plus had files that differed; such
+figures are taken by `make soak TAKE=--dirty` alone.
 
 **Wrong** is judged by what the simulated devices really held, which they keep a history of. A value is right if the
 device held it at some moment between the call and its return. A write that succeeds is right if the device has carried
 it out within the call. A call that fails is right if what it says is so: *not sent*, *rejected by the device*, or
-*outcome unknown*; a reading that fails gives no value. Every run asserts that its faults have happened.
+*outcome unknown*; a reading that fails gives no value. Every run asserts that its faults have happened. A row without
+*wrong* is that of a run that ends at the first one, and tells no figures then.
 
 What no program on the host can tell apart is no fault that a promise covers; it is measured too, and written down as a
 [known limit](explanation/taint.md): such are faults *toward the device*, and those in the text of a CAN adapter, that
@@ -169,9 +174,24 @@ def tests_of_rows() -> dict[str, list[str]]:
     return found
 
 
+def _refusal(dirty: list[dict[str, Any]], new: list[dict[str, Any]]) -> str:
+    return (
+        f"error: {len(dirty)} of {len(new)} figures were measured with files that differ from"
+        f" {dirty[0]['commit'][:-1]}, the first of them by {dirty[0]['test']}; nothing is written\n"
+        f"  expected: figures of a commit, which can be measured again\n"
+        f"  what to do: commit, and measure again; or take them with their plus:"
+        f" python -m scripts.reliability --take --dirty"
+    )
+
+
 def main() -> int:
     """Write the page, with --take from new figures as well; or with --check see that the one there is current."""
-    runs = soaked.merged(soaked.kept(), soaked.fresh() if "--take" in sys.argv[1:] else [])
+    new = soaked.fresh() if "--take" in sys.argv[1:] else []
+    dirty = [] if "--dirty" in sys.argv[1:] else [run for run in new if run["commit"].endswith("+")]
+    if dirty:
+        print(_refusal(dirty, new), file=sys.stderr)
+        return REFUSED
+    runs = soaked.merged(soaked.kept(), new)
     wanted: dict[Path, str] = {PAGE: page(runs)}
     return kept({soaked.KEPT: soaked.text(runs), **wanted})
 

@@ -9,6 +9,7 @@ import datetime
 import json
 import re
 import subprocess
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +17,8 @@ from typing import Any, Final
 ROOT: Final = Path(__file__).resolve().parent.parent
 FRESH: Final = ROOT / "build" / "soak.jsonl"
 KEPT: Final = ROOT / "docs" / "reliability.json"
+MADE: Final = ("docs/reliability.json", "docs/reliability.md")
+"""What a long run itself writes."""
 Figure = int | float | str
 
 
@@ -44,13 +47,33 @@ def record(
 
 
 def commit() -> str:
-    """What is measured: the commit, with a plus where files differ from it; "" outside a repository."""
-    asked = ("describe", "--always", "--dirty=+", "--abbrev=10", "--exclude=*")
+    """What is measured: the commit, with a plus where files differ from it; "" outside a repository.
+
+    The figures themselves and their page may differ: else a second part of the long runs could never follow a first.
+    """
     try:
-        done = subprocess.run(["git", *asked], cwd=ROOT, capture_output=True, text=True, check=True)
+        name = _git("describe", "--always", "--abbrev=10", "--exclude=*")
+        differ = _git("diff", "--name-only", "HEAD", "--", ".", *(f":(exclude){file}" for file in MADE))
     except (OSError, subprocess.CalledProcessError):
         return ""
+    return f"{name}+" if differ else name
+
+
+def _git(*words: str) -> str:
+    done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True)
     return done.stdout.strip()
+
+
+def begin(*flags: str) -> str:
+    """Forget what the runs before have told; gives what is to be said when the figures will not be taken."""
+    FRESH.unlink(missing_ok=True)
+    now = commit()
+    if not now.endswith("+") or "--dirty" in flags:
+        return ""
+    return (
+        f"files differ from {now[:-1]}: figures are printed and kept in {FRESH.relative_to(ROOT)}, but"
+        f" {KEPT.relative_to(ROOT)} and its page do not take them (make soak TAKE=--dirty: they do)"
+    )
 
 
 def fresh() -> list[dict[str, Any]]:
@@ -81,3 +104,8 @@ def _row(what: str) -> tuple[int, int]:
 def text(runs: Iterable[dict[str, Any]]) -> str:
     """As it stands in the file."""
     return json.dumps({"format": 1, "runs": list(runs)}, ensure_ascii=False, indent=1) + "\n"
+
+
+if __name__ == "__main__":
+    if said := begin(*sys.argv[1:]):
+        print(said, file=sys.stderr)

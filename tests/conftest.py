@@ -114,9 +114,10 @@ class Figures(Protocol):
 
 @pytest.fixture
 def figures(request: pytest.FixtureRequest) -> Figures:
-    """`figures("L7 late replies", family="kst", promise=3, exchanges=n, wrong=0)`: printed, and kept by `make soak`.
+    """`figures("L7 late replies", family="kst", promise=3, reads=n, wrong=count)`: printed, and kept by `make soak`.
 
-    `promise` is the number of the promise of docs/reliability.md that the run proves.
+    `promise` is the number of the promise of docs/reliability.md that the run proves. A figure is what was counted;
+    what ends the run at the first one, as an error does, is none.
     """
 
     def tell(what: str, *, family: str = "", promise: int = 0, **figures: int | float | str) -> None:

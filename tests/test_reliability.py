@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,12 +13,15 @@ import pytest
 from scripts import reliability, soaked
 from scripts.fault_rows import ROWS
 
+COMMIT = soaked.commit
+
 
 @pytest.fixture
 def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Figures and page are somewhere else for once."""
     monkeypatch.setattr(soaked, "FRESH", tmp_path / "build" / "soak.jsonl")
     monkeypatch.setattr(soaked, "KEPT", tmp_path / "reliability.json")
+    monkeypatch.setattr(soaked, "commit", lambda: "0123456789")
     monkeypatch.setattr(reliability, "PAGE", tmp_path / "reliability.md")
     return tmp_path
 
@@ -71,6 +77,33 @@ def test_many_of_a_kind_are_one_row(apart: Path, monkeypatch: pytest.MonkeyPatch
     assert "| L1 faults, else | kst | faults 7, wrong 0, longest s 9 | `u.py::y` 2" in page
 
 
+@pytest.mark.parametrize("flags", [(), ("--dirty",)])
+def test_figures_of_files_that_differ_are_taken_only_by_whoever_says_so(
+    flags: tuple[str, ...], apart: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    soaked.record("L9 garbage", test="t.py::clean", wrong=1)
+    monkeypatch.setattr(soaked, "commit", lambda: "abc+")
+    soaked.record("L8 echoes", test="t.py::dirty", wrong=2)
+    monkeypatch.setattr("sys.argv", ["reliability", "--take", *flags])
+    assert reliability.main() == (0 if flags else reliability.REFUSED)
+    assert (reliability.PAGE.exists(), soaked.KEPT.exists()) == (bool(flags),) * 2
+    said = capsys.readouterr().err
+    assert ("1 of 2 figures were measured with files that differ from abc" in said) is not bool(flags)
+    assert ("t.py::dirty" in said) is not bool(flags)
+
+
+def test_a_long_run_begins_anew_and_says_at_once_that_its_figures_will_not_be_taken(
+    apart: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(soaked, "ROOT", apart)
+    soaked.record("L9 garbage", wrong=1)
+    assert soaked.begin() == ""
+    assert soaked.fresh() == []
+    monkeypatch.setattr(soaked, "commit", lambda: "abc+")
+    assert "files differ from abc: figures are printed and kept in build/soak.jsonl" in soaked.begin()
+    assert soaked.begin("--dirty") == ""
+
+
 def test_without_being_told_to_it_takes_nothing_over(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     soaked.record("L9 garbage", wrong=1)
     assert "L9 garbage" not in written(monkeypatch)
@@ -89,9 +122,34 @@ def test_a_page_that_is_behind_is_noticed(apart: Path, monkeypatch: pytest.Monke
     assert reliability.main() == 1
 
 
-def test_figures_name_the_commit_they_belong_to(apart: Path) -> None:
-    assert soaked.record("one", wrong=0)["commit"] == soaked.commit()
+def test_figures_name_the_commit_they_belong_to(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(soaked, "commit", COMMIT)
+    assert soaked.record("one", wrong=0)["commit"] == COMMIT()
     assert [run["what"] for run in soaked.fresh()] == ["one"]
+
+
+def test_a_file_that_differs_is_a_plus_but_not_what_a_long_run_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    monkeypatch.setattr(soaked, "ROOT", tmp_path)
+    assert COMMIT() == "", "outside a repository"
+    (tmp_path / "docs").mkdir()
+    for name in ("docs/reliability.md", "docs/reliability.json", "code.py"):
+        (tmp_path / name).write_text("1")
+    git("init")
+    git("add", ".")
+    git("commit", "--message", "one")
+    clean = COMMIT()
+    assert len(clean) == 10
+    for name in ("docs/reliability.md", "docs/reliability.json"):
+        (tmp_path / name).write_text("2")
+    assert COMMIT() == clean
+    (tmp_path / "code.py").write_text("2")
+    assert COMMIT() == f"{clean}+"
 
 
 def test_every_kind_of_fault_has_its_tests() -> None:
@@ -102,3 +160,46 @@ def test_every_kind_of_fault_has_its_tests() -> None:
 
 def test_the_rows_are_those_of_the_matrix() -> None:
     assert list(ROWS) == [*(f"L{n}" for n in range(1, 19)), *(f"D{n}" for n in range(1, 16))]
+
+
+def telling() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Every test that tells figures, with its name."""
+    for file in sorted(reliability.TESTS.rglob("test_*.py")):
+        text = file.read_text("utf-8")
+        if "figures" not in text:
+            continue
+        found = [
+            one
+            for one in ast.walk(ast.parse(text))
+            if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef) and one.name.startswith("test_")
+        ]
+        for one in found:
+            if "figures" in taken(one):
+                yield f"{file.relative_to(soaked.ROOT)}::{one.name}", one
+
+
+def taken(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
+    return {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
+
+
+def test_whoever_tells_figures_is_in_the_long_runs_which_bring_them_to_the_page() -> None:
+    told = dict(telling())
+    assert len(told) > 40
+    never = [
+        name
+        for name, one in told.items()
+        if "rounds" not in taken(one) and not any("soak" in ast.unparse(mark) for mark in one.decorator_list)
+    ]
+    assert never == []
+
+
+def test_a_figure_that_is_0_was_counted() -> None:
+    zeros = [
+        f"{name}: {word.arg}"
+        for name, one in telling()
+        for call in ast.walk(one)
+        if isinstance(call, ast.Call) and ast.unparse(call.func) == "figures"
+        for word in call.keywords
+        if word.arg != "promise" and isinstance(word.value, ast.Constant) and word.value.value == 0
+    ]
+    assert zeros == []

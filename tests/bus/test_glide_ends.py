@@ -66,7 +66,6 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
         "L17 interrupted twice: a read on an event loop, the straight way",
         family="feetech",
         **counts,
-        wrong=0,
     )
     assert counts["cuts"] >= min(most, 20)
     assert counts["twice"] >= counts["cuts"] / 4

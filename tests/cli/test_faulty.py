@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
+from motorbus.cli import faulty
 from motorbus.cli.exits import Exit
-from motorbus.cli.faulty import script_of
+from motorbus.cli.faulty import MOST, from_option
 from motorbus.errors import RequestError
 from motorbus.simulation.faults import WORDS, parse
 from tests.cli.conftest import Run
@@ -17,25 +22,85 @@ from tests.cli.conftest import Run
 def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     file = tmp_path / "noise"
     file.write_text("seed 3\n1%: drop  # now and then\n")
-    assert script_of(str(file)) == script_of("seed 3; 1%: drop") == parse("seed 3; 1%: drop")
-    assert len(script_of(None)) == 0
+    assert from_option(str(file)) == from_option("seed 3; 1%: drop") == parse("seed 3; 1%: drop")
+    assert len(from_option(None)) == 0
     with pytest.raises(RequestError, match="neither a file nor a script"):
-        script_of("")  # as of a variable of a shell that is not set
+        from_option("")  # as of a variable of a shell that is not set
     with pytest.raises(RequestError, match="neither a file nor a script"):
-        script_of(str(tmp_path / "nothing"))
+        from_option(str(tmp_path / "nothing"))
     for nothing in ("", "# nothing yet\n", "seed 3\n"):
         file.write_text(nothing)
         with pytest.raises(RequestError, match="there is no fault in it"):
-            script_of(str(file))
+            from_option(str(file))
     file.write_text("seed 3\nexchange 1: explode\n")
     with pytest.raises(RequestError, match="^line 2: "):
-        script_of(str(file))
+        from_option(str(file))
     file.write_bytes(b"\xef\xbb\xbfexchange 1: drop\r\n")  # as some editors write it
-    assert script_of(str(file)) == parse("exchange 1: drop")
+    assert from_option(str(file)) == parse("exchange 1: drop")
     long = "; ".join(f"exchange {number}: drop" for number in range(1000))
-    assert len(script_of(long)) == 1000
+    assert len(from_option(long)) == 1000
     with pytest.raises(RequestError, match="neither a file nor a script"):
-        script_of("\0")
+        from_option("\0")
+
+
+def test_a_file_without_end_is_not_read_to_its_end(tmp_path: Path) -> None:
+    file = tmp_path / "noise"
+    line = b"exchange 1: drop # " + b"x" * (MOST // 1000) + b"\n"
+    whole = line * (MOST // len(line))
+    file.write_bytes(whole + b"#" * (MOST - len(whole)))
+    assert len(from_option(str(file))) == MOST // len(line)
+    with file.open("ab") as script:
+        script.truncate(1 << 40)  # a hole: it takes no room, and reading it all would take hours
+    with pytest.raises(RequestError, match=r"at most 1,048,576 bytes"):
+        from_option(str(file))
+
+
+@contextmanager
+def piped(pipe: Path, *pieces: bytes) -> Iterator[None]:
+    """Somebody writes this into a pipe, and closes it."""
+
+    def write() -> None:
+        with suppress(BrokenPipeError), pipe.open("wb", buffering=0) as end:
+            for piece in pieces:
+                end.write(piece)
+
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=write)
+    writer.start()
+    yield
+    writer.join()
+
+
+def test_a_pipe_is_as_good_as_a_file(tmp_path: Path) -> None:
+    with piped(tmp_path / "pipe", b"seed 3; exchange 1: ", b"drop\n", b"exchange 2: drop"):
+        assert from_option(str(tmp_path / "pipe")) == parse("seed 3; exchange 1: drop; exchange 2: drop")
+
+
+def test_a_pipe_that_says_too_much_is_not_read_to_its_end(tmp_path: Path) -> None:
+    with (
+        piped(tmp_path / "pipe", b"#" * MOST, b"#"),
+        pytest.raises(RequestError, match="at most 1,048,576 bytes"),
+    ):
+        from_option(str(tmp_path / "pipe"))
+
+
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for_without_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(faulty, "PATIENCE", 0.01)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RequestError, match=r"nothing has come out of this pipe for 0\.01 s"):
+        from_option(str(tmp_path / "pipe"))
+    holder = os.open(tmp_path / "pipe", os.O_RDWR)  # there is a writer, and it says nothing
+    os.write(holder, b"exchange 1: drop")
+    with pytest.raises(RequestError, match="nothing has come out of this pipe"):
+        from_option(str(tmp_path / "pipe"))
+    os.close(holder)
+
+
+def test_a_device_is_not_opened_for_a_script() -> None:
+    with pytest.raises(RequestError, match="neither a file nor a script"):
+        from_option("/dev/zero")
 
 
 def test_help_lists_every_word(run: Run) -> None:

@@ -158,6 +158,46 @@ def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_
     assert process.returncode == 0
 
 
+def test_what_has_not_happened_is_named_at_the_end_also_of_a_script_that_was_set_later(
+    tmp_path: Path,
+) -> None:
+    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--link", str(tmp_path / "arm")]
+    with (
+        Control() as control,
+        subprocess.Popen(
+            [*command, "--faults", "exchange 17: drop", "--control", control.path, "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            assert json.loads(process.stdout.readline())["schema"] == "motorbus.simulate/1"
+            assert control.facts()["again"] == "--faults 'exchange 17: drop'"
+            assert control.order("faults seed 5; 1%: drop; at 0 s: power-cycle 1") == "ok"
+            while control.facts()["count"] == 0:
+                pass
+        finally:
+            process.send_signal(signal.SIGTERM)
+            out, err = process.communicate(timeout=PATIENCE)
+    again = "--faults 'seed 5; 1%: drop; at 0 s: power-cycle 1'"
+    lines = err.splitlines()
+    assert [line for line in lines if line.startswith("faults: ")] == [
+        "faults: `exchange 17: drop` has not happened (0 exchanges were seen)",
+        "faults: seed 5",
+        f"faults: 1 happened, by the seed 5; the same again: {again}",
+        "faults: `1%: drop` has not happened (0 exchanges were seen)",
+    ]
+    facts = json.loads(out)
+    assert (facts["schema"], facts["count"], facts["never"]) == (
+        "motorbus.simulator-script/1",
+        1,
+        ["1%: drop"],
+    )
+    assert facts["again"] == again
+
+
 def test_the_vendors_own_library_on_a_line_that_does_harm(tmp_path: Path) -> None:
     script = "exchange 1: drop; exchange 2 byte 4: corrupt 80; exchange 3: merge; exchange 5 to device: drop"
     with (

@@ -23,7 +23,6 @@ from motorbus.errors import MotorbusError, Refused
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import Robot
-from tests.conftest import Figures
 from tests.faults.cutting import afterwards
 from tests.faults.off import are_off
 from tests.faults.scenes import IDS, KINDS, Scene, off
@@ -151,7 +150,7 @@ def night(kind: str, look: int) -> tuple[bool, list[str]]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_l15_a_night_at_any_look_at_the_line(kind: str, figures: Figures) -> None:
+def test_l15_a_night_at_any_look_at_the_line(kind: str) -> None:
     """What is asked across it is answered truly, or fails; what is asked after it is right."""
     look, frozen, nights = 0, True, 0
     while frozen and look < 40:
@@ -160,7 +159,6 @@ def test_l15_a_night_at_any_look_at_the_line(kind: str, figures: Figures) -> Non
         nights += frozen
         assert wrong == [], look
     assert nights
-    figures(f"L15 frozen for 8 h: {kind}", family=KINDS[kind].family, nights=nights, wrong=0)
 
 
 @pytest.mark.parametrize("family", IDS)

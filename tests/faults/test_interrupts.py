@@ -199,7 +199,7 @@ def test_l17_an_interrupt_at_any_line_on_a_real_port(rounds: Rounds, figures: Fi
                 assert came.where is None or isinstance(came.error, error), came
         link.close()
     assert cuts > 10
-    figures("L17 interrupts: a read by a pseudo-terminal", family="feetech", cuts=cuts, stuck=0, wrong=0)
+    figures("L17 interrupts: a read by a pseudo-terminal", family="feetech", cuts=cuts)
 
 
 def test_l17_a_run_that_is_cut_before_its_start_is_not_said_to_go_on() -> None:

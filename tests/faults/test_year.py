@@ -77,6 +77,7 @@ def test_d9_l15_a_year(rounds: Rounds, figures: Figures) -> None:
             counts += life.counts
             assert life.worn == 0
             wraps = life.now // WRAP
+    worn = sum(life.worn for life in lives)
     months = max(1.0, (days - 1) / 30)
     growth = (after.kib - before.kib) / 1024 / months
     assert growth <= (MIB_IN_30_DAYS if days > 1 else 4)
@@ -86,9 +87,9 @@ def test_d9_l15_a_year(rounds: Rounds, figures: Figures) -> None:
         promise=5,
         days=days,
         wraps_of_a_32_bit_millisecond=int(wraps),
-        eeprom_writes=0,
-        descriptors=0,
-        threads=0,
+        eeprom_writes=worn,
+        descriptors=after.descriptors - before.descriptors,
+        threads=after.threads - before.threads,
         mib_in_30_days=round(growth, 3),
         unplugged=counts["unplugged"],
         polls=counts["polls"],

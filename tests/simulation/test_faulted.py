@@ -18,7 +18,7 @@ from motorbus.errors import RequestError
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.simulation.clients import CanClient, Door
-from motorbus.simulation.faulted import MOST, TOLD, Faulted, read_order
+from motorbus.simulation.faulted import MOST, NEWS, TOLD, Faulted, read_order
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
@@ -243,3 +243,96 @@ def test_how_to_have_it_again_is_that_of_the_latest_script() -> None:
             "faults: 2 happened, 1 of them by the latest script, by the seed 5; the same again:"
             " --faults 'seed 5; 100%: duplicate'"
         )
+
+
+def test_what_has_not_happened_is_named_with_what_there_was_instead() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        script = "exchange 1 packet 2: drop; exchange 9: drop; at 0 s: delay 1; at 600 s: drop; at 700 s: power-cycle 1"
+        hall.faulted.set(f"seed 1; {script}; 1e-9%: drop; 100%: duplicate; at 0 s: torn-eeprom 1")
+        hall.slept += 2.0
+        hall.mount.step(timeout=0)
+        said = hall.faulted.unhappened()
+        facts = hall.faulted.facts()
+    assert [line.partition(" (")[0] for line in said] == [
+        "faults: `at 0 s: torn-eeprom 1` has not happened",
+        "faults: `exchange 1 packet 2: drop` has not happened",
+        "faults: `exchange 9: drop` has not happened",
+        "faults: `at 0 s: delay 1` has not happened",
+        "faults: `at 600 s: drop` has not happened",
+        "faults: `at 700 s: power-cycle 1` has not happened",
+        "faults: `1e-09%: drop` has not happened",
+        "faults: `100%: duplicate` has not happened",
+    ]
+    assert said[0].endswith("(nothing was stored since that could be torn)")
+    assert said[2].endswith("(0 exchanges were seen)")
+    assert said[3].endswith("(its moment has passed, and nothing came since that it could change)")
+    assert said[5].endswith(" s have passed)")
+    assert facts["pending_count"] == len(facts["pending"]) == 6
+    assert facts["never"] == ["1e-09%: drop", "100%: duplicate"]
+
+
+def test_what_has_happened_once_is_no_longer_named() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        hall.faulted.set("seed 1; exchange 1: duplicate; 100%: split; 1e-9%: drop; exchange 2 byte 9: drop")
+        with reached(hall, listener) as client:
+            asked(client.fileno(), PING, 12)
+            assert "1 exchange was seen" in hall.faulted.unhappened()[0]
+            asked(client.fileno(), PING, 6)
+            asked(client.fileno(), PING, 6)
+        passed, seen = hall.faulted.unhappened()
+        assert passed.startswith(
+            "faults: `exchange 2 byte 9: drop` has not happened (exchange 2 has passed, and"
+        )
+        assert seen == "faults: `1e-09%: drop` has not happened (3 exchanges were seen)"
+        assert hall.faulted.facts()["never"] == ["1e-09%: drop"]
+
+
+def test_a_long_list_of_what_has_not_happened_is_cut_and_counted() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        hall.faulted.set("; ".join(f"exchange {number}: drop" for number in range(1, TOLD + 4)))
+        said = hall.faulted.unhappened()
+        assert len(said) == TOLD + 1
+        assert said[-1] == "faults: … and 3 more have not happened"
+        assert hall.faulted.facts()["pending_count"] == TOLD + 3
+
+
+def test_a_script_that_is_set_later_is_told_like_one_of_the_command_line() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        hall.faulted.set("")
+        assert (hall.faulted.news(), hall.faulted.used, hall.faulted.facts()["again"]) == ([], False, "")
+        assert read_order(hall.faulted, "100%: duplicate; exchange 7: drop") is None
+        seed = hall.faulted.script.seed
+        script = f"seed {seed}; 100%: duplicate; exchange 7: drop"
+        assert hall.faulted.news() == [f"faults: seed {seed}"]
+        assert hall.faulted.facts()["again"] == f"--faults '{script}'"
+        with reached(hall, listener) as client:
+            asked(client.fileno(), PING, 12)
+        replay = f"faults: 1 happened, by the seed {seed}; the same again: --faults '{script}'"
+        assert hall.faulted.replay() == replay
+        assert read_order(hall.faulted, "exchange 1: duplicate; at 0 s: torn-eeprom 1") is None
+        pending = "faults: `exchange 7: drop` has not happened (1 exchange was seen)"
+        assert hall.faulted.news() == [replay, pending]
+        with reached(hall, listener) as client:
+            asked(client.fileno(), PING, 12)
+        how = "faults: 2 happened, 1 of them by the latest script; the same again:"
+        again = "--faults 'exchange 1: duplicate; at 0 s: torn-eeprom 1'"
+        torn = (
+            "faults: `at 0 s: torn-eeprom 1` has not happened (nothing was stored since that could be torn)"
+        )
+        assert hall.faulted.replay() == f"{how} {again}"
+        assert read_order(hall.faulted, "off") is None
+        assert hall.faulted.news() == [f"{how} {again}", torn]
+        assert (hall.faulted.replay(), hall.faulted.unhappened()) == ("faults: 2 happened", [])
+        assert hall.faulted.used
+
+
+def test_news_that_nobody_reads_do_not_pile_up() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        for _ in range(3 * NEWS):
+            hall.faulted.set("exchange 9: drop")
+        assert len(hall.faulted.news()) == NEWS

@@ -25,7 +25,7 @@ from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
-from motorbus.simulation.faulted import Faulted
+from motorbus.simulation.faulted import SCHEMA, Faulted
 from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
@@ -55,9 +55,11 @@ The file of --inputs has one change on each line, as "2.5 1 on": input 1
 turns on 2.5 s after power-on.
 
 --faults takes a script of what goes wrong, one fault a line or between
-semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
-corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
-happened is said on stderr, and at the end how to have it again.
+semicolons, or a file or a pipe with one, of 1 MiB at most: `exchange 17
+byte 3: drop`, `1% of bytes: corrupt`, `at 2.5 s: unplug 0.5`. `--faults
+help` lists all of them. A pipe that is silent for 10 s is an error. What
+happened is said on stderr, and at the end how to have it again and which
+of them have not happened.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
@@ -79,7 +81,7 @@ Flag = Annotated[bool, Parameter(negative="")]
 Inputs = Annotated[
     Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
 ]
-Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file with one, or help.")]
+Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file or pipe with one, or help.")]
 Switched = Annotated[
     tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
 ]
@@ -138,7 +140,7 @@ def simulate(
     found = families.load(family)
     if switches or faults == "help":
         return _list(found, output) if switches else faulty.listed(output)
-    script = faulty.script_of(faults)
+    script = faulty.from_option(faults)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
@@ -159,6 +161,7 @@ def simulate(
         buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
         _ready(output, buses, family, sorted(simulator.nodes), ids)
         _serve(mount, stop, faulted, None if quiet else output)
+        _ended(output, faulted)
     return Exit.OK
 
 
@@ -187,17 +190,26 @@ def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> 
         mount.serve(stop)
         return
     remarks = Remarks(mount.simulator)
-    if faulted.script.by_chance:
-        output.note(f"faults: seed {faulted.script.seed}")
+    _note(output, faulted.news())
     while not mount.step(stop):
         now = time.monotonic()
-        for line in (*remarks.lines(now), *faulted.remarks(now)):
-            output.note(line)
+        _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
     now = time.monotonic()
-    for line in (*remarks.lines(now), *faulted.remarks(now), *remarks.rest(), *faulted.rest()):
+    _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
+    _note(
+        output, (*remarks.rest(), *faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened())
+    )
+
+
+def _ended(output: Output, faulted: Faulted) -> None:
+    """With --json, what came of the faults, if there was ever a script."""
+    if faulted.used:
+        output.document(SCHEMA, faulted.facts())
+
+
+def _note(output: Output, lines: Iterable[str]) -> None:
+    for line in lines:
         output.note(line)
-    if said := faulted.replay():
-        output.note(said)
 
 
 def _scripted(simulator: object, path: Path | None, family: str) -> None:

@@ -7,12 +7,13 @@ host at the clients, for it has neither check sum nor time of its own.
 from __future__ import annotations
 
 import secrets
+from collections import deque
 from typing import Any, Final
 
 from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
-from motorbus.simulation.faults import FaultyLine, Script, World
-from motorbus.simulation.faults.script import meant
+from motorbus.simulation.faults import Fault, FaultyLine, Script, World
+from motorbus.simulation.faults.script import requested
 from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.mount import Mount
 
@@ -23,6 +24,8 @@ TOLD: Final = 20
 """So many of them are told at once."""
 MOST: Final = 5
 """Lines in a second for whoever watches; what is beyond is counted."""
+NEWS: Final = 100
+"""Lines about scripts that have come and gone that wait for somebody to read them; the latest ones."""
 
 
 class Faulted:
@@ -37,6 +40,9 @@ class Faulted:
         self._before = self._seen = self._left = 0
         self._since = 0.0
         self._room = MOST
+        self._sets = 0
+        self._set_at = world.now
+        self._news: deque[str] = deque(maxlen=NEWS)
         world.why = mount.fixed
         world.port = None if world.why else mount
 
@@ -50,28 +56,40 @@ class Faulted:
         """What is set, with its seed where chance decides anything."""
         return self._script
 
+    @property
+    def used(self) -> bool:
+        """Whether there was ever a script."""
+        return self._sets > 1 or bool(self._script)
+
     def set(self, script: Script | str) -> None:
         """Let this happen from now on, in place of what was set; moments count from now.
 
-        A script that leaves anything to chance and says no seed gets one. Raises RequestError for a bad script, and for
-        what cannot happen here; what was set goes on then.
+        A script that leaves anything to chance and says no seed gets one. What came of the one before, and that seed,
+        is in `news`. Raises RequestError for a bad script, and for what cannot happen here; what was set goes on then.
         """
-        given = meant(script)
+        given = requested(script)
         if given.by_chance:
             given = given.seeded(secrets.randbelow(1 << 32))
         if not self._mount.texts:
             without_adapter(given)
+        ended = self._ended()  # before the world forgets
         line = FaultyLine(given, self._world, most=KEPT)
         text = FaultyLine(given, adapter=True, most=KEPT, began=self._world.now)
+        self._news += ended
+        self._sets, self._set_at = self._sets + 1, self._world.now
         self._left += self.count - self._seen
         self._before = self._seen = self.count
         self._mount.course.line = line if len(given) else PerfectLine()
         self._mount.text(text if text.faults else None)
         self._lines, self._script = (line, text), given
+        if given.by_chance:
+            self._news.append(f"faults: seed {given.seed}")
 
     def facts(self) -> dict[str, Any]:
         """What is set, what has happened and what has not, as plain data; times in s from the beginning."""
         fired = sorted((one.at, one.fault) for line in self._lines for one in line.fired)
+        pending = [str(fault) for line in self._lines for fault in line.pending]
+        never = [str(fault) for line in self._lines for fault in line.never]
         return {
             "schema": SCHEMA,
             "simulated": True,
@@ -80,8 +98,18 @@ class Faulted:
             "exchange": self._lines[0].exchange if self._lines else 0,
             "count": self.count,
             "fired": [{"at": round(at - self._began, 6), "fault": fault} for at, fault in fired[-TOLD:]],
-            "pending": [str(fault) for line in self._lines for fault in line.pending][:TOLD],
+            "pending": pending[:TOLD],
+            "pending_count": len(pending),
+            "never": never[:TOLD],
+            "never_count": len(never),
+            "again": self._again,
         }
+
+    def news(self) -> list[str]:
+        """What is to be said of scripts since the last call: the seed of a new one, what came of the one before."""
+        said = list(self._news)
+        self._news.clear()
+        return said
 
     def remarks(self, now: float) -> list[str]:
         """What is to be shown of what has happened since the last call, at this moment (s); not too many of them."""
@@ -107,7 +135,10 @@ class Faulted:
         return [f"… and {left} more faults"] if left else []
 
     def replay(self) -> str:
-        """How to have all of it again; "" when nothing happened."""
+        """How to have all of it again; "" when nothing happened.
+
+        That is said of chance, which has a seed, and of a script that was set later, which no command line holds.
+        """
         if not self.count:
             return ""
         latest = self.count - self._before
@@ -115,8 +146,42 @@ class Faulted:
         if self._before and latest:
             how += f", {latest} of them by the latest script"
         if self._script.by_chance and latest:
-            how += f", by the seed {self._script.seed}; the same again: --faults '{self._script.line}'"
+            how += f", by the seed {self._script.seed}"
+        if latest and (self._script.by_chance or self._sets > 1):
+            how += f"; the same again: {self._again}"
         return how
+
+    @property
+    def _again(self) -> str:
+        """The flag that sets the same script; "" for none."""
+        return f"--faults '{self._script.line}'" if self._script else ""
+
+    def _ended(self) -> list[str]:
+        """What came of a script that another takes the place of."""
+        return [*([self.replay()] if self.count > self._before else []), *self.unhappened()]
+
+    def unhappened(self) -> list[str]:
+        """A line for each fault of the latest script that has not happened, and what there was; not too many."""
+        found = [
+            f"faults: `{fault}` has not happened ({self._why(line, fault)})"
+            for line in self._lines
+            for fault in (*line.pending, *line.never)
+        ]
+        beyond = len(found) - TOLD
+        return [*found[:TOLD], *([f"faults: … and {beyond} more have not happened"] if beyond > 0 else [])]
+
+    def _why(self, line: FaultyLine, fault: Fault) -> str:
+        """What there was while it did not happen."""
+        passed = self._world.now - self._set_at
+        if fault in self._world.armed:
+            return "nothing was stored since that could be torn"
+        if fault.moment is not None and fault.moment <= passed:
+            return "its moment has passed, and nothing came since that it could change"
+        if fault.moment is not None:
+            return f"{passed:.1f} s have passed"
+        if fault.exchange is not None and fault.exchange < line.exchange:
+            return f"exchange {fault.exchange} has passed, and nothing was in it that this could change"
+        return f"{line.exchange} exchange{' was' if line.exchange == 1 else 's were'} seen"
 
 
 def read_order(faults: Faulted | None, text: str) -> dict[str, Any] | None:

@@ -20,7 +20,7 @@ from motorbus.errors import PortBusy, PortNotFound, RequestError
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
-from motorbus.simulation.faults.script import meant
+from motorbus.simulation.faults.script import requested
 from motorbus.simulation.faults.struck import without_adapter
 from motorbus.simulation.served import LinkClient, Served, join
 
@@ -113,7 +113,7 @@ class Simulation:
 
     @faults.setter
     def faults(self, script: Faults) -> None:
-        given = meant(script)
+        given = requested(script)
         without_adapter(given)
         link = self._link
         self._world.port = None if isinstance(link, Served) else self

@@ -180,7 +180,7 @@ def is_thorough(rounds: Callable[[int], int]) -> bool:
 def test_d10_provisioning_cut_anywhere_ends_old_or_new(
     wanted: dict[str, int], rounds: Callable[[int], int], figures: Figures
 ) -> None:
-    counted = fired = 0
+    counted = fired = lost = 0
     states = set()
     for number, options in enumerate(KINDS):
         found = list(cuts(lambda options=options: World(wanted, options)))  # type: ignore[misc]
@@ -191,12 +191,13 @@ def test_d10_provisioning_cut_anywhere_ends_old_or_new(
             counted += 1
             states.add(world.state)
             assert not (isinstance(told, Provisioned) and world.link.dead)
-            assert world.faults() == [], f"{options} {cut}"
-            assert world.mended() == [], f"{options} {cut}"
+            wrong = world.faults() or world.mended()
+            lost += bool(wrong)
+            assert wrong == [], f"{options} {cut}"
     assert fired == counted
     assert len(states) > 3, "the cuts strike in different states"
     what = f"D10 D11 provisioning cut once, {' and '.join(wanted)}"
-    figures(what, family="kst", promise=4, cuts=counted, states=len(states), lost=0)
+    figures(what, family="kst", promise=4, cuts=counted, states=len(states), lost=lost)
 
 
 @pytest.mark.timeout(3600)
@@ -205,7 +206,7 @@ def test_d10_provisioning_cut_while_it_is_mended_too(
     wanted: dict[str, int], rounds: Callable[[int], int], figures: Figures
 ) -> None:
     """From every state that a first cut can leave, each cut of the next provisioning, and one more after that."""
-    counted, thorough = 0, is_thorough(rounds)
+    counted, lost, thorough = 0, 0, is_thorough(rounds)
     seen: set[object] = set()
     for options in KINDS if thorough else KINDS[:1]:
         for first in cuts(lambda options=options: World(wanted, options)):  # type: ignore[misc]
@@ -223,8 +224,9 @@ def test_d10_provisioning_cut_while_it_is_mended_too(
                 world = wreck()
                 world.host(second)
                 counted += world.link.fired
-                assert world.faults() == [], f"{options} {first} {second}"
-                assert world.mended() == [], f"{options} {first} {second}"
+                wrong = world.faults() or world.mended()
+                lost += bool(wrong)
+                assert wrong == [], f"{options} {first} {second}"
     assert counted > 10
     what = f"D10 D11 provisioning cut and again while it is mended, {' and '.join(wanted)}"
-    figures(what, family="kst", promise=4, cuts=counted, states=len(seen), lost=0)
+    figures(what, family="kst", promise=4, cuts=counted, states=len(seen), lost=lost)

@@ -133,7 +133,7 @@ def test_l8_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Rounds, fi
     share = sum(rig.right.values()) / rig.calls
     what = f"L8 echoes in full, late or in part, on and off; {'at 9600 baud' if pace else 'on a link without a rate'}"
     faults = line.echoes + line.count
-    figures(what, family="stepper", exchanges=rig.calls, faults=faults, wrong=0, succeeded=f"{share:.2%}")
+    figures(what, family="stepper", exchanges=rig.calls, faults=faults, succeeded=f"{share:.2%}")
     assert line.echoes > total / 2
     assert line.count > total / 50
 
@@ -145,9 +145,9 @@ def test_l8_six_bytes_of_an_echo_come_too_soon_on_a_line_of_its_own_baud(
     total = rounds(10_000) // 10
     line = Echoing(SIX, deaf=True)
     rig = rig_on(line, opened=True)
-    for _ in range(total):
-        assert not rig.anything()
-    figures("L8 six bytes echoed by nobody, at 9600 baud", family="stepper", exchanges=total, wrong=0)
+    believed = sum(rig.anything() for _ in range(total))
+    assert believed == 0
+    figures("L8 six bytes echoed by nobody, at 9600 baud", family="stepper", exchanges=total, wrong=believed)
     assert line.echoes > total
 
 

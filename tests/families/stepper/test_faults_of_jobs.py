@@ -170,7 +170,6 @@ def test_l7_jobs_among_all_faults_are_as_they_are_told(
         family="stepper",
         exchanges=sent,
         faults=line.count,
-        wrong=0,
         jobs=total,
         without_a_fault_and_done=jobs.untouched,
         **{f"runs_{name}": count for name, count in ends.items()},

@@ -12,7 +12,7 @@ import motorbus
 from motorbus.errors import RequestError
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, Fault, Script, parse
-from motorbus.simulation.faults.script import meant, script_of
+from motorbus.simulation.faults.script import as_script, requested
 from tests.simulation.faults.scripts import scripts
 
 
@@ -157,9 +157,9 @@ def test_chance_needs_a_seed_and_a_place_does_not() -> None:
 
 def test_a_script_is_text_faults_or_itself() -> None:
     fault = Fault(1, 2, "drop")
-    assert script_of("exchange 1 byte 2: drop") == script_of([fault]) == script_of(Script((fault,)))
-    assert list(script_of([fault])) == [fault]
-    assert len(script_of([fault])) == 1
+    assert as_script("exchange 1 byte 2: drop") == as_script([fault]) == as_script(Script((fault,)))
+    assert list(as_script([fault])) == [fault]
+    assert len(as_script([fault])) == 1
 
 
 @pytest.mark.parametrize(
@@ -184,11 +184,75 @@ def test_numbers_beyond_all_measure_are_refused_in_few_words(line: str) -> None:
     assert len(str(caught.value)) < 700
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"{before}{number}{behind}"
+        for number in (
+            "1_0",
+            "+5",
+            "\u0661",
+            "\uff11",
+            "0b1",
+            "0o7",
+            "nan",
+            "inf",
+            "Infinity",
+            "1e400",
+            "1e1_0",
+        )
+        for before, behind in (
+            ("exchange ", ": drop"),
+            ("exchange 1 byte ", ": drop"),
+            ("exchange 1 packet ", ": drop"),
+            ("", "%: drop"),
+            ("", "% of bytes: drop"),
+            ("at ", " s: drop"),
+            ("seed ", ""),
+            ("exchange 1: echo ", ""),
+            ("exchange 1 byte 2: flip ", ""),
+            ("exchange 1: flip ", ""),
+            ("exchange 1: delay ", ""),
+            ("exchange 1: delay 0.1-", ""),
+            ("exchange 1: split ", ""),
+            ("exchange 1: power-cycle ", ""),
+            ("exchange 1: brown-out 1 ", ""),
+            ("exchange 1: brown-out ", ""),
+        )
+    ]
+    + ["exchange 1: power-cycle 01", "exchange 1: delay 1,5", "exchange 1: delay .", "exchange 1: delay 1e"]
+    + [
+        f"exchange 1 byte 2: {word} {number}"
+        for word in ("corrupt", "insert")
+        for number in ("1_0", "+5", "\u0661", "\uff11", "0o7", "0x", "0x_1", "-0", "nan")
+    ],
+)
+def test_a_number_is_digits_as_people_write_them(line: str) -> None:
+    with pytest.raises(RequestError, match="^line 2: "):
+        parse(f"exchange 1: drop\n{line}")
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("exchange 1 byte 2: corrupt 0x8f", Fault(1, 2, "corrupt", value=0x8F)),
+        ("exchange 1 byte 2: insert 0aB", Fault(1, 2, "insert", value=0xAB)),
+        ("exchange 1: delay .5", Fault(1, None, "delay", seconds=0.5)),
+        ("exchange 1: delay 5.", Fault(1, None, "delay", seconds=5.0)),
+        ("exchange 1: delay 1E-3", Fault(1, None, "delay", seconds=1e-3)),
+        ("exchange 1: power-cycle 0X1f", Fault(1, None, "power-cycle", node=0x1F)),
+        ("exchange 007: drop", Fault(7, None, "drop")),
+    ],
+)
+def test_a_number_that_people_write_in_other_ways(line: str, fault: Fault) -> None:
+    assert parse(line) == Script((fault,))
+
+
 @pytest.mark.parametrize("text", ["seed 3", "# nothing", "\n"])
 def test_who_asks_for_a_script_without_a_fault_is_told(text: str) -> None:
-    assert len(parse(text)) == len(meant("")) == len(meant(())) == 0
+    assert len(parse(text)) == len(requested("")) == len(requested(())) == 0
     asks: list[Callable[[], object]] = [
-        lambda: meant(text),
+        lambda: requested(text),
         lambda: motorbus.simulate("feetech", faults=text),
         lambda: motorbus.open("feetech:sim,ids=1", faults=text),
     ]

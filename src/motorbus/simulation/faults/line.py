@@ -19,7 +19,7 @@ from motorbus.link.memory import Fired
 from motorbus.simulation.faults.fault import SOMEWHERE, Fault
 from motorbus.simulation.faults.harm import GAP, INSTANT, Strike, harmed
 from motorbus.simulation.faults.luck import Luck, chance
-from motorbus.simulation.faults.script import Script, script_of
+from motorbus.simulation.faults.script import Script, as_script
 
 if TYPE_CHECKING:
     from motorbus.simulation.faults.world import World
@@ -56,6 +56,7 @@ class FaultyLine:
     `fired`    what has happened, in order, each with the fault by position as text
     `record`   the same as a script by position: the same traffic suffers the same again
     `pending`  what has a place or a moment and has not happened
+    `never`    what stands there by chance and has not happened once
     `exchange` how many things the host has sent
     `most`     how many of the latest are kept; None: all
     `began`    from when moments count (s), if not from now
@@ -74,7 +75,7 @@ class FaultyLine:
         most: int | None = None,
         began: float | None = None,
     ) -> None:
-        given = script_of(script)
+        given = as_script(script)
         self.faults = tuple(fault for fault in given if fault.adapter is adapter)
         self.script = Script(self.faults, given.seed)
         if self.script.by_chance:
@@ -88,6 +89,7 @@ class FaultyLine:
         self._ways = {Side.HOST: _Way(), Side.DEVICE: _Way()}
         self._waiting: dict[int, list[tuple[int, Fault]]] = {}
         self._timed: set[int] = set()
+        self._lucky: set[int] = set()
         self._began = began if began is not None else world.now if world is not None else 0.0
         for fault in self.faults:
             self._check(fault)
@@ -114,6 +116,13 @@ class FaultyLine:
         left += [(index, self.faults[index]) for index in self._timed]
         armed = self._world.armed if self._world is not None else ()
         return (*armed, *(fault for _, fault in sorted(left, key=lambda pair: pair[0])))
+
+    @property
+    def never(self) -> tuple[Fault, ...]:
+        """What stands there by chance and has not happened once."""
+        return tuple(
+            fault for index, fault in enumerate(self.faults) if fault.percent and index not in self._lucky
+        )
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         """What arrives of this, and when."""
@@ -241,6 +250,7 @@ class FaultyLine:
                 strikes += [found for one in needy for found in self._somewhere(one, way, passed, len(body))]
                 strikes.sort(key=lambda strike: strike[:2])
         for strike in strikes:
+            self._lucky.add(strike.rank)
             self._note(strike.fault, at, to, data)
         pieces, stalled = self._at_bytes(way, data, body, at, [one for one in strikes if one.place >= 0])
         packet = [one.fault for one in strikes if one.place < 0]

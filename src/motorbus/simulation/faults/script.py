@@ -36,6 +36,10 @@ _WHERE: Final = re.compile(
     re.ASCII,
 )
 _SPAN: Final = re.compile(r"(?P<low>[\d.]+(?:e[+-]?\d+)?)-(?P<high>[\d.]+(?:e[+-]?\d+)?)", re.ASCII)
+_DECIMAL: Final = re.compile(r"\d+", re.ASCII)
+_ID: Final = re.compile(r"0+|[1-9]\d*", re.ASCII)
+_HEX: Final = re.compile(r"(?:0x)?[0-9a-f]+", re.ASCII | re.IGNORECASE)
+_REAL: Final = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,19 +89,19 @@ def parse(text: str) -> Script:
     return Script(tuple(faults), seed)
 
 
-def script_of(script: Script | str | Iterable[Fault]) -> Script:
+def as_script(script: Script | str | Iterable[Fault]) -> Script:
     """Whatever says a script as one."""
     if isinstance(script, str):
         return parse(script)
     return script if isinstance(script, Script) else Script(tuple(script))
 
 
-def meant(script: Script | str | Iterable[Fault]) -> Script:
+def requested(script: Script | str | Iterable[Fault]) -> Script:
     """The same of what somebody has asked for; "" is none.
 
     Raises RequestError for another text without a fault: its writer believes that something goes wrong.
     """
-    made = script_of(script)
+    made = as_script(script)
     if script and isinstance(script, str) and not made:
         raise RequestError(f"{short(script)!r}: there is no fault in it", expected=EXAMPLES)
     return made
@@ -163,34 +167,40 @@ def _values(takes: Takes, said: list[str]) -> dict[str, Any]:
     if not said:
         return {}
     if takes in (Takes.BITS, Takes.BYTE):
-        return {"value": _positive(int(said[0], 16))}
+        return {"value": _integer(said[0], _HEX, 16)}
     if takes in (Takes.BIT, Takes.PERHAPS_COUNT):
-        return {"value": _positive(int(said[0]))}
+        return {"value": _integer(said[0], _DECIMAL)}
     if takes in (Takes.NODE, Takes.NODES):
         every = takes is Takes.NODES and said[0] == "all"
         return {"node": None if every else _node(said[0])}
     if takes is Takes.SECONDS_NODE:
         whom = said[1] if len(said) > 1 else "all"
-        return {"seconds": float(said[0]), "node": None if whom == "all" else _node(whom)}
+        return {"seconds": _real(said[0]), "node": None if whom == "all" else _node(whom)}
     span = _SPAN.fullmatch(said[0]) if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) else None
     if span:
-        return {"seconds": float(span["low"]), "until": float(span["high"])}
-    return {"seconds": float(said[0])}
+        return {"seconds": _real(span["low"]), "until": _real(span["high"])}
+    return {"seconds": _real(said[0])}
 
 
 def _node(text: str) -> int:
     """An id, in decimal or as 0x25. Which ones there are is not known here."""
-    value = int(text, 0)
+    value = _integer(text, _HEX, 16) if text[:2].lower() == "0x" else _integer(text, _ID)
     if value.bit_length() > 32:
         raise ValueError(value.bit_length())
     return value
 
 
-def _positive(value: int) -> int:
-    """What is below 0 means something else in a `Fault`, and nothing in a script."""
-    if value < 0:
-        raise ValueError(value)
-    return value
+def _integer(text: str, form: re.Pattern[str], base: int = 10) -> int:
+    """A number without a sign. What Python takes besides, as 1_0 and digits of other scripts, is a slip of the pen."""
+    if not form.fullmatch(text):
+        raise ValueError(text)
+    return int(text, base)
+
+
+def _real(text: str) -> float:
+    if not _REAL.fullmatch(text):
+        raise ValueError(text)
+    return float(text)
 
 
 def _whole(text: str) -> int:
@@ -202,7 +212,7 @@ def _whole(text: str) -> int:
 
 def _float(text: str) -> float:
     try:
-        return float(text)
+        return _real(text)
     except ValueError:
         raise RequestError(f"{text} is no number") from None
 

@@ -8,7 +8,7 @@ from motorbus.errors import RequestError
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults.fault import Fault
 from motorbus.simulation.faults.line import FaultyLine
-from motorbus.simulation.faults.script import Script, meant
+from motorbus.simulation.faults.script import Script, requested
 from motorbus.simulation.faults.world import World
 
 
@@ -17,7 +17,7 @@ def strike(link: MemoryLink, script: Script | str | Iterable[Fault]) -> FaultyLi
 
     Raises RequestError for a bad script, for what these devices cannot do, and for faults of an adapter's text.
     """
-    given = meant(script)
+    given = requested(script)
     without_adapter(given)
     world = World(link.simulator, port=link, now=link.now())
     line = FaultyLine(given, world)
