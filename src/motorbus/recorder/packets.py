@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple, overload
 
 from motorbus.core.capture import FAULTS, KINDS, NOBODY, NOISE, Columns, Packet, Told
 from motorbus.core.operation import CanFrame, Data
+from motorbus.core.spans import cut_out
 
 _new = tuple.__new__
 _VOID: Final = (NOISE, NOBODY, NOBODY)
@@ -180,7 +181,8 @@ class Heard(Packets):
 class Whole(Packets):
     """All of a recording; the columns are arrays, `size` (bytes) is one more, and `data` is cut out when asked for."""
 
-    def __init__(self, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
+    def __init__(self, np: Any, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
+        self._np: Final = np
         self._recording: Final = recording
         self._columns: Final = columns
         self._at: Final = at
@@ -218,8 +220,7 @@ class Whole(Packets):
         recording = self._recording
         if not isinstance(recording, bytes):
             return [one.flat() if isinstance(one, CanFrame) else one for one in recording]
-        ends = self.start + self.size
-        return [recording[start:end] for start, end in zip(self.start.tolist(), ends.tolist(), strict=True)]
+        return cut_out(self._np, recording, self.start, self.size)
 
     def __len__(self) -> int:
         return len(self.start)
