@@ -147,17 +147,20 @@ class Heard(Packets):
 
     def _among(self, column: Sequence[int], void: int) -> list[int]:
         """What is said of packets, with this for the noise among them."""
-        whole, taken = [void] * len(self._data), 0
-        ends = [*self._noise, len(self._data)]
-        for begin, end in zip([0, *(place + 1 for place in self._noise)], ends, strict=True):
-            whole[begin:end] = column[taken : taken + end - begin]
-            taken += end - begin
+        whole: list[int] = []
+        told = 0
+        for place in self._noise:
+            taken, told = told, told + place - len(whole)
+            whole += column[taken:told]
+            whole.append(void)
+        whole += column[told:]
         return whole
 
     @cached_property
     def start(self) -> Sequence[int]:
-        if len({mark.more for mark in self._marks}) == 1:
-            return self._count(self._first + self._marks[0].more)
+        marks = self._marks
+        if len(marks) == 1 or len({mark.more for mark in marks}) == 1:
+            return self._count(self._first + marks[0].more)
         return [own + mark.more for mark, owns in self._by_mark() for own in owns]
 
     @cached_property
@@ -175,7 +178,9 @@ class Heard(Packets):
     def _count(self, first: int) -> Sequence[int]:
         if self._frames:
             return range(first, first + len(self._data))
-        return [*accumulate(map(len, self._data), initial=first)][:-1]
+        places = [*accumulate(map(len, self._data), initial=first)]
+        del places[-1]
+        return places
 
 
 class Whole(Packets):
