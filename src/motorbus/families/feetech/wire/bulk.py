@@ -47,7 +47,7 @@ def _places(np: Any, line: Any, top: int) -> tuple[Spans, Spans]:
     ends = starts + lengths
     ends += 4
     form = (ids <= top) & (lengths >= 2) & (ends <= len(line))
-    good = form & (_sums(np, line, starts, ends) == SOUND)
+    good = form & (_sums(np, line, starts, ends, form) == SOUND)
     if good.all():
         return (starts, ends), (starts[:0], ends[:0])
     sound, doubtful = np.flatnonzero(good), np.flatnonzero(form & ~good)
@@ -63,10 +63,10 @@ def _headers(np: Any, line: Any) -> Any:
     return starts[: np.searchsorted(starts, len(line) - OVERHEAD, "right")]
 
 
-def _sums(np: Any, line: Any, starts: Any, ends: Any) -> Any:
-    """The low bytes of the sums of these spans, most of which end where the next one begins, by numpy's own loop."""
+def _sums(np: Any, line: Any, starts: Any, ends: Any, form: Any) -> Any:
+    """The low bytes of the sums of those spans that have the form: most of them end where the next one begins."""
     sums = np.add.reduceat(line, starts, dtype=np.uint8)
-    apart = np.append(np.flatnonzero(ends[:-1] != starts[1:]), np.arange(len(starts))[-1:])
+    apart = np.flatnonzero(form & (ends != np.append(starts[1:], -1)))
     stops = np.minimum(ends[apart], len(line) - 1)
     edges = np.stack((starts[apart], stops), axis=1).reshape(-1)
     last = (ends[apart] > stops) * line[-1]

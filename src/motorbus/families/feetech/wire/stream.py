@@ -127,9 +127,10 @@ class Stream(Generic[P]):
             if run:
                 runs.append(run)
                 run = []
-            if not HEADER <= packet < above:
-                behind = data.find(HEADER, start + 1 if packet < HEADER else _behind(data, start))
-                fault = "framing"
+            if packet < HEADER:
+                behind, fault = data.find(HEADER, start + 1), "framing"
+            elif packet >= above:
+                behind, fault = self._sound(data, data.find(HEADER, _behind(data, start))), "framing"
             elif stop > end:
                 break
             else:
@@ -153,9 +154,13 @@ class Stream(Generic[P]):
         place = data.find(HEADER, start + 2, stop + 1)
         if place < 0:
             return -1 if stop == len(data) and data[-1] == HEADER[0] else stop
-        size = _SIZES[data[place + 3]] if place + 3 < len(data) else 0
-        other = data[place : place + size]
-        return place if len(other) == size > 0 and other < self._above and is_sound(other) else -1
+        return self._sound(data, place)
+
+    def _sound(self, data: bytes, place: int) -> int:
+        """This place of a header if it holds a packet, and -1 if not, or not yet; also for -1."""
+        size = _SIZES[data[place + 3]] if 0 <= place < len(data) - 3 else 0
+        packet = data[place : place + size]
+        return place if len(packet) == size > 0 and packet < self._above and is_sound(packet) else -1
 
     def _hunt(self, data: bytes, more: bool) -> list[Run]:
         """All of this searched."""
