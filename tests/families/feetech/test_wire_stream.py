@@ -297,6 +297,12 @@ def test_a_search_begins_only_where_it_must(
     assert len(calls) == searches
 
 
+def test_the_last_byte_of_a_bad_packet_may_begin_the_next_one_of_the_next_piece() -> None:
+    found = stream.Stream(252, bytes)
+    runs = [*found.runs(ENDS_IN_FF), *found.runs(SOUND_ONE[1:])]
+    assert runs == [Noise(ENDS_IN_FF[:-1], "checksum"), [SOUND_ONE]]
+
+
 def test_what_waits_for_more_is_not_looked_at_before_it_can_be_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     cuts = counted(monkeypatch, "_cut")
     packet = wire.encode_status(1, 0, bytes(30))
