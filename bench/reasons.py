@@ -65,8 +65,9 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "damaged length, and is as quick as it is incomplete",
     },
     "9": {
-        "bulk": "numpy finds the packets, but the bytes of each are an object that Python makes one by one; the "
-        "row of columns only leaves that out",
+        "bulk": "numpy finds the packets and cuts them out, but the bytes of each are an object of their own, and "
+        "what is got anew from the kernel for them and for the columns takes a good part; the row of columns only "
+        "leaves the bytes out",
     },
     "10": {
         "read request": "the first reading of a servo makes more than a packet: which packet is due, how long it may "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.capture import FAULTS, PIECE
-from motorbus.core.spans import first_come, tiled
+from motorbus.core.spans import cut_out, first_come, tiled
 
 Tile: TypeAlias = tuple[int, int, str]
 SPANS = st.lists(
@@ -95,3 +95,40 @@ def test_a_long_run_of_noise_comes_in_pieces(extra: int) -> None:
     assert sum(sizes[:-1]) == total
     assert set(sizes[:-2]) == {PIECE}
     assert 0 < sizes[-2] <= PIECE
+
+
+def test_one_number_is_said_of_all_packets() -> None:
+    none = np.zeros(0, int)
+    for total in (4, 6):
+        sound = np.array([0, 2]), np.array([2, 4])
+        found = tiled(np, total, sound, (none, none), lambda starts, _: (2, starts, 7))
+        assert found.kind.tolist() == [2, 2, 0][: total // 2]
+        assert found.code.tolist() == [7, 7, -1][: total // 2]
+        assert {column.dtype for column in found} == {np.dtype(np.int64)}
+
+
+@given(sizes=st.lists(st.sampled_from([1, 2, 3, 8, 8, 8, 21, 46]), max_size=9), times=st.integers(0, 90))
+def test_bytes_are_cut_out_as_by_slices(sizes: list[int], times: int) -> None:
+    """Those at the very end as well, and with zeros at their ends."""
+    many = np.array(sizes * times, int)
+    starts = np.cumsum(many) - many
+    data = bytes(place % 7 % 3 for place in range(int(many.sum())))
+    cut = cut_out(np, data, starts, many)
+    assert cut == [data[at : at + size] for at, size in zip(starts.tolist(), many.tolist(), strict=True)]
+    assert {type(one) for one in cut} <= {bytes}
+    assert type(cut) is list
+
+
+def test_bytes_of_a_size_that_many_have_are_cut_out_together() -> None:
+    class Counting(bytes):
+        cuts = 0
+
+        def __getitem__(self, key: Any) -> Any:
+            Counting.cuts += 1
+            return super().__getitem__(key)
+
+    data = Counting(bytes(range(250)) * 8)
+    sizes = np.array([8] * 200 + [3, 7])
+    starts = np.cumsum(sizes) - sizes
+    assert cut_out(np, data, starts, sizes)[-3:] == [data[1592:1600], data[1600:1603], data[1603:1610]]
+    assert Counting.cuts == 2 + 3

@@ -51,7 +51,7 @@ def decode(
     else:
         packets = _fed(whose, whole, way)
         kept, columns = [packet.data for packet in packets], _columns(np, packets)
-    return Whole(kept, columns, None if times is None else times[columns.start])
+    return Whole(np, kept, columns, None if times is None else times[columns.start])
 
 
 def can_decode() -> bool:

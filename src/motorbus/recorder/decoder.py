@@ -14,7 +14,7 @@ from typing import Final
 from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
 from motorbus.core.entry import shown
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.recorder.heard import captures_of, spoken
 from motorbus.recorder.packets import Heard, Mark
@@ -72,14 +72,15 @@ class Decoder:
 class _Line:
     """What went one way."""
 
-    __slots__ = ("_cutter", "_fault", "_frames", "_mark", "_marks", "_noise", "_taken", "_told")
+    __slots__ = ("_at", "_cutter", "_fault", "_frames", "_marks", "_more", "_noise", "_taken", "_told")
 
     def __init__(self, cutter: Cutter, frames: bool) -> None:
         self._cutter = cutter
         self._frames = frames
         self._taken = 0
         self._told = 0
-        self._mark: tuple[int, float | None] | None = None
+        self._more: int | None = None
+        self._at: float | None = None
         self._marks: tuple[Mark, ...] = ()
         self._noise = b""
         self._fault = 0
@@ -87,23 +88,21 @@ class _Line:
     def feed(self, data: Data, place: int, at: float | None) -> Heard:
         own = self._taken
         self._taken = own + (1 if self._frames else len(data))
-        mark = place - own, at
-        if self._mark != mark:
-            self._mark = mark
-            self._marks += (Mark(own, *mark),)
+        more = place - own
+        if more != self._more or at != self._at:
+            self._more, self._at = more, at
+            self._marks += (Mark(own, more, at),)
         return self._heard(self._cutter.feed(data))
 
     def flush(self) -> Heard:
         return self._heard(self._cutter.flush(), last=True)
 
     def _heard(self, runs: list[Run], last: bool = False) -> Heard:
-        data: list[bytes] = []
         noise: dict[int, int] = {}
-        sound: list[bytes] = []
         if len(runs) == 1 and isinstance(runs[0], list) and not self._noise:
             data = sound = runs[0]  # the usual case of a good line
         else:
-            self._sorted(runs, data, noise, sound)
+            data, sound = self._sorted(runs, noise)
         if last:
             self._silence(data, noise)
         first, marks = self._told, self._marks
@@ -112,11 +111,13 @@ class _Line:
             self._marks = marks[max(bisect_right(marks, told, key=_OWN) - 1, 0) :]
         return Heard(first, marks, data, noise, self._cutter.tell(sound), self._frames)
 
-    def _sorted(self, runs: list[Run], data: list[bytes], noise: dict[int, int], sound: list[bytes]) -> None:
-        """All into `data` in order: packets into `sound` as well, and of noise the fault into `noise`, by its place."""
-        stray, fault = self._noise, self._fault
+    def _sorted(self, runs: list[Run], noise: dict[int, int]) -> tuple[list[bytes], list[bytes]]:
+        """All in order, and of it the packets; of noise the fault into `noise`, by its place."""
+        data: list[bytes] = []
+        sound: list[bytes] = []
+        stray, fault, frames = self._noise, self._fault, self._frames
         for run in runs:
-            if not isinstance(run, Noise):
+            if isinstance(run, list):
                 if stray:
                     noise[len(data)] = fault
                     data.append(stray)
@@ -124,17 +125,20 @@ class _Line:
                 data += run
                 sound += run
                 continue
-            if stray and run.fault != FAULTS[fault]:
+            more, name, _ = run
+            number = _NUMBER[name]
+            if stray and number != fault:
                 noise[len(data)] = fault
                 data.append(stray)
                 stray = b""
-            fault = _NUMBER[run.fault]
-            stray += run.data
-            while len(stray) >= PIECE or (stray and self._frames):
+            fault = number
+            stray += more
+            while len(stray) >= PIECE or (frames and stray):
                 noise[len(data)] = fault
                 data.append(stray[:PIECE])
                 stray = stray[PIECE:]
         self._noise, self._fault = stray, fault
+        return data, sound
 
     def _silence(self, data: list[bytes], noise: dict[int, int]) -> None:
         """The noise has ended: tell it."""

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple, overload
 
 from motorbus.core.capture import FAULTS, KINDS, NOBODY, NOISE, Columns, Packet, Told
 from motorbus.core.operation import CanFrame, Data
+from motorbus.core.spans import cut_out
 
 _new = tuple.__new__
 _VOID: Final = (NOISE, NOBODY, NOBODY)
@@ -146,17 +147,20 @@ class Heard(Packets):
 
     def _among(self, column: Sequence[int], void: int) -> list[int]:
         """What is said of packets, with this for the noise among them."""
-        whole, taken = [void] * len(self._data), 0
-        ends = [*self._noise, len(self._data)]
-        for begin, end in zip([0, *(place + 1 for place in self._noise)], ends, strict=True):
-            whole[begin:end] = column[taken : taken + end - begin]
-            taken += end - begin
+        whole: list[int] = []
+        told = 0
+        for place in self._noise:
+            taken, told = told, told + place - len(whole)
+            whole += column[taken:told]
+            whole.append(void)
+        whole += column[told:]
         return whole
 
     @cached_property
     def start(self) -> Sequence[int]:
-        if len({mark.more for mark in self._marks}) == 1:
-            return self._count(self._first + self._marks[0].more)
+        marks = self._marks
+        if len(marks) == 1 or len({mark.more for mark in marks}) == 1:
+            return self._count(self._first + marks[0].more)
         return [own + mark.more for mark, owns in self._by_mark() for own in owns]
 
     @cached_property
@@ -174,13 +178,16 @@ class Heard(Packets):
     def _count(self, first: int) -> Sequence[int]:
         if self._frames:
             return range(first, first + len(self._data))
-        return [*accumulate(map(len, self._data), initial=first)][:-1]
+        places = [*accumulate(map(len, self._data), initial=first)]
+        del places[-1]
+        return places
 
 
 class Whole(Packets):
     """All of a recording; the columns are arrays, `size` (bytes) is one more, and `data` is cut out when asked for."""
 
-    def __init__(self, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
+    def __init__(self, np: Any, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
+        self._np: Final = np
         self._recording: Final = recording
         self._columns: Final = columns
         self._at: Final = at
@@ -218,8 +225,7 @@ class Whole(Packets):
         recording = self._recording
         if not isinstance(recording, bytes):
             return [one.flat() if isinstance(one, CanFrame) else one for one in recording]
-        ends = self.start + self.size
-        return [recording[start:end] for start, end in zip(self.start.tolist(), ends.tolist(), strict=True)]
+        return cut_out(self._np, recording, self.start, self.size)
 
     def __len__(self) -> int:
         return len(self.start)

@@ -279,7 +279,10 @@ def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
         (SOUND_ONE + b"\xff\xff\x01", 0),
         (ENDS_IN_FF + SOUND_ONE, 1),
         (HEADER_INSIDE + SOUND_ONE, 1),
-        (NOBODYS + SOUND_ONE, 1),
+        (NOBODYS + SOUND_ONE, 0),
+        (b"\xff" * 9 + SOUND_ONE[2:], 0),
+        (b"\xff\xff\x01\x12" + SOUND_ONE * 3, 0),
+        (b"\xff\xff\x01\x12" + BAD_ONE + SOUND_ONE * 3, 1),
         (SOUND_ONE + b"\x00", 1),
         (SOUND_ONE + b"\xff", 1),
         (b"\x00\x01\x02\x03\x04\x05", 1),
@@ -292,6 +295,12 @@ def test_a_search_begins_only_where_it_must(
     calls = counted(monkeypatch, "_search")
     stream.Stream(252, bytes).runs(data)
     assert len(calls) == searches
+
+
+def test_the_last_byte_of_a_bad_packet_may_begin_the_next_one_of_the_next_piece() -> None:
+    found = stream.Stream(252, bytes)
+    runs = [*found.runs(ENDS_IN_FF), *found.runs(SOUND_ONE[1:])]
+    assert runs == [Noise(ENDS_IN_FF[:-1], "checksum"), [SOUND_ONE]]
 
 
 def test_what_waits_for_more_is_not_looked_at_before_it_can_be_whole(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,31 +6,29 @@ Sums of all bytes up to some place make every checksum one subtraction. What is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from motorbus.core.capture import REPLY, REQUEST, Columns
 from motorbus.core.spans import tiled
-from motorbus.families.feetech.wire.packets import BROADCAST, MAX_ID, OVERHEAD, SOUND
-from motorbus.families.feetech.wire.sides import CODE, ID, Sides, may_ask
+from motorbus.families.feetech.wire.packets import (
+    BROADCAST,
+    HEADER,
+    MAX_ID,
+    OVERHEAD,
+    SOUND,
+)
+from motorbus.families.feetech.wire.sides import CODE, ID, LENGTH, Sides, may_ask
 
 
 def packets(np: Any, data: bytes, way: str = "") -> Columns:
     """Everything in `data`, of servos ("rx"), of a host ("tx"), or of both ("")."""
     line = np.frombuffer(data, np.uint8)
-    starts, ends = _places(np, line, top(way))
-    sums = _sums(np, line)
-    sound = sums(ends) - sums(starts) == SOUND
-    doubtful = starts[:0], ends[:0]
-    if not sound.all():
-        doubtful = starts[~sound], ends[~sound]
-        starts, ends = starts[sound], ends[sound]
 
     def tell(starts: Any, ends: Any) -> tuple[Any, Any, Any]:
-        ids, codes = line[starts + ID], line[starts + CODE]
+        ids, codes = line[ID:][starts], line[CODE:][starts]
         return _kinds(np, data, starts, ends, ids, codes, way), ids, codes
 
-    return tiled(np, len(data), (starts, ends), doubtful, tell)
+    return tiled(np, len(data), *_places(np, line, top(way)), tell)
 
 
 def top(way: str) -> int:
@@ -38,38 +36,46 @@ def top(way: str) -> int:
     return MAX_ID if way == "rx" else BROADCAST
 
 
-def _places(np: Any, line: Any, top: int) -> tuple[Any, Any]:
-    """Starts and ends of all that has the form of a packet and is there as a whole."""
-    full = line == 0xFF
-    starts = np.flatnonzero(full[:-1] & full[1:])
-    starts = starts[: np.searchsorted(starts, len(line) - OVERHEAD, "right")]
-    ids, lengths = line[starts + 2], line[starts + 3]
-    ends = starts + lengths + 4
+Spans: TypeAlias = tuple[Any, Any]
+"""Starts and ends."""
+
+
+def _places(np: Any, line: Any, top: int) -> tuple[Spans, Spans]:
+    """All that has the form of a packet and is there as a whole: where the checksum is right, and where it is wrong."""
+    starts = _headers(np, line)
+    ids, lengths = line[ID:][starts], line[LENGTH:][starts]
+    ends = starts + lengths
+    ends += 4
     form = (ids <= top) & (lengths >= 2) & (ends <= len(line))
-    return (starts, ends) if form.all() else (starts[form], ends[form])
+    good = form & (_sums(np, line, starts, ends, form) == SOUND)
+    if good.all():
+        return (starts, ends), (starts[:0], ends[:0])
+    sound, doubtful = np.flatnonzero(good), np.flatnonzero(form & ~good)
+    return (starts[sound], ends[sound]), (starts[doubtful], ends[doubtful])
 
 
-def _sums(np: Any, line: Any) -> Callable[[Any], Any]:
-    """A function: the low bytes of the sums of all bytes before these places.
+def _headers(np: Any, line: Any) -> Any:
+    """Where a header is that has room for a packet behind it."""
+    full = line == HEADER[0]
+    full[:-1] &= full[1:]
+    full[-1:] = False
+    starts = np.flatnonzero(full)
+    return starts[: np.searchsorted(starts, len(line) - OVERHEAD, "right")]
 
-    Eight bytes are summed at once, as four numbers of 16 bits side by side in one of 64, and only these sums are added
-    up over the whole line.
-    """
-    words = np.append(line, np.zeros(16 - len(line) % 8, np.uint8)).view("<u8")
-    lanes, ones, eight, high = map(np.uint64, (0x00FF_00FF_00FF_00FF, 0x0001_0001_0001_0001, 8, 48))
-    first = np.array([(1 << 8 * count) - 1 for count in range(8)], np.uint64)
 
-    def within(words: Any) -> Any:
-        pairs = (words & lanes) + (words >> eight & lanes)
-        return (pairs * ones >> high).astype(np.uint8)
-
-    before = np.zeros(len(words), np.uint8)
-    np.cumsum(within(words[:-1]), dtype=np.uint8, out=before[1:])
-    return lambda places: before[places >> 3] + within(words[places >> 3] & first[places & 7])
+def _sums(np: Any, line: Any, starts: Any, ends: Any, form: Any) -> Any:
+    """The low bytes of the sums of those spans that have the form: most of them end where the next one begins."""
+    sums = np.add.reduceat(line, starts, dtype=np.uint8)
+    apart = np.flatnonzero(form & (ends != np.append(starts[1:], -1)))
+    stops = np.minimum(ends[apart], len(line) - 1)
+    edges = np.stack((starts[apart], stops), axis=1).reshape(-1)
+    last = (ends[apart] > stops) * line[-1]
+    sums[apart] = np.add.reduceat(line, edges, dtype=np.uint8)[::2] + last
+    return sums
 
 
 def _kinds(np: Any, data: bytes, starts: Any, ends: Any, ids: Any, codes: Any, way: str) -> Any:
     if way or not may_ask(ids.tobytes(), codes.tobytes()):
-        return np.full(len(starts), REQUEST if way == "tx" else REPLY, np.int8)
+        return REQUEST if way == "tx" else REPLY
     each = [data[start:end] for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
     return np.array(Sides().tell(each)()[0], np.int8)

@@ -21,6 +21,7 @@ from motorbus.families.feetech.wire.packets import (
 )
 
 ID: Final = 2
+LENGTH: Final = 3
 CODE: Final = 4
 _SURE: Final = bytes(set(range(256)) - set(RULES))
 """Fifth bytes that are no instruction."""

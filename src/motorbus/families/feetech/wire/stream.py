@@ -40,6 +40,8 @@ HEADLESS: Final = 65011
 """Where Adler-32 begins so that its low half is the sum without the header; that of a sound packet is never reduced."""
 _SIZES: Final = (0, 0, *range(OVERHEAD, MAX_LENGTH + 5))
 """Bytes of a packet by its length field; 0 for none."""
+_new: Final = tuple.__new__
+"""Makes a `Noise` in a third of the time."""
 
 
 class Stream(Generic[P]):
@@ -125,28 +127,40 @@ class Stream(Generic[P]):
             if run:
                 runs.append(run)
                 run = []
-            headed = HEADER <= packet < above
-            if headed and stop > end:
+            if packet < HEADER:
+                behind, fault = data.find(HEADER, start + 1), "framing"
+            elif packet >= above:
+                behind, fault = self._sound(data, data.find(HEADER, _behind(data, start))), "framing"
+            elif stop > end:
                 break
-            if headed and packet[-1] != 0xFF and packet.find(HEADER, 2) < 0:
-                runs.append(Noise(packet, "checksum"))
-                start = stop
-            elif packet < HEADER and (stop := data.find(HEADER, start + 1)) > 0:
-                runs.append(Noise(data[start:stop], "framing"))
-                start = stop
+            else:
+                behind, fault = self._inside(data, start, stop), "checksum"
+            if behind > 0:
+                runs.append(_new(Noise, (data[start:behind], fault, None)))
+                start = behind
             elif (start := self._search(data, start, runs, more=True)) < 0:
                 return runs
         if run:
             runs.append(run)
-        self._keep(data[start:], runs)
+        rest = data[start:]
+        if not rest or HEADER <= rest < above:
+            self._rest = rest
+        else:
+            self._search(rest, 0, runs, more=True)
         return runs
 
-    def _keep(self, data: bytes, runs: list[Run]) -> None:
-        """What is not complete, if it can become a packet."""
-        if not data or HEADER <= data < self._above:
-            self._rest = data
-        else:
-            self._search(data, 0, runs, more=True)
+    def _inside(self, data: bytes, start: int, stop: int) -> int:
+        """Where to look on behind a header here whose checksum is wrong; -1 where only a search can tell."""
+        place = data.find(HEADER, start + 2, stop + 1)
+        if place < 0:
+            return -1 if stop == len(data) and data[-1] == HEADER[0] else stop
+        return self._sound(data, place)
+
+    def _sound(self, data: bytes, place: int) -> int:
+        """This place of a header if it holds a packet, and -1 if not, or not yet; also for -1."""
+        size = _SIZES[data[place + 3]] if 0 <= place < len(data) - 3 else 0
+        packet = data[place : place + size]
+        return place if len(packet) == size > 0 and packet < self._above and is_sound(packet) else -1
 
     def _hunt(self, data: bytes, more: bool) -> list[Run]:
         """All of this searched."""
@@ -258,7 +272,12 @@ def _behind(data: bytes, start: int) -> int:
     """Where to look on behind a header whose id is none: of many FF in a row only the last two can begin a packet."""
     if data[start + 2] != HEADER[0]:
         return start + 1
-    return len(data) - len(data[start:].lstrip(HEADER)) - len(HEADER)
+    while piece := data[start : start + MAX_LENGTH]:
+        left = piece.lstrip(HEADER)
+        start += len(piece) - len(left)
+        if left:
+            break
+    return start - len(HEADER)
 
 
 def _status(data: bytes) -> Packet:
