@@ -11,6 +11,7 @@ import pytest
 from bench.responder import build
 from bench.robot_loop import (
     COLUMNS,
+    KINDS,
     LOOKS,
     STEP,
     Sample,
@@ -28,11 +29,11 @@ from bench.robot_loop import (
 from bench.workloads import to_and_fro
 from motorbus.motion.machine import Machine
 
-STEADY = Sample("followed", 909.1, 1136.4, 909.1, 54546, 0, 0, 4e-6, 950e-6, 120e-6)
-FLAT = Sample("followed", 1136.4, 1136.4, 1020.0, 5100, 5000, 500, 400e-6, 970e-6, 120e-6)
+STEADY = Sample("followed ahead", 909.1, 1136.4, 909.1, 54546, 0, 0, 4e-6, 950e-6, 120e-6)
+FLAT = Sample("followed ahead", 1136.4, 1136.4, 1020.0, 5100, 5000, 500, 400e-6, 970e-6, 120e-6)
 
 
-@pytest.mark.parametrize("kind", ["followed", "direct"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_it_is_a_loop_of_six_axes_on_a_wire_that_takes_its_time(kind: str) -> None:
     found = sample(build(), kind, 100.0, 0.5)
     assert found.wire == pytest.approx(1e6 / 880)
@@ -101,7 +102,14 @@ def test_the_verdict_is_of_the_worst() -> None:
     assert "79.2%. At least 88%: MISSED." in verdict([STEADY, FLAT, FLAT._replace(achieved=900.0)])
 
 
+def test_loops_that_are_not_ahead_are_told_and_not_judged() -> None:
+    others = [one._replace(kind="direct", achieved=700.0, skipped=7) for one in (STEADY, FLAT)]
+    told = verdict([STEADY, FLAT, *others])
+    assert "89.8%. At least 88%: reached." in told
+    assert "Not ahead: 7 in 54546 cycles, and 61.6%." in told
+
+
 def test_there_is_a_row_for_each() -> None:
     told = rows([STEADY, FLAT])
     assert all(len(row) == len(COLUMNS) for row in told)
-    assert told[1] == ("followed", "1136.4", "1020.0", "89.8%", "5000", "500", "400", "970", "120")
+    assert told[1] == ("followed ahead", "1136.4", "1020.0", "89.8%", "5000", "500", "400", "970", "120")

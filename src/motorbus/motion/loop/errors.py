@@ -27,6 +27,7 @@ def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
 
 
 def as_number(name: str, goal: object) -> float:
+    """The goal of this axis as it is (rad, m). Raises RequestError for what is no number."""
     if isinstance(goal, bool) or not isinstance(goal, int | float):
         raise RequestError(
             f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent"
