@@ -21,6 +21,8 @@ from motorbus.families.feetech.driver.identity import unknown_map
 from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.orders import position_goal
 
+_made: Final = tuple.__new__
+
 
 def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[Positions]:
     """The present positions of all of these in one exchange, which may be kept and run again.
@@ -195,21 +197,23 @@ class _Gauges:
         packets = Packets([node.node for node in nodes], count, how[0].order)
         are_sound, unpack, plain = packets.are_sound, packets.unpack, min(one.plain for one in how)
         scales = [(one.node.node, one.scale, one.factor) for one in how]
+        blank = dict.fromkeys((one.node.node for one in how), 0.0)
 
         def whole(data: bytes, at: float) -> Positions | Unlike:
             nonlocal made_by
             if not are_sound(data) or (by := list(map(settings_of_now, nodes))) != made_by:
                 return UNLIKE
             made_by = by  # where they were read once more and are the same, that is seen at once from now on
-            raws = unpack(data)
-            if max(raws) >= plain:
-                return UNLIKE
-            values = {id: raw * scale * factor for (id, scale, factor), raw in zip(scales, raws, strict=True)}
+            values = blank.copy()  # of the right size, which one that grows has not
+            for (id, scale, factor), raw in zip(scales, unpack(data)):  # noqa: B905 - they are as many
+                if raw >= plain:
+                    return UNLIKE
+                values[id] = raw * scale * factor
             for node in nodes:
                 node.at = at
                 node.alarm = ()
             self._last = at, values.copy()
-            return Positions(values, (), at)
+            return _made(Positions, (values, (), at))
 
         return whole
 
