@@ -24,6 +24,7 @@ from motorbus.errors import LinkError, MotorbusError
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.bus.turns import Turns
+    from motorbus.core.aimed import Aim
     from motorbus.link.base import Link
 
 T = TypeVar("T")
@@ -60,12 +61,13 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
             if launched is None:
                 return UNLIKE
             course = launched
+            link = bus.link
             if bus.sleeps:
-                bus.link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
-            arrived = bus.link.read(course.deadline)
+                link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
+            arrived = link.read(course.deadline)
             if len(arrived) == 1:
                 lock.acquire()  # let go of it below, or where the flight falls
-                at = bus.link.now()
+                at = link.now()
                 if at > course.deadline:  # a host that was held up takes it in late
                     at = course.deadline
                 if turns.aloft is course and at - course.sent_at >= course.least:
@@ -111,19 +113,26 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
             course = course.twin
         if course.era != lock.era and not course.fits():
             return None
-        now, free = link.now(), turns.free_at
-        if bus.relay.pumper is not None or (free > now and turns.takes_time) or _stale(turns, link):
+        relay = bus.relay
+        now, start = link.now(), turns.free_at
+        if relay.pumper is not None or (start > now and turns.takes_time):
             return None
-        start, request = free if free > now else now, course.request
+        if arrived := link.read(-inf):  # it cannot answer a request that has not left: take it in first
+            with lock:
+                turns.feed(arrived, link.now())
+            return None
+        if start < now:
+            start = now
+        request = course.request
         if ahead is not None:
             if not _may_leave(turns, ahead, now):
                 return None
-            turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
+            turns.free_at = start = start + _air_time(turns, ahead)
             request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
         # an answer cannot come before its question has passed, which does so behind what is ahead of it
-        course.sent_at = start if turns.takes_time else now
+        course.sent_at = start if start > now and turns.takes_time else now
         course.deadline = start + course.wait
-        lock.owing, bus.relay.pumper = True, get_ident()
+        lock.owing, relay.pumper = True, get_ident()
         turns.aloft = turns.flying[course.lane] = course
         turns.echo.recent.append(course.request)  # type: ignore[arg-type]
         link.write(request)
@@ -165,7 +174,7 @@ def _thrown(bus: Bus, exchange: Exchange[Any]) -> float | None:
     now, free = link.now(), turns.free_at
     if (free > now and turns.takes_time) or not _may_leave(turns, exchange, now):
         return None
-    turns.free_at = (free if free > now else now) + turns.family.air_time(exchange, turns.rate)
+    turns.free_at = (free if free > now else now) + _air_time(turns, exchange)
     link.write(exchange.request)
     return now
 
@@ -200,13 +209,28 @@ def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
     return True
 
 
+def _air_time(turns: Turns, exchange: Exchange[Any]) -> float:
+    """s on the wire for what nobody answers; all orders of one aim are as long, so of those it is known."""
+    aim: Aim | None = exchange.aim
+    if aim is None:
+        return turns.family.air_time(exchange, turns.rate)
+    rate, seconds = aim.air
+    if rate != turns.rate:
+        rate = turns.rate
+        seconds = turns.family.air_time(exchange, rate)
+        aim.air = rate, seconds
+    return seconds
+
+
 def _is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
-    if turns.passes is None or not exchange.sure:
+    passes = turns.passes
+    if passes is None or not exchange.sure:
         return False
-    if exchange.refusal is not None and exchange.refusal(turns.known.stops) is not None:
+    refusal = exchange.refusal
+    if refusal is not None and refusal(turns.known.stops) is not None:
         return False
     try:
-        return turns.passes(exchange)
+        return passes(exchange)
     except MotorbusError:  # who goes the usual way is told why
         return False
 
@@ -219,15 +243,6 @@ def _admitted(turns: Turns, exchange: Exchange[Any]) -> bool:
     except MotorbusError:  # who goes the usual way is told why
         return False
     return True
-
-
-def _stale(turns: Turns, link: Link) -> bool:
-    """What has already arrived cannot answer a request that has not left: take it in first. Was there anything?"""
-    arrived = link.read(-inf)
-    if arrived:
-        with turns.lock:
-            turns.feed(arrived, link.now())
-    return bool(arrived)
 
 
 def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:

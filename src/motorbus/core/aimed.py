@@ -15,9 +15,10 @@ from motorbus.core.operation import Answer, Effect, Exchange, Goal, Rank, Refusa
 
 class Aim:
     """What all orders have in common that are made in one mould: the nodes they are for, how the goals are made of raw
-    values, and why one must not leave after all; see `Exchange`."""
+    values, and why one must not leave after all; see `Exchange`. They are all as long: `air` is a rate of the bus
+    (bit/s), and the time (s) that one of them took on the wire at that rate, once a bus has found that out."""
 
-    __slots__ = ("goals", "ordered", "refusal")
+    __slots__ = ("air", "goals", "ordered", "refusal")
 
     def __init__(
         self, ordered: Sequence[int], goals: Callable[[Sequence[int]], tuple[Goal, ...]], refusal: Refusal
@@ -25,6 +26,7 @@ class Aim:
         self.ordered: Final = ordered
         self.goals: Final = goals
         self.refusal: Final = refusal
+        self.air: tuple[int, float] = 0, 0.0
 
 
 class Aimed(Exchange[None]):
