@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.bus.turns import Turns
     from motorbus.core.aimed import Aim
-    from motorbus.link.base import Link
 
 T = TypeVar("T")
 

@@ -18,7 +18,7 @@ from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, re
 from motorbus.families.feetech.driver.gauge import Packets, measure
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
-from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.driver.node import CHANGES, Node, Settings
 from motorbus.families.feetech.driver.orders import position_goal
 
 _made: Final = tuple.__new__
@@ -198,12 +198,16 @@ class _Gauges:
         are_sound, unpack, plain = packets.are_sound, packets.unpack, min(one.plain for one in how)
         scales = [(one.node.node, one.scale, one.factor) for one in how]
         blank = dict.fromkeys((one.node.node for one in how), 0.0)
+        seen: object = None  # `CHANGES.now` when they were found to have those settings
 
         def whole(data: bytes, at: float) -> Positions | Unlike:
-            nonlocal made_by
-            if not are_sound(data) or (by := list(map(settings_of_now, nodes))) != made_by:
+            nonlocal seen
+            if not are_sound(data):
                 return UNLIKE
-            made_by = by  # where they were read once more and are the same, that is seen at once from now on
+            if (now := CHANGES.now) is not seen:
+                if list(map(settings_of_now, nodes)) != made_by:
+                    return UNLIKE
+                seen = now
             values = blank.copy()  # of the right size, which one that grows has not
             for (id, scale, factor), raw in zip(scales, unpack(data)):  # noqa: B905 - they are as many
                 if raw >= plain:

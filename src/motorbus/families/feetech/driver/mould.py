@@ -18,7 +18,7 @@ from motorbus.core.entry import Entry
 from motorbus.core.operation import Goal
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import CHANGES, Node
 from motorbus.families.feetech.driver.orders import goals_of
 from motorbus.families.feetech.table import Mode
 
@@ -107,6 +107,7 @@ class Mould:
         item = "B" + "".join("BH"[row.size - 1] for row in first)
         self.ids: Final = tuple(node.node for node in nodes)
         self._made_by: Final = [(node, node.settings) for node in nodes]
+        self._seen: object = None  # `CHANGES.now` when they were found to be those
         as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
         self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
         self._columns: Final = [Column(cells[place::count]) for place in range(count)]
@@ -121,9 +122,13 @@ class Mould:
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
+        now = CHANGES.now
+        if now is self._seen:
+            return True
         for node, settings in self._made_by:
             if node.settings is not settings and node.settings != settings:
                 return False
+        self._seen = now
         return True
 
     def cast(self, values: Sequence[float]) -> Aimed | None:
