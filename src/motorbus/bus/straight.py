@@ -112,9 +112,10 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
             course = course.twin
         if course.era != lock.era and not course.fits():
             return None
-        relay = bus.relay
+        relay, pace = bus.relay, turns.pace
+        takes_time = pace is not None and pace.certain  # as `turns.takes_time`
         now, start = link.now(), turns.free_at
-        if relay.pumper is not None or (start > now and turns.takes_time):
+        if relay.pumper is not None or (start > now and takes_time):
             return None
         if arrived := link.read(-inf):  # it cannot answer a request that has not left: take it in first
             with lock:
@@ -129,7 +130,7 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
             turns.free_at = start = start + _air_time(turns, ahead)
             request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
         # an answer cannot come before its question has passed, which does so behind what is ahead of it
-        course.sent_at = start if start > now and turns.takes_time else now
+        course.sent_at = start if takes_time else now
         course.deadline = start + course.wait
         lock.owing, relay.pumper = True, get_ident()
         turns.aloft = turns.flying[course.lane] = course
@@ -199,8 +200,9 @@ def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
     if exchange.effect or exchange.goals or exchange.later is not None:
         if not _is_sure(turns, exchange) and not _admitted(turns, exchange):
             return False
-        if exchange.aim in turns.aims:
-            turns.aims[exchange.aim] = now
+        aim = exchange.aim
+        if aim in turns.aims:
+            turns.aims[aim] = now
         else:
             turns.orders(exchange, now)
     turns.statistics.other["sent"] += 1

@@ -55,6 +55,7 @@ class Aimed(Exchange[None]):
     def __init__(self, request: bytes, aim: Aim, raws: Sequence[int]) -> None:
         self.request = request  # type: ignore[misc]
         self.aim = aim
+        self.refusal = aim.refusal  # type: ignore[misc]
         self._raws = raws
         self._goals: tuple[Goal, ...] | None = None
 
@@ -77,8 +78,3 @@ class Aimed(Exchange[None]):
     def ordered(self) -> Sequence[int]:
         """The nodes of its goals."""
         return self.aim.ordered
-
-    @property  # type: ignore[misc]
-    def refusal(self) -> Refusal:
-        """Why it must not leave after all."""
-        return self.aim.refusal

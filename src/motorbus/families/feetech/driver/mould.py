@@ -107,7 +107,7 @@ class Mould:
         item = "B" + "".join("BH"[row.size - 1] for row in first)
         self.ids: Final = tuple(node.node for node in nodes)
         self._made_by: Final = [(node, node.settings) for node in nodes]
-        self._seen: object = None  # `CHANGES.now` when they were found to be those
+        self.seen: object = None  # `CHANGES.now` when they were found to be those
         as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
         self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
         self._columns: Final = [Column(cells[place::count]) for place in range(count)]
@@ -123,12 +123,12 @@ class Mould:
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
         now = CHANGES.now
-        if now is self._seen:
+        if now is self.seen:
             return True
         for node, settings in self._made_by:
             if node.settings is not settings and node.settings != settings:
                 return False
-        self._seen = now
+        self.seen = now
         return True
 
     def cast(self, values: Sequence[float]) -> Aimed | None:

@@ -16,7 +16,7 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.group import block_of, distinct, sync_writes
 from motorbus.families.feetech.driver.loop import check_ordered, known_row, one_packet
 from motorbus.families.feetech.driver.mould import Mould, mould
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import CHANGES, Node
 from motorbus.families.feetech.driver.orders import Order, check_names, check_values, only_block, orders_of
 
 Row: TypeAlias = "float | Sequence[float]"
@@ -42,7 +42,7 @@ class SyncWriter:
         LimitExceeded when one fits no register.
         """
         made = self._mould
-        if made is None or not made.holds():
+        if made is None or (made.seen is not CHANGES.now and not made.holds()):
             made = self._fit()
         exchange = None
         if made is not None and (type(values) is list or type(values) is tuple):
