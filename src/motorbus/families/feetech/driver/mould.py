@@ -114,6 +114,7 @@ class Mould:
         self._each: Final = count + 1  # parts of a packet for each servo
         self._floats: Final = [float] * (count * len(nodes))
         self._items: Final = [part for id in self.ids for part in (id, *[0] * count)]
+        self._last: tuple[list[float], list[int]] = [], []
         self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
         self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
         self._sum: Final = sum(self._head[2:])
@@ -136,23 +137,34 @@ class Mould:
         not plain, or they are not as many as it takes."""
         if [*map(type, values)] != self._floats:
             return None
-        items = self._items.copy()
-        columns = self._columns
-        each = self._each
-        if each == 2:
-            raws = columns[0].raws(values)
-            if raws is None:
-                return None
-            items[1::2] = raws
-        else:
-            count = each - 1
-            for place, column in enumerate(columns):
-                found = column.kept(values[place::count])
-                if found is None:
-                    return None
-                items[place + 1 :: each] = found
+        count = self._each - 1
+        filled: list[int] | None = self._items
+        firsts = values
+        if count > 1:
+            filled, firsts = self._filled(values, count), values[::count]
+        raws = self._columns[0].raws(firsts)
+        if filled is None or raws is None:
+            return None
+        items = filled.copy()
+        items[1 :: count + 1] = raws
         body = self._pack(*items)
         return Aimed(self._head + body + BYTES[~adler32(body, self._sum) & 255], self._aim, items)
+
+    def _filled(self, values: Sequence[float], count: int) -> list[int] | None:
+        """The parts of a packet with all but the values of the first row; in a loop these are mostly what they were."""
+        rest = list(values)
+        del rest[::count]
+        last, filled = self._last
+        if rest == last:
+            return filled
+        items = self._items.copy()
+        for place, column in enumerate(self._columns[1:], 1):
+            raws = column.kept(values[place::count])
+            if raws is None:
+                return None
+            items[place + 1 :: count + 1] = raws
+        self._last = rest, items
+        return items
 
     def _goals(self, items: Sequence[int]) -> tuple[Goal, ...]:
         raws = [raw for number, raw in enumerate(items) if number % self._each]
