@@ -39,6 +39,7 @@ class Aimed(Exchange[None]):
     __slots__ = ("_goals", "_raws", "aim")
 
     aim: Aim
+    refusal: Refusal  # type: ignore[misc]
     sure = True
     replies = ()  # type: ignore[misc]  # the same of all, so it is said once
     lane = 0  # type: ignore[misc]

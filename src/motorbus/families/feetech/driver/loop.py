@@ -157,10 +157,11 @@ def _unsettled(node: Node) -> RequestError:
 class _Gauges:
     """Those of several servos that one exchange asks. What was read last is kept, for the gate asks the same again."""
 
-    __slots__ = ("_gauges", "_last", "_places")
+    __slots__ = ("_gauges", "_last", "_places", "_seen")
 
     def __init__(self, gauges: Mapping[int, _Gauge]) -> None:
         self._gauges = gauges
+        self._seen: object = None  # `CHANGES.now` when all had the settings by which they were read last
         self._last: tuple[Answer | float, dict[int, float]] | None = (
             None  # which one or when, and what it said
         )
@@ -194,6 +195,7 @@ class _Gauges:
         nodes, made_by = [one.node for one in how], [one.settings for one in how]
         for gauge, settings in zip(self._gauges.values(), made_by, strict=True):
             gauge.settle(settings)
+        self._seen = None
         packets = Packets([node.node for node in nodes], count, how[0].order)
         are_sound, unpack, plain = packets.are_sound, packets.unpack, min(one.plain for one in how)
         scales = [(one.node.node, one.scale, one.factor) for one in how]
@@ -223,12 +225,16 @@ class _Gauges:
 
     def _settled(self) -> bool:
         """Whether all have the settings by which they were read last."""
+        now = CHANGES.now
+        if now is self._seen:
+            return True
         for gauge in self._gauges.values():
             settings = gauge.node.settings
             if settings is not gauge.settings:
                 if settings != gauge.settings:
                     return False
                 gauge.settings = settings  # the same, read once more: that is seen at once from now on
+        self._seen = now
         return True
 
 
