@@ -38,6 +38,20 @@ def said(call: Any) -> Any:
         return type(error), str(error)
 
 
+def test_what_nobody_answers_takes_its_time_at_the_rate_of_now() -> None:
+    bus, _, _ = struck_bus()
+    for rate in (1_000_000, 1_000_000, 500_000, 500_000, 1_000_000):
+        bus.run(iter(Tune(rate)))
+        bus.run(kept(1))
+        for _ in range(2):
+            free = max(bus.turns.free_at, bus.link.now())
+            bus.run(order())
+            assert bus.turns.free_at == pytest.approx(free + bus.family.air_time(order(), rate), abs=1e-12)
+            free = max(bus.turns.free_at, bus.link.now())
+            bus.volley(order(), kept(1))
+            assert bus.turns.free_at == pytest.approx(free + bus.family.air_time(order(), rate), abs=1e-12)
+
+
 def known_of(bus: Bus) -> Any:
     """All that anybody can see of a bus."""
     nodes = {
@@ -103,7 +117,7 @@ def usually(steps: list[Step], **options: Any) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         for module, name in ((pump, "fly"), (pump, "cast"), (volley, "fly")):
             patch.setattr(module, name, never)
-        patch.setattr(loosed, "loose", nothing)
+        patch.setattr(loosed, "_loose", nothing)
         return carried_out(steps, **options)
 
 

@@ -77,6 +77,15 @@ def unanswered(bus: Bus) -> list[int]:
     return [due.node for flight in flights for due in flight.exchange.replies]  # type: ignore[union-attr]
 
 
+def heard_of_all(bus: Bus, exchange: Any) -> Any:
+    """A group says who is missing, and does not wait; who was silent twice is left alone for a while."""
+    value = bus.run(exchange)
+    if value[1]:
+        bus.link.advance(1.0)  # type: ignore[attr-defined]
+        value = bus.run(exchange)
+    return value
+
+
 CASES = [(what, "", rest) for what in CALLS for rest in (0.0, 0.01)]
 CASES += [
     (what, fault, 0.0)
@@ -107,9 +116,7 @@ def test_an_interrupt_at_any_line_leaves_the_bus_usable_and_believes_nobody(
         for node in nodes:
             simulator.memory[node][57] = 99
         value = in_another_thread(lambda: bus.run(exchange))  # noqa: B023 - called at once
-        value = (
-            bus.run(exchange) if value[1] else value
-        )  # a group says that they are missing, and does not wait
+        value = value if not value[1] else heard_of_all(bus, exchange)
         assert value == ([(node, 0, node, 99) for node in nodes], ()), f"line {at}"
         assert bus.run(position(6)) == 6
     assert at > 20

@@ -95,14 +95,14 @@ class Launches:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.straight = 0
-        launched = straight._launched
+        launched = straight.launched_now
 
         def counted(*given: Any) -> Any:
             course = launched(*given)
             self.straight += course is not None
             return course
 
-        monkeypatch.setattr(straight, "_launched", counted)
+        monkeypatch.setattr(straight, "launched_now", counted)
 
 
 @pytest.mark.timeout(600)

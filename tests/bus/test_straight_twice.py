@@ -6,7 +6,7 @@ import pytest
 
 from motorbus.bus.pump import Bus
 from tests.bus.responder import position
-from tests.bus.test_straight_ends import CALLS, flown, in_another_thread, unanswered
+from tests.bus.test_straight_ends import CALLS, flown, heard_of_all, in_another_thread, unanswered
 from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 
@@ -41,7 +41,7 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list
     for node in nodes:
         simulator.memory[node][57] = 99
     value = in_another_thread(lambda: bus.run(exchange))
-    value = bus.run(exchange) if value[1] else value  # a group says that they are missing, and does not wait
+    value = value if not value[1] else heard_of_all(bus, exchange)
     if value != ([(node, 0, node, 99) for node in nodes], ()):
         wrong.append(f"a wrong value: {value}")
     if bus.run(position(6)) != 6:

@@ -8,11 +8,15 @@ otherwise is over when it has been let loose.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
+from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
-from motorbus.bus.straight import foreseen, land, loose
+from motorbus.bus.run import taken
+from motorbus.bus.straight import brought, fallen, found, is_sure, launched_now, noted, off
 from motorbus.bus.volley import rides, volley
-from motorbus.core.operation import Exchange
+from motorbus.core.operation import UNLIKE, Exchange
 from motorbus.errors import LinkError
 
 if TYPE_CHECKING:
@@ -62,7 +66,7 @@ class Loosed:
         """These, ready to leave right behind the answer; None where they cannot, or it is not sure that they may."""
         if self._course is None or len(orders) != 1 or not rides(orders[0]):
             return None
-        return Behind(orders[0], begins, fits) if foreseen(self._bus, orders[0]) else None
+        return Behind(orders[0], begins, fits) if _foreseen(self._bus, orders[0]) else None
 
     def land(self, behind: Behind | None = None) -> list[Any]:
         """The value of each, or the error where it is forgiven. Waits for the answer. Raises the error that is not.
@@ -74,7 +78,7 @@ class Loosed:
             return told
         self._course = None
         try:
-            told = [*told, land(self._bus, course, behind)]
+            told = [*told, _land(self._bus, course, behind)]
         except LinkError:
             raise
         except self._forgiven as error:
@@ -91,4 +95,102 @@ def _gone(bus: Bus, exchanges: Sequence[Exchange[Any]]) -> Course | None:
     *orders, question = exchanges
     if question.whole is None or not all(rides(order) for order in orders):
         return None
-    return loose(bus, question, orders[0] if orders else None)
+    return _loose(bus, question, orders[0] if orders else None)
+
+
+def _loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None) -> Course | None:
+    """Send this as `fly` does, and come back at once; what has left must be given to `_land`. None as `UNLIKE` there.
+
+    Meanwhile the bus is free: whoever else wants something of it makes a usual flight of this one.
+    """
+    course: Course | None = exchange.course
+    if (course is None or course.turns is not bus.turns) and (course := found(bus, exchange)) is None:
+        return None
+    launched = None
+    try:
+        try:
+            launched = launched_now(bus, course, ahead)
+            if launched is not None:
+                launched.wake = bus.relay.wake
+                bus.relay.pass_on()
+            return launched
+        except BaseException as error:
+            own = bus.turns.aloft if bus.relay.pumper == get_ident() else launched
+            fallen(bus, own, error)
+            raise
+    except BaseException:  # as in `fly`
+        bus.relay.recover()
+        raise
+
+
+def _foreseen(bus: Bus, order: Exchange[Any]) -> bool:
+    """Whether this may surely leave, by what is known while an answer is on its way; it is noted as given then."""
+    lock = bus.turns.lock
+    try:
+        try:
+            lock.acquire()
+            found = is_sure(bus.turns, order)
+            lock.release()
+        except BaseException:
+            bus.relay.recover()
+            raise
+    except BaseException:  # as in `fly`
+        bus.relay.recover()
+        raise
+    return found
+
+
+def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
+    """Wait for the answer of what was let loose on this bus, and return its value. Raises what `Bus.run` does.
+
+    Where it comes straight, what is to leave `behind` it does so before anything else is done.
+    """
+    turns, relay, lock = bus.turns, bus.relay, bus.turns.lock
+    then = None if behind is None else partial(_follow, bus, course, behind)
+    try:
+        try:
+            lock.acquire()
+            if turns.aloft is course and relay.pumper is None:
+                relay.pumper = get_ident()
+            lock.release()
+            if relay.pumper == get_ident():
+                value = brought(bus, course, then)
+                if value is not UNLIKE:
+                    return value
+            while not course.done:  # others have made a usual flight of it
+                relay.turn()
+        except BaseException as error:
+            fallen(bus, course if turns.flying.get(course.lane) is course else None, error)
+            raise
+    except BaseException:  # as in `fly`
+        relay.recover()
+        raise
+    return taken(turns, course.exchange, course.result())
+
+
+def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
+    """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
+    if at < behind.begins or not behind.fits(value):
+        return
+    turns, link = last.turns, bus.link
+    course: Course | None = last.holder.course
+    if course is None or turns.flying or turns.chores or turns.trace.subscriptions:
+        return
+    if course.first.length == course.length and course.first.run >= course.most:
+        course = course.twin
+    if course.era != turns.lock.era and not course.fits():
+        return
+    order = behind.order
+    if order.refusal is not None and order.refusal(turns.known.stops) is not None:
+        return
+    now, start, takes_time = link.now(), turns.free_at, turns.takes_time
+    if start > now and takes_time:
+        return
+    if arrived := link.read(-inf):  # as in `launched_now`
+        with turns.lock:
+            turns.feed(arrived, link.now())
+        return
+    noted(turns, order, now)
+    course.wake = bus.relay.wake
+    off(bus, course, order, now, max(now, start), takes_time)
+    behind.at, behind.course = now, course

@@ -11,23 +11,21 @@ Here microseconds count, so what elsewhere would be three functions is one.
 
 from __future__ import annotations
 
-from functools import partial
 from math import inf
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus.bus.course import Course
-from motorbus.bus.pieces import gathered
+from motorbus.bus.pieces import Then, gathered
 from motorbus.bus.run import taken
 from motorbus.bus.ticket import Flight
 from motorbus.core.operation import UNLIKE, Answer, Data, Exchange, Rank, Unlike
 from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.bus.loosed import Behind
     from motorbus.bus.pump import Bus
     from motorbus.bus.turns import Turns
-    from motorbus.link.base import Link
+    from motorbus.core.aimed import Aim
 
 T = TypeVar("T")
 
@@ -54,20 +52,20 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
     """
     turns = bus.turns
     course: Course | None = exchange.course
-    if (course is None or course.turns is not turns) and (course := _found(bus, exchange)) is None:
+    if (course is None or course.turns is not turns) and (course := found(bus, exchange)) is None:
         return UNLIKE
     launched = None
     try:
         try:
-            launched = _launched(bus, course, ahead)
+            launched = launched_now(bus, course, ahead)
             if launched is None:
                 return UNLIKE
             course = launched
-            value: T | Unlike = _brought(bus, course)
+            value: T | Unlike = brought(bus, course)
             if value is not UNLIKE:
                 return value
         except BaseException as error:
-            _fallen(bus, _mine(bus, launched), error)
+            fallen(bus, _mine(bus, launched), error)
             raise
     except BaseException:  # a second interrupt may fall into what the first one has brought about
         bus.relay.recover()
@@ -76,79 +74,10 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
 
 
-def loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None) -> Course | None:
-    """Send this as `fly` does, and come back at once; what has left must be given to `land`. None as `UNLIKE` there.
-
-    Meanwhile the bus is free: whoever else wants something of it makes a usual flight of this one.
-    """
-    course: Course | None = exchange.course
-    if (course is None or course.turns is not bus.turns) and (course := _found(bus, exchange)) is None:
-        return None
-    launched = None
-    try:
-        try:
-            launched = _launched(bus, course, ahead)
-            if launched is not None:
-                launched.wake = bus.relay.wake
-                bus.relay.pass_on()
-            return launched
-        except BaseException as error:
-            own = bus.turns.aloft if bus.relay.pumper == get_ident() else launched
-            _fallen(bus, own, error)
-            raise
-    except BaseException:  # as in `fly`
-        bus.relay.recover()
-        raise
-
-
-def foreseen(bus: Bus, order: Exchange[Any]) -> bool:
-    """Whether this may surely leave, by what is known while an answer is on its way; it is noted as given then."""
-    lock = bus.turns.lock
-    try:
-        try:
-            lock.acquire()
-            found = _is_sure(bus.turns, order)
-            lock.release()
-        except BaseException:
-            bus.relay.recover()
-            raise
-    except BaseException:  # as in `fly`
-        bus.relay.recover()
-        raise
-    return found
-
-
-def land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
-    """Wait for the answer of what was let `loose` on this bus, and return its value. Raises what `Bus.run` does.
-
-    Where it comes straight, what is to leave `behind` it does so before anything else is done.
-    """
-    turns, relay, lock = bus.turns, bus.relay, bus.turns.lock
-    try:
-        try:
-            lock.acquire()
-            if turns.aloft is course and relay.pumper is None:
-                relay.pumper = get_ident()
-            lock.release()
-            if relay.pumper == get_ident():
-                value = _brought(bus, course, behind)
-                if value is not UNLIKE:
-                    return value
-            while not course.done:  # others have made a usual flight of it
-                relay.turn()
-        except BaseException as error:
-            _fallen(bus, course if turns.flying.get(course.lane) is course else None, error)
-            raise
-    except BaseException:  # as in `fly`
-        relay.recover()
-        raise
-    return taken(turns, course.exchange, course.result())
-
-
-def _brought(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
+def brought(bus: Bus, course: Course, then: Then | None = None) -> Any:
     """Wait for the answer of what is in the air, and return what it means; `UNLIKE` where it has ended otherwise.
 
-    The caller pumps, and lets go of the lock. What has left `behind` it is in the air then, and nobody pumps.
+    The caller pumps, and lets go of the lock. `then` is done as soon as it has landed.
     """
     turns, lock, link = course.turns, course.lock, bus.link
     if bus.sleeps:
@@ -163,43 +92,18 @@ def _brought(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
             value = course.whole(arrived[0], at)
             if value is not UNLIKE:
                 course.lands(arrived[0], at)
-                if behind is not None:
-                    _follow(bus, course, behind, value, at)
+                if then is not None:
+                    then(value, at)
                 bus.relay.pumper = None
                 lock.release()
                 return value
         lock.release()
-    then = None if behind is None else partial(_follow, bus, course, behind)
     if (value := gathered(bus, course, arrived, then)) is UNLIKE:
         _astray(bus, course, arrived)
     return value
 
 
-def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
-    """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
-    if at < behind.begins or not behind.fits(value):
-        return
-    turns, link = last.turns, bus.link
-    course: Course | None = last.holder.course
-    if course is None or turns.flying or turns.chores or turns.trace.subscriptions:
-        return
-    if course.first.length == course.length and course.first.run >= course.most:
-        course = course.twin
-    if course.era != turns.lock.era and not course.fits():
-        return
-    order = behind.order
-    if order.refusal is not None and order.refusal(turns.known.stops) is not None:
-        return
-    now = link.now()
-    if (turns.free_at > now and turns.takes_time) or _stale(turns, link):
-        return
-    _noted(turns, order, now)
-    course.wake = bus.relay.wake
-    _off(bus, course, order, now)
-    behind.at, behind.course = now, course
-
-
-def _found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
+def found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
     try:
         return charted(bus.turns, exchange)
     except BaseException:
@@ -207,7 +111,7 @@ def _found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
         raise
 
 
-def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course | None:
+def launched_now(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course | None:
     """The course, or its twin, that has left just now; None when nothing has."""
     turns, link, lock = course.turns, bus.link, course.lock
     lock.acquire()
@@ -221,26 +125,35 @@ def _launched(bus: Bus, course: Course, ahead: Exchange[Any] | None) -> Course |
             course = course.twin
         if course.era != lock.era and not course.fits():
             return None
-        now, free = link.now(), turns.free_at
-        if bus.relay.pumper is not None or (free > now and turns.takes_time) or _stale(turns, link):
+        relay, pace = bus.relay, turns.pace
+        takes_time = pace is not None and pace.certain  # as `turns.takes_time`
+        now, start = link.now(), turns.free_at
+        if relay.pumper is not None or (start > now and takes_time):
             return None
+        if arrived := link.read(-inf):  # it cannot answer a request that has not left: take it in first
+            with lock:
+                turns.feed(arrived, link.now())
+            return None
+        if start < now:
+            start = now
         if ahead is not None and not _may_leave(turns, ahead, now):
             return None
-        _off(bus, course, ahead, now)
+        off(bus, course, ahead, now, start, takes_time)
         return course
     finally:
         lock.release()
 
 
-def _off(bus: Bus, course: Course, ahead: Exchange[Any] | None, now: float) -> None:
-    """This leaves, with what is ahead of it, and may. The caller holds the lock."""
-    turns, free = course.turns, course.turns.free_at
-    start, request = free if free > now else now, course.request
+def off(
+    bus: Bus, course: Course, ahead: Exchange[Any] | None, now: float, start: float, takes_time: bool
+) -> None:
+    """This leaves, with what is ahead of it, and may; its bits pass from `start` on. The caller holds the lock."""
+    turns, request = course.turns, course.request
     if ahead is not None:
-        turns.free_at = start = start + turns.family.air_time(ahead, turns.rate)
+        turns.free_at = start = start + _air_time(turns, ahead)
         request = ahead.request + request  # type: ignore[operator,assignment]  # bytes, as the bus is calm
     # an answer cannot come before its question has passed, which does so behind what is ahead of it
-    course.sent_at = start if turns.takes_time else now
+    course.sent_at = start if takes_time else now
     course.deadline = start + course.wait
     turns.lock.owing, bus.relay.pumper = True, get_ident()
     turns.aloft = turns.flying[course.lane] = course
@@ -259,7 +172,7 @@ def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
             moment = _thrown(bus, exchange)
             lock.release()
         except BaseException as error:
-            _fallen(bus, _mine(bus, None), error)
+            fallen(bus, _mine(bus, None), error)
             raise
     except BaseException:  # as in `fly`
         bus.relay.recover()
@@ -281,7 +194,7 @@ def _thrown(bus: Bus, exchange: Exchange[Any]) -> float | None:
     now, free = link.now(), turns.free_at
     if (free > now and turns.takes_time) or not _may_leave(turns, exchange, now):
         return None
-    turns.free_at = (free if free > now else now) + turns.family.air_time(exchange, turns.rate)
+    turns.free_at = (free if free > now else now) + _air_time(turns, exchange)
     link.write(exchange.request)
     return now
 
@@ -304,9 +217,9 @@ def usual(bus: Bus, exchange: Exchange[T]) -> T:
 
 def _may_leave(turns: Turns, exchange: Exchange[Any], now: float) -> bool:
     """Note that this leaves, which nobody answers; False where it must not, or something has to be asked before."""
-    if _matters(exchange) and not _is_sure(turns, exchange) and not _admitted(turns, exchange):
+    if _matters(exchange) and not is_sure(turns, exchange) and not _admitted(turns, exchange):
         return False
-    _noted(turns, exchange, now)
+    noted(turns, exchange, now)
     return True
 
 
@@ -314,24 +227,40 @@ def _matters(exchange: Exchange[Any]) -> bool:
     return bool(exchange.effect or exchange.goals or exchange.later is not None)
 
 
-def _noted(turns: Turns, exchange: Exchange[Any], now: float) -> None:
+def noted(turns: Turns, exchange: Exchange[Any], now: float) -> None:
     """This leaves, which nobody answers, and may."""
     if _matters(exchange):
-        if exchange.aim in turns.aims:
-            turns.aims[exchange.aim] = now
+        aim = exchange.aim
+        if aim in turns.aims:
+            turns.aims[aim] = now
         else:
             turns.orders(exchange, now)
     turns.statistics.other["sent"] += 1
     turns.echo.recent.append(exchange.request)  # type: ignore[arg-type]  # bytes, as the bus is calm
 
 
-def _is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
-    if turns.passes is None or not exchange.sure:
+def _air_time(turns: Turns, exchange: Exchange[Any]) -> float:
+    """s on the wire for what nobody answers; all orders of one aim are as long, so of those it is known."""
+    aim: Aim | None = exchange.aim
+    if aim is None:
+        return turns.family.air_time(exchange, turns.rate)
+    rate, seconds = aim.air
+    if rate != turns.rate:
+        rate = turns.rate
+        seconds = turns.family.air_time(exchange, rate)
+        aim.air = rate, seconds
+    return seconds
+
+
+def is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
+    passes = turns.passes
+    if passes is None or not exchange.sure:
         return False
-    if exchange.refusal is not None and exchange.refusal(turns.known.stops) is not None:
+    refusal = exchange.refusal
+    if refusal is not None and refusal(turns.known.stops) is not None:
         return False
     try:
-        return turns.passes(exchange)
+        return passes(exchange)
     except MotorbusError:  # who goes the usual way is told why
         return False
 
@@ -346,15 +275,6 @@ def _admitted(turns: Turns, exchange: Exchange[Any]) -> bool:
     return True
 
 
-def _stale(turns: Turns, link: Link) -> bool:
-    """What has already arrived cannot answer a request that has not left: take it in first. Was there anything?"""
-    arrived = link.read(-inf)
-    if arrived:
-        with turns.lock:
-            turns.feed(arrived, link.now())
-    return bool(arrived)
-
-
 def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:
     """The answer is not yet here, or is not as it usually is: it is taken in as that of any other flight."""
     relay, turns = bus.relay, course.turns
@@ -366,7 +286,7 @@ def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:
         relay.turn()
 
 
-def _fallen(bus: Bus, course: Course | None, error: BaseException) -> None:
+def fallen(bus: Bus, course: Course | None, error: BaseException) -> None:
     """The flight has ended by this: where the link is lost all learn it, and whatever happens the bus is let go."""
     try:
         if isinstance(error, LinkError):

@@ -32,16 +32,18 @@ def volley(
     Without `together` each leaves in a write of its own. Raises the first other error, as `Bus.run` does; what comes
     behind has not been sent then. Raises RequestError, with nothing sent, when one is no exchange.
     """
-    told: list[Any] = []
     try:
-        if together and len(exchanges) == 2 and _flown(bus, exchanges, forgiven, told):
-            return told
+        if together and len(exchanges) == 2:
+            value = _flown(bus, exchanges[0], exchanges[1], forgiven)
+            if value is not UNLIKE:
+                return [None, value]  # nothing comes of an order that is sure, but that it has left
     except AttributeError:
         _check(
             exchanges
         )  # only what is an exchange has what was asked of it, and it is asked before one leaves
         raise
     _check(exchanges)
+    told: list[Any] = []
     begin = 0
     for end, exchange in enumerate(exchanges, 1):
         if exchange.replies == () and end < len(exchanges) and isinstance(exchange.request, bytes):
@@ -69,22 +71,18 @@ def _check(exchanges: Exchanges) -> None:
             ) from None
 
 
-def _flown(bus: Bus, burst: Exchanges, forgiven: tuple[type[Exception], ...], told: list[Any]) -> bool:
-    """The straight way of an order and a question: are both over? What came of them is told then."""
-    order, question = burst
+def _flown(
+    bus: Bus, order: Exchange[Any], question: Exchange[Any], forgiven: tuple[type[Exception], ...]
+) -> Any:
+    """The straight way of an order and a question: what came of the question; `UNLIKE` when nothing was sent."""
     if question.whole is None or not rides(order):
-        return False
-    value: Any
+        return UNLIKE
     try:
-        value = fly(bus, question, order)
+        return fly(bus, question, order)
     except LinkError:
         raise
     except forgiven as error:
-        value = error
-    if value is UNLIKE:
-        return False
-    told += (None, value)  # nothing comes of an order that is sure, but that it has left
-    return True
+        return error
 
 
 def rides(order: Exchange[Any]) -> bool:

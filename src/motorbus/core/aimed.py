@@ -15,9 +15,10 @@ from motorbus.core.operation import Answer, Effect, Exchange, Goal, Rank, Refusa
 
 class Aim:
     """What all orders have in common that are made in one mould: the nodes they are for, how the goals are made of raw
-    values, and why one must not leave after all; see `Exchange`."""
+    values, and why one must not leave after all; see `Exchange`. They are all as long: `air` is a rate of the bus
+    (bit/s), and the time (s) that one of them took on the wire at that rate, once a bus has found that out."""
 
-    __slots__ = ("goals", "ordered", "refusal")
+    __slots__ = ("air", "goals", "ordered", "refusal")
 
     def __init__(
         self, ordered: Sequence[int], goals: Callable[[Sequence[int]], tuple[Goal, ...]], refusal: Refusal
@@ -25,6 +26,7 @@ class Aim:
         self.ordered: Final = ordered
         self.goals: Final = goals
         self.refusal: Final = refusal
+        self.air: tuple[int, float] = 0, 0.0
 
 
 class Aimed(Exchange[None]):
@@ -37,6 +39,7 @@ class Aimed(Exchange[None]):
     __slots__ = ("_goals", "_raws", "aim")
 
     aim: Aim
+    refusal: Refusal  # type: ignore[misc]
     sure = True
     replies = ()  # type: ignore[misc]  # the same of all, so it is said once
     lane = 0  # type: ignore[misc]
@@ -53,6 +56,7 @@ class Aimed(Exchange[None]):
     def __init__(self, request: bytes, aim: Aim, raws: Sequence[int]) -> None:
         self.request = request  # type: ignore[misc]
         self.aim = aim
+        self.refusal = aim.refusal  # type: ignore[misc]
         self._raws = raws
         self._goals: tuple[Goal, ...] | None = None
 
@@ -75,8 +79,3 @@ class Aimed(Exchange[None]):
     def ordered(self) -> Sequence[int]:
         """The nodes of its goals."""
         return self.aim.ordered
-
-    @property  # type: ignore[misc]
-    def refusal(self) -> Refusal:
-        """Why it must not leave after all."""
-        return self.aim.refusal

@@ -104,6 +104,34 @@ def test_several_registers_are_those_that_are_made_in_full(name: str, draw: st.D
         same(cast, full)
 
 
+ODD = st.sampled_from((nan, 1, True, -1.0))
+FEW = [st.sampled_from((0.5, 0.6)), st.sampled_from((0.0, 5.0)), st.sampled_from((0.0, -0.0, 0.7))]
+
+
+@given(st.sampled_from(("sts", "smcl", "scs")), st.data())
+def test_whatever_was_written_before_makes_no_difference(name: str, draw: st.DataObject) -> None:
+    """Of several writes some bring values that are as they were; what was made before stays what it was."""
+    nodes = [met(name, 1), met(name, 2, max_position_limit=700)]
+    form = made(nodes, *NAMES)
+    assert form is not None
+    before: list[tuple[Aimed, Exchange[Any]]] = []
+    for _ in range(4):
+        rows: list[list[float]] = [[draw.draw(few) for few in FEW] for _ in nodes]
+        if draw.draw(st.integers(0, 4)) == 4:
+            rows[draw.draw(st.integers(0, 1))][draw.draw(st.integers(0, 2))] = draw.draw(ODD)
+        values = [value for row in rows for value in row]
+        fresh = made(nodes, *NAMES)
+        assert fresh is not None
+        cast = form.cast(values)
+        assert (cast is None) == (fresh.cast(values) is None)
+        if cast is not None:
+            full = fully(nodes, NAMES, rows)
+            assert isinstance(full, Exchange), full
+            before.append((cast, full))
+    for one, full in before:
+        same(one, full)
+
+
 @pytest.mark.parametrize("name", HEADS)
 def test_every_count_between_the_limits_is_plain_and_none_outside(name: str) -> None:
     nodes = [met(name, 1, min_position_limit=20, max_position_limit=900)]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
+from copy import copy
 from math import inf, nan, tau
+from types import FrameType
+from typing import Any
 
 import pytest
 
 from motorbus.core.entry import Value
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import Node
-from motorbus.families.feetech.driver.node import as_nodes
+from motorbus.families.feetech.driver.node import CHANGES, Settings, _set_settings, as_nodes
 from motorbus.families.feetech.table import CONTROL, STS, TABLES, Control, Mode
 from tests.families.feetech.driver_script import prepared
 from tests.families.feetech.maps import met, simulated
@@ -37,6 +42,52 @@ def test_a_new_node_knows_nothing() -> None:
     node = Node(3)
     assert (node.identity, node.table, node.settings, node.limits, node.known_mode) == (None,) * 5
     assert (node.alarm, node.at, node.writable) == ((), -inf, False)
+
+
+def looks_while_set(node: Node, settings: Settings | None, cut: int) -> list[tuple[object, Settings | None]]:
+    """What others see before each line of setting these; an interrupt falls in front of this line, where it is one."""
+    looks: list[tuple[object, Settings | None]] = []
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        if event == "line" and frame.f_code is _set_settings.__code__:
+            looks.append((CHANGES.now, node.settings))
+            if len(looks) == cut:
+                raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    with suppress(KeyboardInterrupt):
+        sys.settrace(trace)
+        try:
+            node.settings = settings
+        finally:
+            sys.settrace(before)
+    return looks
+
+
+def test_whoever_has_looked_while_settings_were_set_looks_again() -> None:
+    node, others = met("sts", 1), met("sts", 1, at_30=2).settings
+    looks = looks_while_set(node, others, cut=0)
+    assert len(looks) == 3
+    assert node.settings is others
+    for token, settings in looks:
+        assert token is not CHANGES.now or settings is others
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3])
+def test_settings_that_were_set_before_an_interrupt_are_seen(cut: int) -> None:
+    node, others = met("sts", 1), met("sts", 1, at_30=2).settings
+    token = CHANGES.now
+    assert len(looks_while_set(node, others, cut)) == cut
+    assert (node.settings is others) == (cut == 3)
+    assert token is not CHANGES.now or node.settings is not others
+
+
+def test_settings_of_a_copy_are_its_own() -> None:
+    node = met("sts", 1)
+    made_by, other = node.settings, copy(node)
+    node.forget_settings()
+    assert other.settings is made_by
 
 
 def test_limits_are_those_of_the_servo() -> None:

@@ -36,7 +36,7 @@ from motorbus.errors import (
     WireError,
 )
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.driver.node import CHANGES, Node, Settings
 
 T = TypeVar("T")
 
@@ -185,8 +185,15 @@ def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Refusal:
     under = [(node, settings or node.settings) for node, settings in made]
     nodes, as_made = [node for node, _ in under], [settings for _, settings in under]
 
+    seen: object = None
+
     def refusal(_: Stops) -> MotorbusError | None:
+        nonlocal seen
+        now = CHANGES.now
+        if now is seen:
+            return None
         if list(map(settings_of_now, nodes)) == as_made:
+            seen = now
             return None
         for node, settings in under:
             if node.settings is not settings and node.settings != settings:

@@ -15,7 +15,7 @@ from zlib import adler32
 from motorbus.core.entry import Coding, Entry
 from motorbus.core.operation import UNLIKE, Unlike, Whole
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.node import PRESENT_POSITION, Node, Settings
+from motorbus.families.feetech.driver.node import CHANGES, PRESENT_POSITION, Node, Settings
 
 LONG: Final = 200
 """Bytes of data up to which `adler32` tells the sum: more of them may come to more than its modulus."""
@@ -66,11 +66,16 @@ def quantity(node: Node, row: Entry, count: int) -> Whole[float] | None:
     wide = row.size == 2
     low, high = (5, 6) if order == "little" else (6, 5)
 
+    seen: object = None  # `CHANGES.now` when it was found to have those settings
+
     def whole(data: bytes, at: float) -> float | Unlike:
+        nonlocal seen
         if len(data) != size or data[:5] != begin or adler32(data) & 255 != SOUND:
             return UNLIKE
-        if node.settings is not settings:
-            return UNLIKE
+        if (now := CHANGES.now) is not seen:
+            if node.settings is not settings:
+                return UNLIKE
+            seen = now
         raw = data[low] | data[high] << 8 if wide else data[5]
         if raw >= plain:
             raw = decode(data[5:end])

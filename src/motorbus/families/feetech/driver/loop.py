@@ -18,8 +18,10 @@ from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, re
 from motorbus.families.feetech.driver.gauge import Packets, measure
 from motorbus.families.feetech.driver.group import AIR, RATE, distinct, sync_exchange, sync_writes, trains
 from motorbus.families.feetech.driver.identity import unknown_map
-from motorbus.families.feetech.driver.node import Node, Settings
+from motorbus.families.feetech.driver.node import CHANGES, Node, Settings
 from motorbus.families.feetech.driver.orders import position_goal
+
+_made: Final = tuple.__new__
 
 
 def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[Positions]:
@@ -155,10 +157,11 @@ def _unsettled(node: Node) -> RequestError:
 class _Gauges:
     """Those of several servos that one exchange asks. What was read last is kept, for the gate asks the same again."""
 
-    __slots__ = ("_gauges", "_last", "_places")
+    __slots__ = ("_gauges", "_last", "_places", "_seen")
 
     def __init__(self, gauges: Mapping[int, _Gauge]) -> None:
         self._gauges = gauges
+        self._seen: object = None  # `CHANGES.now` when all had the settings by which they were read last
         self._last: tuple[Answer | float, dict[int, float]] | None = (
             None  # which one or when, and what it said
         )
@@ -192,35 +195,46 @@ class _Gauges:
         nodes, made_by = [one.node for one in how], [one.settings for one in how]
         for gauge, settings in zip(self._gauges.values(), made_by, strict=True):
             gauge.settle(settings)
+        self._seen = None
         packets = Packets([node.node for node in nodes], count, how[0].order)
         are_sound, unpack, plain = packets.are_sound, packets.unpack, min(one.plain for one in how)
         scales = [(one.node.node, one.scale, one.factor) for one in how]
+        blank = dict.fromkeys((one.node.node for one in how), 0.0)
+        seen: object = None  # `CHANGES.now` when they were found to have those settings
 
         def whole(data: bytes, at: float) -> Positions | Unlike:
-            nonlocal made_by
-            if not are_sound(data) or (by := list(map(settings_of_now, nodes))) != made_by:
+            nonlocal seen
+            if not are_sound(data):
                 return UNLIKE
-            made_by = by  # where they were read once more and are the same, that is seen at once from now on
-            raws = unpack(data)
-            if max(raws) >= plain:
-                return UNLIKE
-            values = {id: raw * scale * factor for (id, scale, factor), raw in zip(scales, raws, strict=True)}
+            if (now := CHANGES.now) is not seen:
+                if list(map(settings_of_now, nodes)) != made_by:
+                    return UNLIKE
+                seen = now
+            values = blank.copy()  # of the right size, which one that grows has not
+            for (id, scale, factor), raw in zip(scales, unpack(data)):  # noqa: B905 - they are as many
+                if raw >= plain:
+                    return UNLIKE
+                values[id] = raw * scale * factor
             for node in nodes:
                 node.at = at
                 node.alarm = ()
             self._last = at, values.copy()
-            return Positions(values, (), at)
+            return _made(Positions, (values, (), at))
 
         return whole
 
     def _settled(self) -> bool:
         """Whether all have the settings by which they were read last."""
+        now = CHANGES.now
+        if now is self._seen:
+            return True
         for gauge in self._gauges.values():
             settings = gauge.node.settings
             if settings is not gauge.settings:
                 if settings != gauge.settings:
                     return False
                 gauge.settings = settings  # the same, read once more: that is seen at once from now on
+        self._seen = now
         return True
 
 

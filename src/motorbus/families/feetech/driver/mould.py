@@ -18,13 +18,12 @@ from motorbus.core.entry import Entry
 from motorbus.core.operation import Goal
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import CHANGES, Node
 from motorbus.families.feetech.driver.orders import goals_of
 from motorbus.families.feetech.table import Mode
 
 HEAD: Final = 7
 """Bytes of a SYNC WRITE in front of its first item."""
-FLOATS: Final = {float}
 BYTES: Final = tuple(bytes((value,)) for value in range(256))
 
 
@@ -47,48 +46,56 @@ class Column:
 
     def __init__(self, cells: Sequence[Cell]) -> None:
         self._cells: Final = cells
-        self._low: Final = max(
-            cell.low for cell in cells
-        )  # from here on, to there, a raw value is plain for all
-        self._high: Final = min(cell.high for cell in cells)
-        self._whole: Final = cells[0].whole
         plain = {cell.scale for cell in cells if cell.factor == 1}
         alike = len(plain) == 1 and all(cell.factor == 1 for cell in cells)
-        self._scale: Final = plain.pop() if alike else None
+        # the scale of all, and from where to where a raw value is plain for all
+        self._alike: Final = (
+            plain.pop() if alike else None,
+            max(cell.low for cell in cells),
+            min(cell.high for cell in cells),
+        )
+        self._whole: Final = cells[0].whole
         self.last: tuple[Sequence[float], Sequence[int]] = (), ()
 
     def raws(self, values: Sequence[float]) -> list[int] | None:
-        """What these become, one for each servo; None where one is not plain."""
-        if {*map(type, values)} != FLOATS:
-            return None
-        scale = self._scale
+        """What these floats become, one for each servo; None where one is not plain."""
+        scale, low, high = self._alike
+        if scale is None or self._whole:
+            return self._closely(values)
+        raws: list[int] = []
+        keep = raws.append
         try:
-            if scale is not None:
-                raws = [(value / scale).__round__() for value in values]  # as `round`, and sooner
-            else:
-                raws = [
-                    round(value / cell[0] / cell[1]) for value, cell in zip(values, self._cells, strict=True)
-                ]
+            for value in values:  # one loop for all: here microseconds count
+                raw = (value / scale).__round__()  # as `round`, and sooner
+                if not low <= raw <= high:
+                    return self._closely(values)
+                keep(raw)
         except (ValueError, OverflowError):  # not a finite number
-            return None
-        if not (self._low <= min(raws) and max(raws) <= self._high) and not self._are_plain(raws):
-            return None
-        if self._whole and list(values) != raws:
             return None
         return raws
 
-    def kept(self, values: tuple[float, ...]) -> Sequence[int] | None:
+    def kept(self, values: Sequence[float]) -> Sequence[int] | None:
         """As `raws`; what is the same as it was last time is not reckoned anew."""
         last, raws = self.last
-        if values == last and {*map(type, values)} == FLOATS:
+        if values == last:
             return raws
         found = self.raws(values)
         if found is not None:
             self.last = values, found
         return found
 
-    def _are_plain(self, raws: Sequence[int]) -> bool:
-        return all(cell.low <= raw <= cell.high for cell, raw in zip(self._cells, raws, strict=True))
+    def _closely(self, values: Sequence[float]) -> list[int] | None:
+        """The same, each by what is plain for its own servo."""
+        raws = []
+        try:
+            for value, (factor, scale, low, high, _) in zip(values, self._cells, strict=True):
+                raw = round(value / factor / scale)
+                if not low <= raw <= high:
+                    return None
+                raws.append(raw)
+        except (ValueError, OverflowError):  # not a finite number
+            return None
+        return None if self._whole and list(values) != raws else raws
 
 
 class Mould:
@@ -100,11 +107,14 @@ class Mould:
         item = "B" + "".join("BH"[row.size - 1] for row in first)
         self.ids: Final = tuple(node.node for node in nodes)
         self._made_by: Final = [(node, node.settings) for node in nodes]
+        self.seen: object = None  # `CHANGES.now` when they were found to be those
         as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
         self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
         self._columns: Final = [Column(cells[place::count]) for place in range(count)]
         self._each: Final = count + 1  # parts of a packet for each servo
+        self._floats: Final = [float] * (count * len(nodes))
         self._items: Final = [part for id in self.ids for part in (id, *[0] * count)]
+        self._last: tuple[list[float], list[int]] = [], []
         self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
         self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
         self._sum: Final = sum(self._head[2:])
@@ -113,40 +123,48 @@ class Mould:
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
+        now = CHANGES.now
+        if now is self.seen:
+            return True
         for node, settings in self._made_by:
             if node.settings is not settings and node.settings != settings:
                 return False
+        self.seen = now
         return True
 
     def cast(self, values: Sequence[float]) -> Aimed | None:
         """The packet with these values, those of one servo behind those of the one before; None where one of them is
         not plain, or they are not as many as it takes."""
-        columns = self._columns
-        count = len(columns)
-        if len(values) != count * len(self.ids):
+        if [*map(type, values)] != self._floats:
             return None
+        count = self._each - 1
+        filled: list[int] | None = self._items
+        firsts = values
         if count > 1:
-            return self.press([tuple(values[place::count]) for place in range(count)])
-        raws = columns[0].raws(values)
-        return None if raws is None else self._filled([raws])
+            filled, firsts = self._filled(values, count), values[::count]
+        raws = self._columns[0].raws(firsts)
+        if filled is None or raws is None:
+            return None
+        items = filled.copy()
+        items[1 :: count + 1] = raws
+        body = self._pack(*items)
+        return Aimed(self._head + body + BYTES[~adler32(body, self._sum) & 255], self._aim, items)
 
-    def press(self, shares: Sequence[tuple[float, ...]]) -> Aimed | None:
-        """The same from the values of each row, which are one for each servo."""
-        found = []
-        for column, share in zip(self._columns, shares, strict=True):
-            raws = column.kept(share)
+    def _filled(self, values: Sequence[float], count: int) -> list[int] | None:
+        """The parts of a packet with all but the values of the first row; in a loop these are mostly what they were."""
+        rest = list(values)
+        del rest[::count]
+        last, filled = self._last
+        if rest == last:
+            return filled
+        items = self._items.copy()
+        for place, column in enumerate(self._columns[1:], 1):
+            raws = column.kept(values[place::count])
             if raws is None:
                 return None
-            found.append(raws)
-        return self._filled(found)
-
-    def _filled(self, columns: Sequence[Sequence[int]]) -> Aimed:
-        items = self._items.copy()
-        for place, column in enumerate(columns, 1):
-            items[place :: self._each] = column
-        body = self._pack(*items)
-        check = ~(self._sum + adler32(body) - 1) & 255
-        return Aimed(self._head + body + BYTES[check], self._aim, items)
+            items[place + 1 :: count + 1] = raws
+        self._last = rest, items
+        return items
 
     def _goals(self, items: Sequence[int]) -> tuple[Goal, ...]:
         raws = [raw for number, raw in enumerate(items) if number % self._each]

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cache
 from math import inf
-from typing import Any, Final, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
@@ -94,6 +95,27 @@ class Pending(NamedTuple):
     withdrawn: bool = False
 
 
+class Changes:
+    """`now` is another object after each change of the settings of any servo.
+
+    So whoever has found that certain servos have certain settings need not look again, as long as it is the same.
+    """
+
+    __slots__ = ("now",)
+
+    def __init__(self) -> None:
+        self.now = object()
+
+
+CHANGES: Final = Changes()
+
+
+def _set_settings(node: Any, settings: Settings | None) -> None:
+    CHANGES.now = object()  # in front, so that an interrupt between these lines is taken for a change
+    node._settings = settings
+    CHANGES.now = object()  # behind, so that another thread that has looked in between looks again
+
+
 class Node:
     """One servo by its id, 0 to 253, and what is known of it.
 
@@ -106,11 +128,16 @@ class Node:
     may not be kept: what came in between may have closed the lock, behind which a write is obeyed and soon gone.
     """
 
+    if TYPE_CHECKING:
+        settings: Settings | None
+    else:  # read far more often than set, so without a function of Python
+        settings = property(attrgetter("_settings"), _set_settings)
+
     def __init__(self, node: int) -> None:
         self.node: Final = checked_id(node)
         self.identity: Identity | None = None
         self.table: Table | None = None
-        self.settings: Settings | None = None
+        self.settings = None
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
         self.pending: Pending | None = None

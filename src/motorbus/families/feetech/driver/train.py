@@ -22,7 +22,7 @@ from motorbus.families.feetech.driver.identity import writable
 from motorbus.families.feetech.driver.loop import known_row, position_reads
 from motorbus.families.feetech.driver.motion import enable_torque
 from motorbus.families.feetech.driver.mould import mould
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import CHANGES, Node
 from motorbus.families.feetech.driver.orders import Order, blocks, no_limits, position_goal
 from motorbus.families.feetech.driver.pace import speed_at_least
 from motorbus.families.feetech.driver.rest import asked_anew
@@ -155,13 +155,18 @@ class _Packet:
         for node, row in zip(nodes, self._rows, strict=True):
             position_goal(node, row, 0.0)  # raises where it heeds no goal position
         self._under = [(node, node.settings) for node in nodes]
+        self._seen: object = None  # `CHANGES.now` when they were found to be those
         self._mould = mould(nodes, [[row] for row in self._rows])
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
+        now = CHANGES.now
+        if now is self._seen:
+            return True
         for node, settings in self._under:
             if node.settings is not settings:
                 return False
+        self._seen = now
         return True
 
     def exchange(self, to: Mapping[int, float]) -> Exchange[None]:

@@ -7,6 +7,7 @@ What is plain goes through a `Mould`, which costs hardly more than the bytes of 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.entry import Table, shown
@@ -15,7 +16,7 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.group import block_of, distinct, sync_writes
 from motorbus.families.feetech.driver.loop import check_ordered, known_row, one_packet
 from motorbus.families.feetech.driver.mould import Mould, mould
-from motorbus.families.feetech.driver.node import Node
+from motorbus.families.feetech.driver.node import CHANGES, Node
 from motorbus.families.feetech.driver.orders import Order, check_names, check_values, only_block, orders_of
 
 Row: TypeAlias = "float | Sequence[float]"
@@ -29,7 +30,7 @@ class SyncWriter:
         self.servos: Final = tuple(servos)
         self.names: Final = tuple(names)
         self._single: Final = len(self.names) == 1
-        self._width: Final = {len(self.names)}
+        self._widths: Final = [len(self.names)] * len(self.servos)
         self._mould: Mould | None = None
 
     def __call__(self, values: Sequence[Row]) -> Exchange[None]:
@@ -41,23 +42,20 @@ class SyncWriter:
         LimitExceeded when one fits no register.
         """
         made = self._mould
-        if made is None or not made.holds():
+        if made is None or (made.seen is not CHANGES.now and not made.holds()):
             made = self._fit()
         exchange = None
         if made is not None and (type(values) is list or type(values) is tuple):
-            exchange = made.cast(values) if self._single else self._pressed(made, values)
+            flat = values if self._single else self._flat(values)
+            exchange = None if flat is None else made.cast(flat)
         return exchange or self._slowly(values)
 
-    def _pressed(self, made: Mould, values: Any) -> Exchange[None] | None:
-        """The packet for rows of values; None where a row is too long or too short, or none at all."""
+    def _flat(self, values: Any) -> list[Any] | None:
+        """Rows of values, one behind the other; None where a row is too long or too short, or none at all."""
         try:
-            alike = {*map(len, values)} == self._width
+            return [*chain.from_iterable(values)] if [*map(len, values)] == self._widths else None
         except TypeError:  # a row that is none
             return None
-        if not alike or len(values) != len(self.servos):
-            return None
-        shares = tuple(zip(*values))  # noqa: B905 - they are alike
-        return made.press(shares) if len(shares) == len(self.names) else None
 
     def _fit(self) -> Mould | None:
         """Made anew when the settings of a servo have changed."""
