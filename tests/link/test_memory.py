@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from random import Random
 from threading import Thread
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from motorbus.core.can_bits import bits
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost
-from motorbus.link.base import Link
+from motorbus.link.base import Link, PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.link.parrot import DELAY, PING, Parrot, drain
 
@@ -90,6 +91,27 @@ def test_equal_moments_keep_their_order() -> None:
     for number in range(10):
         link.write(bytes([number]))
     assert drain(link) == [bytes([number]) for number in range(10)]
+
+
+class Carrier(PerfectLine):
+    """Does the same as the perfect line, piece by piece."""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_arrives_at_once_comes_as_it_would_piece_by_piece(seed: int) -> None:
+    said = []
+    for line in (PerfectLine(), Carrier()):
+        random, parrot = Random(seed), Parrot(delay=0.002)
+        link = MemoryLink(parrot, line=line)
+        heard: list[tuple[float, list[Data], int]] = []
+        for number in range(60):
+            for _ in range(random.randrange(3)):
+                link.write(bytes([number, random.randrange(256)]))
+                link.rest(link.now() + random.choice([0.0, 0.0005, 0.003]))
+            arrived = link.read(link.now() + random.choice([0.0, 0.001, 0.002, 0.01]))
+            heard.append((link.now(), arrived, len(parrot.heard)))
+        said.append(heard)
+    assert said[0] == said[1]
 
 
 # -- air time ---------------------------------------------------------------------------------------------------

@@ -105,6 +105,19 @@ def test_a_deadline_in_the_past_never_waits(
     assert arrived == [PING]
 
 
+def test_a_look_where_nothing_has_come_tries_to_read_nothing(
+    link: SerialLink, master: PtyMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[int] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "read", lambda descriptor, count: tried.append(descriptor))
+        assert link.read(float("-inf")) == link.read(link.now()) == []
+    assert not tried
+    master.write(PING)
+    assert wait_readable(link.fileno() or 0, 30)
+    assert link.read(float("-inf")) == [PING]
+
+
 def test_a_port_that_takes_no_more_blocks_nobody(link: SerialLink) -> None:
     with pytest.raises(LinkError, match=r"takes no more bytes: \d+ of 1000000"):
         link.write(bytes(1_000_000))

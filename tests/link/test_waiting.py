@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from motorbus.link import waiting
-from motorbus.link.waiting import doze, wait_any, wait_readable
+from motorbus.link.waiting import doze, is_readable, wait_any, wait_readable
 
 
 @pytest.fixture
@@ -33,6 +33,18 @@ def test_what_is_there_is_seen(pipe: tuple[int, int]) -> None:
 
 def test_nothing_is_nothing(pipe: tuple[int, int]) -> None:
     assert not wait_readable(pipe[0], 0.001)
+
+
+def test_a_look_sees_what_is_there_and_what_has_ended(pipe: tuple[int, int]) -> None:
+    assert not is_readable(pipe[0])
+    os.write(pipe[1], b"x")
+    assert is_readable(pipe[0])
+    reader, writer = os.pipe()
+    os.close(writer)
+    assert is_readable(reader)
+    os.close(reader)
+    with pytest.raises((OSError, ValueError)):
+        is_readable(-1)
 
 
 def test_the_end_of_the_other_side_is_seen(pipe: tuple[int, int]) -> None:

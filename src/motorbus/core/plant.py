@@ -14,7 +14,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import copysign, inf, isfinite, sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
+
+_made: Final = tuple.__new__
+"""Makes a named tuple in half the time of its own call: a fleet makes four for every goal of every axis."""
 
 
 class Phase(NamedTuple):
@@ -62,8 +65,15 @@ class Motion(NamedTuple):
     cruise: float = 0.0
 
     def position(self, at: float) -> float:
-        """Where it is at this moment."""
-        return self.state(at)[0]
+        """Where it is at this moment: what most packets ask of every servo."""
+        elapsed = at - self.start
+        if elapsed < 0.0:
+            elapsed = 0.0
+        for duration, position, velocity, acceleration in self.phases:
+            if elapsed < duration:
+                return position + elapsed * (velocity + 0.5 * acceleration * elapsed)
+            elapsed -= duration
+        return self.goal + self.cruise * elapsed if self.cruise else self.goal
 
     def velocity(self, at: float) -> float:
         """How fast it is at this moment, with its sign."""
@@ -74,8 +84,10 @@ class Motion(NamedTuple):
         return self.state(at)[2]
 
     def state(self, at: float) -> tuple[float, float, float]:
-        """Position, velocity and acceleration at this moment: what every packet asks of every servo."""
-        elapsed = max(0.0, at - self.start)
+        """Position, velocity and acceleration at this moment."""
+        elapsed = at - self.start
+        if elapsed < 0.0:
+            elapsed = 0.0
         for duration, position, velocity, acceleration in self.phases:
             if elapsed < duration:
                 place = position + elapsed * (velocity + 0.5 * acceleration * elapsed)
@@ -155,7 +167,10 @@ def move(
         back = move(at, halt, goal, speed=speed, acceleration=acceleration, deceleration=braking)
         return Motion(at, first.phases + back.phases, goal)
     square = 2 * acceleration * way * (goal - position) + velocity**2
-    peak = min(speed, sqrt(max(0.0, braking / (acceleration + braking) * square)))
+    share = braking / (acceleration + braking) * square
+    peak = sqrt(share) if share > 0.0 else 0.0
+    if speed < peak:
+        peak = speed
     gaining = acceleration if peak > way * velocity else braking
     return _trapezoid(at, position, velocity, goal, way * peak, gaining, braking, cruises=peak == speed)
 
@@ -214,9 +229,8 @@ def _time_over(distance: float, stretch: Stretch) -> float | None:
 
 
 def _check(speed: float, acceleration: float, *finite: float) -> None:
-    for number in finite:
-        if not isfinite(number):
-            raise ValueError("position, goal and velocity must be finite")
+    if not all(map(isfinite, finite)):
+        raise ValueError("position, goal and velocity must be finite")
     if not speed >= 0 or not acceleration > 0:
         raise ValueError("speed must be 0 or more, acceleration more than 0")
     if speed == acceleration == inf:
@@ -253,16 +267,16 @@ def _trapezoid(
 ) -> Motion:
     """To the velocity `peak`, along at it if it is the highest allowed, and down to nothing at the goal."""
     gain = peak - velocity
-    first = Phase(abs(gain) / acceleration, position, velocity, copysign(acceleration, gain))
-    reached = first.position_after(first.duration)
+    ramp, slope = abs(gain) / acceleration, copysign(acceleration, gain)
+    reached = position + ramp * (velocity + 0.5 * slope * ramp)
     braking = goal - peak * abs(peak) / (2 * deceleration)
-    phases = [first] if first.duration else []
+    phases: tuple[Phase, ...] = (_made(Phase, (ramp, position, velocity, slope)),) if ramp else ()
     # A triangle has no cruise: there the difference is rounding, and divided by a tiny peak it would be ages.
-    if cruises and (cruise := max(0.0, (braking - reached) / peak)):
-        phases.append(Phase(cruise, reached, peak, 0.0))
+    if cruises and (cruise := (braking - reached) / peak) > 0.0:
+        phases += (_made(Phase, (cruise, reached, peak, 0.0)),)
     if brake := abs(peak) / deceleration:
-        phases.append(Phase(brake, braking, peak, -copysign(deceleration, peak)))
-    return Motion(at, tuple(phases), goal)
+        phases += (_made(Phase, (brake, braking, peak, -copysign(deceleration, peak))),)
+    return _made(Motion, (at, phases, goal, 0.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, forbidden, full, lost, not_found, wrong_rate
 from motorbus.link.speed import line_speed
 from motorbus.link.tcp import CONNECT_TIME, give_up_soon, split_address
-from motorbus.link.waiting import doze, wait_readable
+from motorbus.link.waiting import doze, is_readable, wait_readable
 
 if TYPE_CHECKING:
     from serialx import BaseSerial, SerialPortInfo
@@ -141,7 +141,7 @@ class SerialLink:
     def read(self, until: float) -> list[Data]:
         try:
             pause = until - time.monotonic()
-            if pause > 0 and not wait_readable(self._descriptor, pause):
+            if not (wait_readable(self._descriptor, pause) if pause > 0 else is_readable(self._descriptor)):
                 return []
             data = os.read(self._descriptor, CHUNK)
         except BlockingIOError:

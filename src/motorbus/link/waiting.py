@@ -28,6 +28,16 @@ def wait_readable(descriptor: int, seconds: float) -> bool:
     return bool(ready.poll(min(seconds, LONGEST) * 1000))
 
 
+def is_readable(descriptor: int) -> bool:
+    """Whether something can be read now, or the other end is gone; else to try it costs an exception, and more so cold.
+
+    Raises as `wait_readable`.
+    """
+    if descriptor < LIMIT:
+        return bool(select((descriptor,), (), (), 0)[0])
+    return wait_readable(descriptor, 0.0)
+
+
 def wait_any(descriptors: Sequence[int], seconds: float) -> list[int]:
     """Those of them that can be read, or whose other end is gone; waits for the first, as `wait_readable` does.
 

@@ -36,6 +36,16 @@ def test_ping_of_a_servo_that_is_there() -> None:
     assert node.alarm == ("temperature",)
 
 
+def test_what_prepares_a_servo_is_made_once_and_learns_each_time() -> None:
+    node, other = Node(3), Node(4)
+    assert prepare(node) is prepare(node)
+    assert prepare(other).request != prepare(node).request
+    for mode in (Mode.POSITION, Mode.VELOCITY, Mode.POSITION):
+        number = {Mode.POSITION: 0, Mode.VELOCITY: 1}[mode]
+        play(prepare(node), prepares(at_33=number))
+        assert node.known_mode is mode
+
+
 def test_ping_into_silence_is_false() -> None:
     assert play(ping(Node(3)), Line(ASKED, None)) is False
 

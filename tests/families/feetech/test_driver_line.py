@@ -60,6 +60,11 @@ def test_probes_are_of_many_lengths_and_never_that_of_their_echo_or_of_common_re
     assert len(probe(3, 0).request) not in lengths
 
 
+def test_probes_that_say_the_same_are_one_and_those_of_others_are_others() -> None:
+    assert probe(3, 0) is probe(3, 17)
+    assert len({probe(node, attempt).request for node in (3, 4) for attempt in range(34)}) == 34
+
+
 def test_neighbouring_attempts_differ() -> None:
     lengths = [probe(3, attempt).replies[0].length for attempt in range(17)]  # type: ignore[index]
     assert len(set(lengths)) == 17

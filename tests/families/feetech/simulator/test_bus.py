@@ -232,6 +232,17 @@ def test_replies_that_do_not_overlap_stay_apart() -> None:
     assert host.timed(packet(1, PING)) == [(0.0, "FF FF 01 02 00 FC"), (0.0004, "FF FF 01 02 00 FC")]
 
 
+def test_who_is_asked_later_and_begins_earlier_is_heard_first() -> None:
+    host = Host((1, 2, 3))
+    host.write(1, 7, 250)
+    host.write(2, 7, 100)
+    for id in (1, 2, 3):
+        host.bus.receive(packet(id, PING), host.now)
+    assert [data[2] for _, data in host.bus.advance(host.now + 0.0003) if isinstance(data, bytes)] == [3, 2]
+    assert [data[2] for _, data in host.bus.advance(host.now + 1.0) if isinstance(data, bytes)] == [1]
+    assert host.bus.due() is None
+
+
 def test_sync_read_in_the_order_of_the_list_back_to_back() -> None:
     host = Host((1, 2, 3), position={1: 1, 2: 2, 3: 3})
     assert host.timed(packet(ALL, SYNC_READ, 56, 2, 3, 1, 2)) == [

@@ -127,9 +127,8 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
         return kept[1]
     if node.table is None or node.settings is None:
         return _after(node, lambda same: _quantity(same, name))
-    if name not in node.table or not node.table[name].unit:
+    if name not in node.table or not (row := node.table[name]).unit:
         raise _untold(node, name.replace("_", " "))
-    row = node.table[name]
 
     def take(data: bytes) -> float:
         return float(node.value(row, row.decode(data)))

@@ -46,25 +46,33 @@ class Measure(NamedTuple):
 def measure(node: Node, row: Entry) -> Measure | None:
     """The one for a servo as it is now; None where nothing so simple holds."""
     settings = node.settings
-    if settings is None or not row.unit or (settings.shift and row.name == PRESENT_POSITION):
+    if settings is None or not _is_simple(row, settings):
         return None
-    negative = row.coding is Coding.TWOS_COMPLEMENT
-    plain = 1 << (8 * row.size - negative if row.sign_bit is None else row.sign_bit)
     factor = settings.factors.get(row.name, 1.0)
-    return Measure(
-        node, row, settings, plain, row.scale, factor, "little" if row.order == "little" else "big"
-    )
+    order: Literal["little", "big"] = "little" if row.order == "little" else "big"
+    return Measure(node, row, settings, _plain(row), row.scale, factor, order)
+
+
+def _is_simple(row: Entry, settings: Settings) -> bool:
+    return bool(row.unit) and not (settings.shift and row.name == PRESENT_POSITION)
+
+
+def _plain(row: Entry) -> int:
+    """A code below this is its own raw value."""
+    if row.sign_bit is not None:
+        return 1 << row.sign_bit
+    return 1 << 8 * row.size - (row.coding is Coding.TWOS_COMPLEMENT)
 
 
 def quantity(node: Node, row: Entry, count: int) -> Whole[float] | None:
     """What a status packet says that brings this row, and perhaps a byte more: its value in the row's unit."""
-    how = measure(node, row)
-    if how is None or row.size > 2:
+    settings = node.settings
+    if settings is None or row.size > 2 or not _is_simple(row, settings):
         return None
-    _, _, settings, plain, scale, factor, order = how
+    plain, scale, factor = _plain(row), row.scale, settings.factors.get(row.name, 1.0)
     begin, size, end, decode = head(node.node, count), wire.OVERHEAD + count, 5 + row.size, row.decode
     wide = row.size == 2
-    low, high = (5, 6) if order == "little" else (6, 5)
+    low, high = (5, 6) if row.order == "little" else (6, 5)
 
     seen: object = None  # `CHANGES.now` when it was found to have those settings
 

@@ -73,19 +73,25 @@ def identify(node: Node) -> Exchange[Identity]:
 
 
 def prepare(node: Node) -> Exchange[Identity]:
-    """Read whatever motion and prepared group operations need: identity, limits, mode and units, in one READ."""
+    """Read whatever motion and prepared group operations need: identity, limits, mode and units, in one READ.
 
-    def take(image: bytes) -> Identity:
-        return learn(node, image)
+    It is always the same one for a servo, and kept: who polls one that is not there asks it again and again.
+    """
+    kept = node.preparation
+    if kept is None:
 
-    return read_block(node, 0, IMAGE, take)
+        def take(image: bytes) -> Identity:
+            return learn(node, image)
+
+        kept = node.preparation = read_block(node, 0, IMAGE, take)
+    return kept
 
 
 def known(node: Node) -> Operation[Table]:
     """The register map of this servo; asks it when its settings are not known yet."""
     if node.table is not None and node.settings is not None:
         return node.table
-    identity = yield from prepare(node)
+    identity: Identity = yield prepare(node)  # as `yield from` it, without a generator of its own
     if node.table is None:  # who answered stands for a servo and is none, as in a dry run: its answer says so
         return TABLES[identity.table]
     return node.table

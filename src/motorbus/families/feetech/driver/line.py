@@ -6,6 +6,7 @@ All figures come with their source; none is measured by this project.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any, Final
 
 from motorbus.core.family import Stop
@@ -82,7 +83,12 @@ def echo_test() -> Exchange[None]:
 
 def probe(node: int, attempt: int) -> Exchange[bool]:
     """READ that begins with the id register, in a length that few other reads have; True when the id is right."""
-    count = PROBES[attempt % len(PROBES)]
+    return _probe(node, PROBES[attempt % len(PROBES)])
+
+
+@cache
+def _probe(node: int, count: int) -> Exchange[bool]:
+    """Kept, for there are few: of a servo that stays silent many are looked at each time."""
 
     def read(answer: Answer) -> bool:
         return bool(answer.replies) and answer.replies[0].data[5] == node

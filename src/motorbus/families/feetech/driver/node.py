@@ -124,7 +124,8 @@ class Node:
     current where a goal register holds it (HLS), as last read or written; None when not read yet. `former_limits` are
     those (rad) that were given up to make a motor of it, where limits decide about that. `questions` are packets that
     were made to read it, with the reply due, by address and count; `kept` are exchanges that bring one quantity, each
-    with the settings under which it was made. `unsure` are the EEPROM cells that were written and
+    with the settings under which it was made, and `preparation` the one that brings all that the driver must know.
+    `unsure` are the EEPROM cells that were written and
     may not be kept: what came in between may have closed the lock, behind which a write is obeyed and soon gone.
     """
 
@@ -146,6 +147,7 @@ class Node:
         self.unsure: set[int] = set()
         self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Due, ...]]]] = {}
         self.kept: Final[dict[str, tuple[Settings, Exchange[Any]]]] = {}
+        self.preparation: Exchange[Identity] | None = None
 
     @property
     def limits(self) -> tuple[float, float] | None:

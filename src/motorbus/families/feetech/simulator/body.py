@@ -166,6 +166,16 @@ class Body(ABC):
         """Its shaft was turned by hand, or its supply is gone: what it did is over."""
         self._carry(self.motion, None, inf, at)
 
+    def go_freely(self, planned: Motion, torque: float, at: float) -> None:
+        """Do from this moment on as planned, with all of its torque: nothing from outside is in the way."""
+        self._given = torque
+        self._carry(planned, None, inf, at)
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing from outside burdens or blocks it."""
+        return self._world == _NOTHING
+
     def bear(self, plan: Callable[[Drive], Motion], wanted: Settings, at: float) -> None:
         """Do from this moment on what becomes of a plan; both are in the direction of the shaft."""
         self._given = wanted.torque
@@ -177,7 +187,10 @@ class Body(ABC):
     @property
     def next(self) -> float:
         """When that happens next; infinity when nothing will."""
-        return min(self.protection.next, self._again, self._cut_at)
+        soon = self.protection.next
+        if self._again < soon:
+            soon = self._again
+        return self._cut_at if self._cut_at < soon else soon
 
     def join(self, expect: Callable[[float], None], sag: Callable[[float], float] | None) -> None:
         """From now on `expect` is told its next moment whenever that may be another one.

@@ -15,6 +15,7 @@ from motorbus.families.feetech.table import Middle, Mode
 _CALIBRATE: Final = 128
 _COUNTS: Final = frozenset({"operating_mode", "homing_offset"})
 _FACES: Final = frozenset({"phase", "angular_resolution"})
+_TO_A_GOAL: Final = (Mode.POSITION, Mode.STEP)
 _LIMITS: Final = frozenset({"min_position_limit", "max_position_limit"})
 
 
@@ -52,7 +53,7 @@ def write(servo: Servo, address: int, data: bytes, at: float) -> float:
         _react(servo, done.names, torque, at)
     if done.stored:
         servo.stores()
-    return servo.storing(at)
+    return servo.storing(at) if servo.memory.flash.works else 0.0
 
 
 def reg_write(servo: Servo, address: int, data: bytes) -> None:
@@ -88,8 +89,9 @@ def _react(servo: Servo, names: frozenset[str], torque: int, at: float) -> None:
         servo.face(at)
     if about.counts or (about.limits and not control.modes):  # there the limits decide about the mode
         servo.count_anew(at)
-    mode = servo.mode if about.goal else None
-    if mode in (Mode.POSITION, Mode.STEP) and memory["torque_enable"] != 1 and _goal_enables(servo):
+    asked = servo.asked
+    mode = asked.mode if about.goal else None
+    if mode in _TO_A_GOAL and not asked.on and _goal_enables(servo):
         memory["torque_enable"] = 1
     if mode is Mode.STEP:
         servo.step(at)

@@ -26,7 +26,10 @@ class Fate:
 
     def expect(self, moment: float) -> None:
         """Something of a servo has changed, and by itself it will do something at this moment."""
-        self.soon = -inf if self.supply else min(self.soon, moment)
+        if self.supply:
+            self.soon = -inf
+        elif moment < self.soon:
+            self.soon = moment
 
     def live(self, to: float, now: float, tell: Callable[[float], None]) -> None:
         """Let everything happen up to this moment; `tell` is given each moment before."""

@@ -82,6 +82,7 @@ def read(servo: Servo, address: int, count: int, at: float) -> bytes:
         rows = [row.name for row in memory.layout.touched(address, count)]
         asked = tuple((name, FEEDBACK[name]) for name in rows if name in FEEDBACK)
         memory.layout.told[address, count] = asked
-    for name, tell in asked:
-        memory.tell(name, tell(servo, at))
+    tell = memory.tell
+    for name, worked_out in asked:
+        tell(name, worked_out(servo, at))
     return memory.read(address, count)

@@ -15,6 +15,8 @@ from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.table import Middle
 from motorbus.families.feetech.wire import Instruction
 
+_made: Final = tuple.__new__
+"""Makes a named tuple in half the time of its own call."""
 MOST: Final = 253
 """More bytes than this do not fit into one status packet."""
 
@@ -29,8 +31,6 @@ class Answer(NamedTuple):
 
 def _busy(servo: Servo, at: float) -> float:
     """How much later (s) it answers because its EEPROM is at work (feetech-cli: a burst follows)."""
-    if not servo.memory.flash.works:
-        return 0.0
     return servo.storing(at) if servo.switches.while_storing == "buffer" else 0.0
 
 
@@ -38,10 +38,16 @@ def _ping(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     return None if parameters else Answer(later=_busy(servo, at))
 
 
+def told(servo: Servo, address: int, count: int, at: float) -> Answer:
+    """What it says when so many bytes from this address on are read, at most `MOST`."""
+    later = _busy(servo, at) if servo.memory.flash.works else 0.0
+    return _made(Answer, (feedback.read(servo, address, count, at), None, later))
+
+
 def _read(servo: Servo, parameters: bytes, at: float) -> Answer | None:
     if len(parameters) != 2 or parameters[1] > MOST:
         return None
-    return Answer(feedback.read(servo, parameters[0], parameters[1], at), None, _busy(servo, at))
+    return told(servo, parameters[0], parameters[1], at)
 
 
 def _write(servo: Servo, parameters: bytes, at: float) -> Answer | None:

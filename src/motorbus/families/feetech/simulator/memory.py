@@ -64,6 +64,7 @@ class Layout:
         self.told: dict[
             tuple[int, int], tuple[tuple[str, Tell], ...]
         ] = {}  # `feedback` keeps its answers here
+        self.asked: dict[object, Any] = {}  # and `settings` what the same registers come to
         self.rows: list[Entry | None] = [None] * SIZE
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
@@ -73,6 +74,7 @@ class Layout:
             for entry in table.values()
             if entry.size == 1 and entry.coding is Coding.UNSIGNED
         }
+        self.id = table["id"].address
         self.words = {entry.name: _word(entry) for entry in table.values() if _is_word(entry)}
         self.scales = {entry.name: entry.scale for entry in table.values()}
         self.factory = bytes(_image(table, defaults))
@@ -142,9 +144,8 @@ class Memory:
     def __getitem__(self, name: str) -> int:
         """The raw value of a row."""
         layout, live = self.layout, self.live
-        plain = layout.plain.get(name)  # most rows are one byte, and each packet asks for ten of them
-        if plain is not None:
-            return live[plain]
+        if name in layout.plain:  # most rows are one byte, and each packet asks for some of them
+            return live[layout.plain[name]]
         word = layout.words.get(name)
         if word is not None:
             low, high, magnitude, sign = word
@@ -160,13 +161,15 @@ class Memory:
 
     def tell(self, name: str, raw: int) -> None:
         """The same for feedback, which nothing that the servo does depends on."""
-        layout = self.layout
-        word, plain = layout.words.get(name), layout.plain.get(name)
-        if word is not None and 0 <= raw <= word.magnitude:
-            self.live[word.low], self.live[word.high] = raw & 0xFF, raw >> 8
-            return
-        if plain is not None and 0 <= raw <= 0xFF:
-            self.live[plain] = raw
+        layout, live = self.layout, self.live
+        word = layout.words.get(name)
+        if word is not None:
+            low, high, magnitude, _ = word
+            if 0 <= raw <= magnitude:
+                live[low], live[high] = raw & 0xFF, raw >> 8
+                return
+        elif 0 <= raw <= 0xFF and (plain := layout.plain.get(name)) is not None:
+            live[plain] = raw
             return
         entry = layout.table[name]
         self.live[entry.address : entry.address + entry.size] = code(entry, raw)

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import copysign, inf, sqrt
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.plant import Drive, Motion, Phase, move, rest, run
 from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.table import Mode
 
+_made: Final = tuple.__new__
+"""Makes a named tuple in half the time of its own call: each goal needs one."""
 _MOST_TURNS = 7.5
 """How far a goal over many turns may lie to either side (STS3215 memory table V3.6: 30719 counts)."""
 
@@ -63,7 +65,7 @@ class Settings(NamedTuple):
 
 def settings(asked: Settings, torque: float, burden: float, goal: int, zero: int) -> Settings:
     """What the registers ask for, with what changes from one movement to the next in the place of the first four."""
-    return Settings._make((torque, burden, goal, zero, *asked[4:]))
+    return _made(Settings, (torque, burden, goal, zero, *asked[4:]))
 
 
 def reading(encoder: float, zero: int, told: bool, turn: int, fold: int = 1) -> int:
@@ -146,7 +148,9 @@ def _place(settings: Settings, encoder: float, switches: Switches) -> float:
         return settings.zero + settings.goal * settings.fold
     else:
         low, high = settings.low, settings.high
-    goal = min(max(settings.goal, low), high)
+    goal = settings.goal
+    if not low <= goal <= high:
+        goal = min(max(goal, low), high)
     if goal != settings.goal and switches.beyond_limits == "stay":
         return encoder
     if settings.turns:
@@ -171,7 +175,7 @@ def _go(settings: Settings, encoder: float, velocity: float, place: float, at: f
     if settings.runs_away and place != encoder:
         goal = copysign(drive.top_speed, encoder - place)
         return run(at, encoder, goal, velocity=velocity, acceleration=acceleration)
-    speed = abs(_bounded(settings.velocity, drive))
+    speed = min(abs(settings.velocity), drive.top_speed) if settings.velocity else 0.0
     if not speed and settings.time:
         speed = min(drive.top_speed, _speed_for(abs(place - encoder), settings.time, acceleration))
     elif not speed and settings.fastest:

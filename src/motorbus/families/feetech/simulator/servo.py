@@ -198,7 +198,7 @@ class Servo(Body):
     @property
     def locked(self) -> bool:
         """Whether writes to the EEPROM area are lost at power-off."""
-        return self.memory["lock"] != 0
+        return self._registers.asked.locked
 
     @property
     def told_voltage(self) -> int:
@@ -210,9 +210,20 @@ class Servo(Body):
     @property
     def error(self) -> int:
         """The error byte of its status packets, which register 65 repeats: alarms and nothing else."""
-        least, most = self._registers.asked.volts
+        return self._error(self._registers.asked)
+
+    def _error(self, asked: Asked) -> int:
+        least, most = asked.volts
         bits = self._alarm | self.protection.error
-        return bits if least <= self.told_voltage <= most else bits | _VOLTAGE
+        plain = not self._sag and not self._may_be_blind  # most are like that
+        told = self._told_voltage if plain else self.told_voltage
+        return bits if least <= told <= most else bits | _VOLTAGE
+
+    def speaks(self) -> tuple[int, int, float]:
+        """What belongs to each of its packets: its id, its error byte, and the return delay before it (s)."""
+        asked = self._registers.asked
+        memory = self.memory
+        return memory.live[memory.layout.id], self._error(asked), asked.delay
 
     def hears(self, rate: int | None, at: float) -> bool:
         """Whether it is there, awake and set to this rate (None: whichever it is)."""
@@ -238,15 +249,15 @@ class Servo(Body):
 
         Supply, torque on, no alarm that unloads it, torque limit and current cap: this is the one place for them.
         """
-        return self._available(self.asked.limit)
+        return self._available(self._registers.asked)
 
-    def _available(self, limit: float) -> float:
-        """The same, by the share that the registers allow."""
-        if not self.plugged or self.memory["torque_enable"] != 1:
+    def _available(self, asked: Asked) -> float:
+        """The same, by what the registers allow."""
+        if not self.plugged or not asked.on:
             return 0.0
-        unloading = self.error
+        unloading, limit = self._error(asked), asked.limit
         if not unloading:
-            return min(limit, 1.0)
+            return limit if limit < 1.0 else 1.0
         if self.tripped and not self._alarm & OVERLOAD:
             unloading &= ~OVERLOAD  # it leaves a part of the torque
         return 0.0 if unloading & self.memory["unload_mask"] else min(limit, self.protection.left)
@@ -271,7 +282,7 @@ class Servo(Body):
     def position(self, at: float) -> int:
         """The present position in counts, as it says it."""
         settings = self._registers.asked.settings
-        encoder = self.facing * self.motion.state(at)[0]
+        encoder = self.facing * self.motion.position(at)
         return motor.reading(encoder, self.zero, settings.told, settings.turn, self.fold)
 
     def arrived(self, at: float) -> bool:
@@ -289,8 +300,10 @@ class Servo(Body):
 
     def _go(self, planned: motor.Planner, at: float) -> None:
         self.protection.weigh(at)
-        wanted, motion = self._wanted(self.asked), self.motion
-        if self.facing > 0:
+        wanted, motion = self._wanted(self._registers.asked), self.motion
+        if self.facing > 0 and wanted.torque >= 1 and self.free:  # most are like that
+            self.go_freely(planned(wanted, motion, at, self.model.drive, self.switches), wanted.torque, at)
+        elif self.facing > 0:
             self.bear(lambda drive: planned(wanted, motion, at, drive, self.switches), wanted, at)
         else:
             before, turned = (
@@ -304,7 +317,7 @@ class Servo(Body):
     def _wanted(self, asked: Asked) -> motor.Settings:
         goal = self.memory["goal_position"]
         return motor.settings(
-            asked.settings, self._available(asked.limit), self.facing * self.burden, goal, self.zero
+            asked.settings, self._available(asked), self.facing * self.burden, goal, self.zero
         )
 
     def face(self, at: float) -> None:

@@ -34,6 +34,8 @@ DECIDES_MOTION: Final = frozenset(
     }
 )
 """A write of one of these makes the servo think again about where it goes."""
+_KNOWN: Final = 256
+"""Different contents of the registers of which is kept what they come to."""
 
 
 class Asked(NamedTuple):
@@ -49,6 +51,8 @@ class Asked(NamedTuple):
     `rate`      bit/s; None for a code that means nothing: it hears nobody
     `delay`     s between the end of a request and the beginning of the reply
     `volts`     the least and the greatest supply that are no alarm, in 0.1 V
+    `on`        its torque is switched on
+    `locked`    writes to the EEPROM area are lost at power-off
     """
 
     mode: Mode | None
@@ -61,6 +65,8 @@ class Asked(NamedTuple):
     rate: int | None
     delay: float
     volts: tuple[int, int]
+    on: bool
+    locked: bool
 
 
 class Registers:
@@ -73,9 +79,9 @@ class Registers:
         self._model, self._memory, self._switches = model, memory, switches
         self._before = slice(goal.address)
         self._after = slice(goal.address + goal.size, readings.address)
-        self._seen = bytearray(), bytearray()
+        self._seen = b"", b""
         self._steps = round(model.table["goal_velocity"].scale / goal.scale)  # 1, and 50 on HLS
-        self._asked = self._work_out()
+        self._asked = self._see()
 
     @property
     def asked(self) -> Asked:
@@ -84,12 +90,29 @@ class Registers:
         if not memory.settled:
             live, (before, after) = memory.live, self._seen
             if not (live.startswith(before) and live.startswith(after, self._after.start)):
-                self._asked = self._work_out()  # hosts write goals and little else, so this is rare
+                self._asked = self._see()  # hosts write goals and little else, so this is rare
             memory.settled = True
         return self._asked
 
+    def _see(self) -> Asked:
+        """Look at them anew. A bus is full of servos that differ in their ids alone: they share what they ask for."""
+        live, id_at = self._memory.live, self._memory.layout.id
+        before, after = bytes(live[self._before]), bytes(live[self._after])
+        self._seen = before, after
+        known: dict[object, tuple[Asked, Model, Switches]] = self._memory.layout.asked
+        key = id(self._model), id(self._switches), before[:id_at], before[id_at + 1 :], after
+        found = known.get(key)
+        if found is None:
+            if len(known) >= _KNOWN:
+                known.clear()
+            found = known[key] = (
+                self._work_out(),
+                self._model,
+                self._switches,
+            )  # which have their id() for so long
+        return found[0]
+
     def _work_out(self) -> Asked:
-        self._seen = self._memory.live[self._before], self._memory.live[self._after]
         memory, switches, model = self._memory, self._switches, self._model
         phase, name = memory["phase"], model.table.name
         low, high = self._limits()
@@ -116,7 +139,8 @@ class Registers:
         )
         limit, volts = self._limit(mode), (memory["min_voltage"], memory["max_voltage"])
         blind, rate, delay = self._blind(), self._rate(), self._delay()
-        return Asked(mode, facing, fold, blind, unit, limit, settings, rate, delay, volts)
+        on, locked = memory["torque_enable"] == 1, memory["lock"] != 0
+        return Asked(mode, facing, fold, blind, unit, limit, settings, rate, delay, volts, on, locked)
 
     def _rate(self) -> int | None:
         code, known = self._memory["baud_rate"], BAUD_CODES_OF[self._model.table.name]

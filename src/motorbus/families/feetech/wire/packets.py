@@ -31,6 +31,7 @@ SOUND: Final = 0xFD
 """The last byte of the sum over a whole packet whose checksum is right, header and checksum included."""
 OVERHEAD: Final = 6
 """Bytes of a packet besides its parameters."""
+_BYTES: Final = tuple(bytes((value,)) for value in range(256))
 
 
 class Instruction(IntEnum):
@@ -159,7 +160,7 @@ def frame(id: int, code: int, parameters: bytes = b"") -> bytes:
     `code` is an instruction or an error byte. Raises ValueError when a field does not fit its byte.
     """
     body = bytes((id, len(parameters) + 2, code)) + parameters
-    return HEADER + body + bytes((checksum(body),))
+    return HEADER + body + _BYTES[~sum(body) & 0xFF]
 
 
 def is_sound(data: bytes) -> bool:
