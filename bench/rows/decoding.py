@@ -1,11 +1,12 @@
 """Rows 8 and 9: packets out of a noisy capture, by a streaming decoder and by a bulk one, against the vendor's SDK.
 
-One capture (`bench.noisy_stream`) for all, in memory. The streaming decoder gets it in pieces, and gives lists of
-packets and what they say. The bulk decoder gets it whole, and gives arrays, and the bytes of packets once they are
-asked for: row 9 has them cut out, as the SDK does; what the arrays alone take is told beside it. The SDK's `rxPacket`
-reads from a port that hands over what it asks for and never makes it wait. The figure is the time that theirs needs for
-the whole capture by the time that ours needs. Ours must give exactly the packets that a search by brute force finds;
-how many of them the SDK finds is told, for it gives up what follows a damaged length.
+One capture (`bench.noisy_stream`) for all, in memory. The streaming decoder gets it in pieces as a serial port hands
+them over, and gives lists of packets; what they say is not asked. The SDK has all of it at hand, so what ours needs
+for blocks as of a file is told beside it. The bulk decoder gets it whole, and gives arrays, and the bytes of packets
+once they are asked for: row 9 has them cut out, as the SDK does; what the arrays alone take is told beside it. The
+SDK's `rxPacket` reads from a port that hands over what it asks for and never makes it wait. The figure is the time that
+theirs needs for the whole capture by the time that ours needs. Ours must give exactly the packets that a search by
+brute force finds; how many of them the SDK finds is told, for it gives up what follows a damaged length.
 """
 
 from __future__ import annotations
@@ -25,18 +26,27 @@ from bench.row import SAMPLES, Row, Say, pairs
 NUMBERS = ("8", "9")
 MODULE = "bench.rows.decoding"
 SDK = "feetech-servo-sdk"
-STREAM, BULK, CUT = "streaming", "bulk", "bulk, bytes too"
+STREAM, BLOCKS, BULK, CUT = "streaming", "streaming, blocks", "bulk", "bulk, bytes too"
+BLOCK = 4096
+"""Bytes of a block."""
 JOBS = (
     apart.Job(STREAM, MODULE, (STREAM,)),
+    apart.Job(BLOCKS, MODULE, (BLOCKS,)),
     apart.Job(BULK, MODULE, (BULK,)),
     apart.Job(CUT, MODULE, (CUT,)),
     apart.Job(SDK, MODULE, (SDK,), (SDK, "pyserial")),
 )
 PASSES = 5
 """Over the whole capture, of each sample."""
-GOALS = {STREAM: ("8", ">= 3.5", ">= 5"), CUT: ("9", ">= 15", ">= 25"), BULK: ("9", "", "")}
+GOALS = {
+    STREAM: ("8", ">= 3.5", ">= 5"),
+    BLOCKS: ("8", "", ""),
+    CUT: ("9", ">= 15", ">= 25"),
+    BULK: ("9", "", ""),
+}
 MEASURES = {
-    STREAM: "streaming decoding of a noisy capture",
+    STREAM: "streaming decoding of a noisy capture, in pieces as of a port",
+    BLOCKS: f"streaming decoding of a noisy capture, in blocks of {BLOCK} bytes as of a file",
     CUT: "bulk decoding of a noisy capture, the bytes of each packet cut out",
     BULK: "bulk decoding of a noisy capture, columns only, which is less than theirs does",
 }
@@ -61,7 +71,7 @@ def _row(name: str, found: Any) -> Row:
         f"{median(theirs) / first['decodable'] * 1e6:.2f} µs of theirs; the SDK finds "
         f"{first['found'] / first['decodable']:.1%} of {first['decodable']} packets"
     )
-    if name != STREAM:
+    if name in (BULK, CUT):
         streamed = pairs([one["seconds"] for one in found[STREAM]], ours)
         what = "as arrays, bytes as a list" if name == CUT else "as arrays"
         times = f"{streamed.median:.1f} times as fast as our streaming decoder"
@@ -88,7 +98,7 @@ def measured(name: str, packets: int | None = None) -> dict[str, Any]:
     """One decoder over the capture, once to warm up and then by the clock. Raises Failed for a wrong result."""
     stream = capture() if packets is None else capture(packets)
     truth = list(decodable(stream))
-    decode = {STREAM: _streaming, BULK: _bulk, CUT: _cut, SDK: _vendor}[name]()
+    decode = {STREAM: _streaming, BLOCKS: _blocks, BULK: _bulk, CUT: _cut, SDK: _vendor}[name]()
     decode(stream)
     passes = [decode(stream) for _ in range(PASSES)]
     seconds, places = sum(each for each, _ in passes) / PASSES, passes[-1][1]
@@ -103,11 +113,17 @@ Decoder = Callable[[bytes], tuple[float, Sequence[Any]]]
 """Processor time for the whole stream, and what was found: packets, or the places of those of the SDK."""
 
 
-def _streaming() -> Decoder:
+def _blocks() -> Decoder:
+    return _streaming(
+        lambda stream: [stream[start : start + BLOCK] for start in range(0, len(stream), BLOCK)]
+    )
+
+
+def _streaming(cutting: Callable[[bytes], list[bytes]] = pieces) -> Decoder:
     from motorbus.recorder import Decoder
 
     def decode(stream: bytes) -> tuple[float, list[bytes]]:
-        cut, decoder = pieces(stream), Decoder("feetech", "rx")
+        cut, decoder = cutting(stream), Decoder("feetech", "rx")
         began = process_time()
         heard = [decoder.feed(piece) for piece in cut]
         last = decoder.flush()

@@ -63,9 +63,9 @@ def test_the_page_holds_every_table() -> None:
     assert f"| {BACKUP} | 2.000 s |" in jobs
     assert "5.0%. At most 15%: reached." in jobs
     assert "robot.loop" not in text
-    flat = Looped("direct", 1136.4, 1136.4, 1020.0, 5100, 5000, 500, 4e-4, 9.7e-4, 1.2e-4)
+    flat = Looped("direct ahead", 1136.4, 1136.4, 1020.0, 5100, 5000, 500, 4e-4, 9.7e-4, 1.2e-4)
     looped = page(RESULTS._replace(loop=[flat]))
-    assert "| direct | 1136.4 | 1020.0 | 89.8% | 5000 | 500 | 400 | 970 | 120 |" in looped
+    assert "| direct ahead | 1136.4 | 1020.0 | 89.8% | 5000 | 500 | 400 | 970 | 120 |" in looped
     assert "89.8%. At least 88%: reached." in looped
 
 

@@ -8,10 +8,10 @@ from bench import apart
 from bench.noisy_stream import capture, decodable
 from bench.rounds import Failed
 from bench.rows import decoding
-from bench.rows.decoding import BULK, CUT, JOBS, SDK, STREAM, measured
+from bench.rows.decoding import BLOCKS, BULK, CUT, JOBS, SDK, STREAM, measured
 
 
-@pytest.mark.parametrize("name", [STREAM, BULK, CUT])
+@pytest.mark.parametrize("name", [STREAM, BLOCKS, BULK, CUT])
 def test_ours_find_all_of_them(name: str) -> None:
     said = measured(name, 400)
     assert said["found"] == said["decodable"] == len(list(decodable(capture(400))))
@@ -43,15 +43,17 @@ def test_the_port_in_memory_hands_over_what_is_asked_for() -> None:
 
 
 def test_the_rows_are_theirs_by_ours(monkeypatch: pytest.MonkeyPatch) -> None:
-    shares = {STREAM: 1.0, BULK: 0.25, CUT: 0.5, SDK: 4.0}
+    shares = {STREAM: 1.0, BLOCKS: 0.8, BULK: 0.25, CUT: 0.5, SDK: 4.0}
 
     def told(job: apart.Job, *more: str) -> dict[str, float]:
         found = 90 if job.name == SDK else 100
         return {"seconds": shares[job.name], "bytes": 1000, "decodable": 100, "found": found}
 
     monkeypatch.setattr(apart.rounds, "__defaults__", (told, 3))
-    streamed, cut, bulk = decoding.rows(7, lambda text: None)
+    streamed, blocks, cut, bulk = decoding.rows(7, lambda text: None)
     assert (streamed.number, streamed.value, streamed.ours, streamed.theirs) == ("8", 4.0, 1.0, 4.0)
+    assert (blocks.number, blocks.value, blocks.goal) == ("8", 5.0, "")
+    assert "in blocks of 4096 bytes" in blocks.measure
     assert (cut.number, cut.value, cut.goal, cut.samples) == ("9", 8.0, ">= 15", 7)
     assert (bulk.number, bulk.value, bulk.goal) == ("9", 16.0, "")
     assert "the bytes of each packet cut out" in cut.measure
