@@ -157,12 +157,12 @@ def passing(_: Any) -> bool:
     return True
 
 
-def one_behind_the_other(bus: Bus, read: Any) -> Any:
-    """Two volleys, of which the second leaves right behind the answer to the first where it can."""
+def one_behind_the_other(bus: Bus, read: Any, begins: float = -inf) -> Any:
+    """Two volleys, of which the second leaves right behind the answer to the first where it can, or a while later."""
     volley = Loosed(bus, (order(), read))
-    behind = volley.behind((order(),), -inf, passing)
+    behind = volley.behind((order(),), begins, passing)
     told = volley.land(behind)
-    if behind is None or behind.at is None:
+    if behind is None or (behind.at is None and not volley.leave(behind)):
         volley = Loosed(bus, (order(), read))
     return told, volley.land()
 

@@ -165,6 +165,50 @@ def test_it_does_not_leave_where_anything_is_against_it(against: Callable[[Bus, 
     assert volley.land() == [None]  # nothing else has left
 
 
+def test_what_is_ready_leaves_later_where_nothing_has_happened_since() -> None:
+    bus, _, line, exchange = ready()
+    volley = Loosed(bus, (order(), exchange))
+    behind = volley.behind((order(),), inf, passing)
+    assert behind is not None
+    assert volley.land(behind) == [None, VALUE]
+    line.sent.clear()
+    bus.link.advance(0.001)  # type: ignore[attr-defined]
+    assert volley.leave(behind)
+    assert line.sent == [both(exchange)]
+    assert behind.at == pytest.approx(bus.link.now())
+    assert volley.land() == [None, VALUE]
+
+
+@pytest.mark.parametrize("against", [changed, stopped, watched])
+@pytest.mark.parametrize("landed", [False, True])
+def test_it_does_not_leave_later_where_anything_has_happened(
+    against: Callable[[Bus, Behind], None], landed: bool
+) -> None:
+    bus, _, line, exchange = ready()
+    volley = Loosed(bus, (order(), exchange))
+    behind = volley.behind((order(),), inf, passing)
+    assert behind is not None
+    for step in (volley.land, lambda: against(bus, behind))[:: 1 if landed else -1]:
+        step()
+    line.sent.clear()
+    assert not volley.leave(behind)
+    assert line.sent == []
+    assert bus.volley(order(), exchange) == [None, VALUE]
+
+
+def test_a_link_that_is_lost_before_it_leaves_is_told() -> None:
+    bus, _, _, exchange = ready()
+    volley = Loosed(bus, (order(), exchange))
+    behind = volley.behind((order(),), inf, passing)
+    assert behind is not None
+    volley.land(behind)
+    bus.link.unplug(-inf)  # type: ignore[attr-defined]
+    with pytest.raises(LinkLost):
+        volley.leave(behind)
+    assert bus.turns.idle
+    assert bus.relay.pumper is None
+
+
 def test_nothing_is_ready_that_might_not_leave() -> None:
     bus, _, _, exchange = ready()
     volley = Loosed(bus, (order(), exchange))

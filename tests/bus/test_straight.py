@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import pytest
@@ -18,7 +19,10 @@ from tests.bus.responder import position
 from tests.bus.struck import FAULTS, Landings, kept, one_behind_the_other, order, passing, struck_bus
 
 Step = tuple[str, str, float]
-VOLLEYS = ("volley group", "volley one", "loosed group", "loosed one", "behind group", "behind one")
+VOLLEYS = (
+    *("volley group", "volley one", "loosed group", "loosed one"),
+    *("behind group", "behind one", "later group", "later one"),
+)
 READS = {
     "one": (1,),
     "two": (2,),
@@ -96,6 +100,9 @@ def carried_out(steps: list[Step], *, looks: bool = False) -> Any:
         elif what.startswith("behind"):
             bus.turns.passes = passing
             told.append(said(lambda read=what[7:]: one_behind_the_other(bus, reads[read])))
+        elif what.startswith("later"):
+            bus.turns.passes = passing
+            told.append(said(lambda read=what[6:]: one_behind_the_other(bus, reads[read], inf)))
         else:
             told.append(said(lambda what=what: bus.run(reads[what])))
         bus.link.advance(rest)  # type: ignore[attr-defined]
@@ -166,6 +173,7 @@ def test_loops_of_groups_and_single_ones_are_the_same(cycle: list[str], cycles: 
         ("volley group", "volley far", "one"),
         ("loosed group", "loosed far", "one"),
         ("behind group",),
+        ("later group",),
     ],
 )
 def test_groups_go_straight_and_take_turns_with_their_other_form(

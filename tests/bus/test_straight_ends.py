@@ -24,6 +24,7 @@ CALLS: dict[str, tuple[tuple[int, ...], Callable[[Bus, Any], Any]]] = {
     "cast": ((1,), lambda bus, exchange: bus.run(order())),
     "loosed": ((1, 2), lambda bus, exchange: Loosed(bus, (order(), exchange)).land()),
     "behind": ((1, 2), lambda bus, exchange: one_behind_the_other(bus, exchange)),
+    "later": ((1, 2), lambda bus, exchange: one_behind_the_other(bus, exchange, inf)),
 }
 
 
@@ -89,7 +90,7 @@ def heard_of_all(bus: Bus, exchange: Any) -> Any:
 CASES = [(what, "", rest) for what in CALLS for rest in (0.0, 0.01)]
 CASES += [
     (what, fault, 0.0)
-    for what in ("one", "group", "volley", "loosed", "behind")
+    for what in ("one", "group", "volley", "loosed", "behind", "later")
     for fault in ("late", "drop", "split", "apart", "bytes")
 ]
 

@@ -30,14 +30,15 @@ class Behind:
     """An order that may leave right behind an answer, with the same question again.
 
     Not before `begins` (s on the link's clock), and only if that answer `fits`, which is asked of what it means. It was
-    judged when it was made, by what was known then. `at` is when it has left, None where it has not; its `course` is
-    that of the question.
+    judged when it was made, by what was known in that `era` of the lock. `at` is when it has left, None where it has
+    not; its `course` is that of the question.
     """
 
-    __slots__ = ("at", "begins", "course", "fits", "order")
+    __slots__ = ("at", "begins", "course", "era", "fits", "order")
 
-    def __init__(self, order: Exchange[Any], begins: float, fits: Callable[[Any], bool]) -> None:
+    def __init__(self, order: Exchange[Any], era: int, begins: float, fits: Callable[[Any], bool]) -> None:
         self.order = order
+        self.era = era
         self.begins = begins
         self.fits = fits
         self.at: float | None = None
@@ -50,13 +51,14 @@ class Loosed:
     Between the two the bus is free for everybody. Making one raises what `volley` does.
     """
 
-    __slots__ = ("_bus", "_course", "_forgiven", "_told")
+    __slots__ = ("_bus", "_course", "_forgiven", "_last", "_told")
 
     def __init__(self, bus: Bus, exchanges: Sequence[Exchange[Any]], forgiven: Forgiven = ()) -> None:
         self._bus = bus
         self._forgiven = forgiven
         self._told: list[Any] = [None] * (len(exchanges) - 1)  # nothing comes of an order that is sure
         self._course: Course | None = _gone(bus, exchanges)
+        self._last: Course | None = None
         if self._course is None:
             self._told = volley(bus, exchanges, forgiven)
 
@@ -66,7 +68,8 @@ class Loosed:
         """These, ready to leave right behind the answer; None where they cannot, or it is not sure that they may."""
         if self._course is None or len(orders) != 1 or not rides(orders[0]):
             return None
-        return Behind(orders[0], begins, fits) if _foreseen(self._bus, orders[0]) else None
+        era = self._bus.turns.lock.era
+        return Behind(orders[0], era, begins, fits) if _foreseen(self._bus, orders[0]) else None
 
     def land(self, behind: Behind | None = None) -> list[Any]:
         """The value of each, or the error where it is forgiven. Waits for the answer. Raises the error that is not.
@@ -76,7 +79,7 @@ class Loosed:
         course, told = self._course, self._told
         if course is None:
             return told
-        self._course = None
+        self._course, self._last = None, course
         try:
             told = [*told, _land(self._bus, course, behind)]
         except LinkError:
@@ -86,6 +89,14 @@ class Loosed:
         if behind is not None and behind.course is not None:
             self._course, self._told = behind.course, [None]
         return told
+
+    def leave(self, behind: Behind) -> bool:
+        """This leaves now, after all, and lands here next; false where it cannot, or anything has happened since it was
+        judged: then nothing has left. Raises LinkError."""
+        if self._last is None or not _left(self._bus, self._last, behind):
+            return False
+        self._course, self._told = behind.course, [None]
+        return True
 
 
 def _gone(bus: Bus, exchanges: Sequence[Exchange[Any]]) -> Course | None:
@@ -170,11 +181,36 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
 
 def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
     """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
-    if at < behind.begins or not behind.fits(value):
-        return
+    if at >= behind.begins and behind.fits(value):
+        _go(bus, last, behind)
+
+
+def _left(bus: Bus, last: Course, behind: Behind) -> bool:
+    """Has this left now, a while after the answer to the `last` question? Raises LinkError."""
+    relay, lock = bus.relay, bus.turns.lock
+    try:
+        try:
+            lock.acquire()
+            if relay.pumper is None:
+                _go(bus, last, behind)
+                relay.pumper = None
+            lock.release()
+        except BaseException as error:
+            fallen(bus, bus.turns.aloft if relay.pumper == get_ident() else behind.course, error)
+            raise
+    except BaseException:  # as in `fly`
+        relay.recover()
+        raise
+    return behind.at is not None
+
+
+def _go(bus: Bus, last: Course, behind: Behind) -> None:
+    """The same, whenever it is; the caller holds the lock, and passes on."""
     turns, link = last.turns, bus.link
     course: Course | None = last.holder.course
     if course is None or turns.flying or turns.chores or turns.trace.subscriptions:
+        return
+    if turns.lock.era != behind.era:
         return
     if course.first.length == course.length and course.first.run >= course.most:
         course = course.twin

@@ -91,7 +91,7 @@ class RoundsAhead(Rounds):
         self._count(air.moment)
         missing = self._heard(told) if self._missing is None else self._missing
         if behind is None or behind.at is None:
-            self._leave(self._believed(orders))
+            self._leave(self._believed(orders), None if part.unsure else behind, air)
         else:
             part.began = behind.at - part.origin
             moment = grid.take(part.began)
@@ -131,15 +131,23 @@ class RoundsAhead(Rounds):
             return part.ordering(part.to)
         return orders[bus]
 
-    def _leave(self, orders: Sequence[Exchange[Any]]) -> None:
-        """The next cycle leaves at its time. Raises what went wrong; nothing is in the air then."""
+    def _leave(
+        self, orders: Sequence[Exchange[Any]], behind: Behind | None = None, air: Air | None = None
+    ) -> None:
+        """The next cycle leaves at its time, as it is ready `behind` the last one where that still holds.
+
+        Raises what went wrong; nothing is in the air then.
+        """
         ((bus, part),) = self.parts.items()
         assert self._grid is not None
         assert self.only is not None
         moment = self._grid.take(self.now)
         try:
             part.await_slot(self.only, moment)
-            volley = Loosed(self.only, (*orders, *part.reads), LOST)
+            if behind is not None and air is not None and air.volley.leave(behind):
+                volley = air.volley
+            else:
+                volley = Loosed(self.only, (*orders, *part.reads), LOST)
         except MotorbusError as failure:
             self._fail({bus: failure})
             raise
