@@ -110,6 +110,39 @@ def test_a_link_that_is_lost_meanwhile_is_told_once_it_is_asked_for() -> None:
     assert bus.turns.idle
 
 
+@pytest.mark.parametrize("nodes", [(1,), (1, 2)])
+def test_whoever_is_interrupted_while_he_waits_leaves_no_question_behind(nodes: tuple[int, ...]) -> None:
+    for stop_at in range(1, 12):
+        bus, _, line, _ = ready()
+        exchange = kept(*nodes)
+        for _ in range(2):
+            bus.volley(order(), exchange)
+        line.fault = "drop"
+        volley, read, looks = Loosed(bus, (order(), exchange), FORGIVEN), bus.link.read, iter(range(1, 99))
+
+        def struck(until: float, read: Any = read, looks: Any = looks, stop_at: int = stop_at) -> Any:
+            if next(looks) == stop_at:
+                raise KeyboardInterrupt
+            return read(until)
+
+        bus.link.read = struck  # type: ignore[method-assign]
+        try:
+            volley.land()
+        except KeyboardInterrupt:
+            bus.link.read = read  # type: ignore[method-assign]
+            assert not bus.turns.waiting, stop_at
+            line.sent.clear()
+            for _ in range(2):
+                bus.link.advance(0.3)  # type: ignore[attr-defined]
+                assert bus.run(position(3)) is not None
+            assert exchange.request not in line.sent, stop_at
+            assert bus.turns.idle
+        else:
+            assert stop_at > 2
+            return
+    raise AssertionError("it was interrupted each time")
+
+
 # -- what leaves behind an answer --------------------------------------------------------------------------------
 
 

@@ -213,7 +213,7 @@ class Straight:
 
     `group` is the course with several nodes that was flown last, `groups` are those flown since all was made good,
     `aims` when orders of which aim left last, so far as that is not told yet. `passes` says that an order may surely
-    leave: then nobody else is asked.
+    leave: then nobody else is asked. Of one that has been judged before, `lets_move` says whether it still may.
     """
 
     aloft: Course | None = None
@@ -223,6 +223,7 @@ class Straight:
     counting: list[Course]
     aims: dict[Aim, float]
     passes: Callable[[Exchange[Any]], bool] | None = None
+    lets_move: Callable[[], bool] | None = None
     calm_since = STALE
 
     @property

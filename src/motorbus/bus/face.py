@@ -69,6 +69,7 @@ class BusFace:
                 self.stopper.start()
                 self.turns.admit = admit  # it is ready now, and stays so
                 self.turns.passes = getattr(admit, "passes", None)
+                self.turns.lets_move = getattr(admit, "lets_move", None)
 
         return admitted
 

@@ -126,8 +126,7 @@ def _loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None
                 bus.relay.pass_on()
             return launched
         except BaseException as error:
-            own = bus.turns.aloft if bus.relay.pumper == get_ident() else launched
-            fallen(bus, own, error)
+            fallen(bus, _in_the_air(bus, launched), error)
             raise
     except BaseException:  # as in `fly`
         bus.relay.recover()
@@ -165,13 +164,14 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
                 relay.pumper = get_ident()
             lock.release()
             if relay.pumper == get_ident():
-                value = brought(bus, course, then)
+                value = brought(bus, course, then, bus.link.read(-inf))
                 if value is not UNLIKE:
                     return value
             while not course.done:  # others have made a usual flight of it
                 relay.turn()
         except BaseException as error:
-            fallen(bus, course if turns.flying.get(course.lane) is course else None, error)
+            new = None if behind is None else behind.course
+            fallen(bus, _in_the_air(bus, new, course), error)
             raise
     except BaseException:  # as in `fly`
         relay.recover()
@@ -179,9 +179,18 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
     return taken(turns, course.exchange, course.result())
 
 
+def _in_the_air(bus: Bus, *courses: Course | None) -> Course | None:
+    """Which of these nobody waits for any more: it flies still, or others have made a usual flight of it."""
+    turns = bus.turns
+    if bus.relay.pumper == get_ident() and turns.aloft is not None:
+        return turns.aloft
+    mine = [one for one in courses if one is not None and not one.done]
+    return next((one for one in mine if one.is_detached or turns.flying.get(one.lane) is one), None)
+
+
 def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
     """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
-    if at >= behind.begins and behind.fits(value):
+    if bus.link.now() >= behind.begins and behind.fits(value):
         _go(bus, last, behind)
 
 
@@ -196,7 +205,7 @@ def _left(bus: Bus, last: Course, behind: Behind) -> bool:
                 relay.pumper = None
             lock.release()
         except BaseException as error:
-            fallen(bus, bus.turns.aloft if relay.pumper == get_ident() else behind.course, error)
+            fallen(bus, _in_the_air(bus, behind.course), error)
             raise
     except BaseException:  # as in `fly`
         relay.recover()
@@ -217,6 +226,8 @@ def _go(bus: Bus, last: Course, behind: Behind) -> None:
     if course.era != turns.lock.era and not course.fits():
         return
     order = behind.order
+    if turns.lets_move is not None and not turns.lets_move():
+        return
     if order.refusal is not None and order.refusal(turns.known.stops) is not None:
         return
     now, start, takes_time = link.now(), turns.free_at, turns.takes_time

@@ -19,8 +19,10 @@ Then = Callable[[Any, float], None]
 """Is told what an answer means, and when it was there (s), as soon as it has landed."""
 
 
-def gathered(bus: Bus, course: Course, arrived: list[Data], then: Then | None = None) -> Any:
+def gathered(bus: Bus, course: Course, arrived: list[Data], latest: float, then: Then | None = None) -> Any:
     """Wait for the rest of the answer that has begun to come, and return what it means; `then` is done before that.
+
+    What is there by now counts as no younger than `latest` (s).
 
     `UNLIKE` when it is none as it should be, or does not come: then `arrived` is what is not taken in yet. Raises
     LinkError; the caller lets go of the lock.
@@ -32,8 +34,9 @@ def gathered(bus: Bus, course: Course, arrived: list[Data], then: Then | None = 
             arrived.clear()
             if last < course.length:  # the last packet came in pieces
                 arrived += link.read(link.now() + course.settle)
-            return UNLIKE if arrived else _meant(bus, course, then)
-        arrived[:] = link.read(course.deadline)
+            return UNLIKE if arrived else _meant(bus, course, latest, then)
+        latest = course.deadline
+        arrived[:] = link.read(latest)
     return UNLIKE
 
 
@@ -48,11 +51,11 @@ def keeps(course: Course, arrived: list[Data], at: float) -> bool:
     return kept
 
 
-def _meant(bus: Bus, course: Course, then: Then | None) -> Any:
+def _meant(bus: Bus, course: Course, latest: float, then: Then | None) -> Any:
     """What the answer means of which all pieces have come."""
     lock, value = course.lock, UNLIKE
     lock.acquire()
-    at = min(bus.link.now(), course.deadline)
+    at = min(bus.link.now(), latest)
     if course.turns.aloft is course and at - course.sent_at >= course.least:
         data = course.joined()
         value = course.whole(data, at)

@@ -74,20 +74,24 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
 
 
-def brought(bus: Bus, course: Course, then: Then | None = None) -> Any:
+def brought(bus: Bus, course: Course, then: Then | None = None, arrived: list[Data] | None = None) -> Any:
     """Wait for the answer of what is in the air, and return what it means; `UNLIKE` where it has ended otherwise.
 
-    The caller pumps, and lets go of the lock. `then` is done as soon as it has landed.
+    The caller pumps, and lets go of the lock. `then` is done as soon as it has landed. Of what has `arrived` nobody
+    knows when, so it counts as no younger than the first moment at which all of it could be there.
     """
-    turns, lock, link = course.turns, course.lock, bus.link
-    if bus.sleeps:
-        link.doze(course.deadline - course.thinks)  # type: ignore[attr-defined]
-    arrived = link.read(course.deadline)
+    turns, lock, link, latest = course.turns, course.lock, bus.link, course.deadline
+    if arrived:
+        latest -= course.thinks
+    else:
+        if bus.sleeps:
+            link.doze(latest - course.thinks)  # type: ignore[attr-defined]
+        arrived = link.read(latest)
     if len(arrived) == 1:
         lock.acquire()  # let go of it below, or where the flight falls
         at = link.now()
-        if at > course.deadline:  # a host that was held up takes it in late
-            at = course.deadline
+        if at > latest:  # a host that was held up takes it in late
+            at = latest
         if turns.aloft is course and at - course.sent_at >= course.least:
             value = course.whole(arrived[0], at)
             if value is not UNLIKE:
@@ -98,7 +102,7 @@ def brought(bus: Bus, course: Course, then: Then | None = None) -> Any:
                 lock.release()
                 return value
         lock.release()
-    if (value := gathered(bus, course, arrived, then)) is UNLIKE:
+    if (value := gathered(bus, course, arrived, latest, then)) is UNLIKE:
         _astray(bus, course, arrived)
     return value
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from math import radians
 from typing import Any
 
@@ -17,6 +18,7 @@ from motorbus.link.base import Delivery, Side
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.place import STALE
 from motorbus.motion.loop.readings import patience
+from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import Robot
 from tests.motion.loop.lines import Doubtful
 from tests.motion.loop.test_rounds import RATE, Slow, cycles, looping
@@ -323,6 +325,62 @@ def test_a_port_that_is_gone_is_told_and_no_goal_of_before_is_given_when_it_is_t
         assert not goals(line)
 
 
+def test_no_goal_leaves_when_its_lease_is_over_also_where_it_was_judged_before() -> None:
+    with ahead(how={"direct": True}, rate=200.0) as (robot, loop, sims):
+        loop.goal.update(dict.fromkeys(loop.axes, 0.0))
+        cycles(loop, 3)
+        sims["arm"].line = line = Behind()
+        line.by = 0.006
+        cycles(loop, 3)
+        gate: Any = robot.buses["arm"].admit
+        lease = gate.lease = Lease(0.5)
+        lease.take("somebody", robot.now)
+        packets(line)
+        left = list[float]()
+        carry = line.carry
+
+        def carried(sender: Side, data: Data, at: float) -> list[Delivery]:
+            if sender is Side.HOST and isinstance(data, bytes) and data[4] == 0x83:
+                left.append(robot.now)
+            return carry(sender, data, at)
+
+        line.carry = carried  # type: ignore[method-assign]
+        with pytest.raises(MotorbusError):
+            cycles(loop, 300)
+        assert len(left) > 50
+        assert left[-1] <= lease._until
+
+
+def test_who_was_left_out_goes_no_faster_than_he_may_afterwards() -> None:
+    most = 4096 / 4 / RATE  # counts in a cycle, at 90 deg/s
+    with ahead() as (_, loop, sims):
+        line = sims["arm"].line
+        loop.goal.update(dict.fromkeys(loop.axes, 2.5))
+        cycles(loop, 60)
+        packets(line)
+        given = list[tuple[int, int]]()
+        for lies in (True, *[False] * 42, True, *[False] * 8):
+            line.lying = {2: lambda raw: raw - FAR} if lies else {}
+            state = next(loop)
+            given += [(state.number, packet[2]) for packet in packets(line) if 2 in packet]
+        assert loop.statistics.suspect["a2"] >= 2
+        assert len(given) < 52
+        for (slot, here), (later, there) in pairwise(given):
+            assert abs(there - here) <= (later - slot) * most + 1
+
+
+def test_a_reading_that_waited_for_the_program_is_no_younger_than_it_can_be() -> None:
+    with ahead(rate=20.0) as (robot, loop, _):
+        cycles(loop, 5)
+        link: Any = robot.buses["arm"].link
+        began = loop._rounds.parts["arm"].began
+        link.advance(0.015)  # its answer has been there for long
+        state = next(loop)
+        assert state.at == pytest.approx(began, abs=0.003)
+        assert loop.statistics.cycle.most < 0.005
+        assert state.age == dict.fromkeys(loop.axes, 0.0)
+
+
 # -- leaving, and where it cannot be -----------------------------------------------------------------------------------
 
 
@@ -356,6 +414,16 @@ def test_ctrl_c_in_its_body_leaves_nothing_in_the_air() -> None:
         assert robot["a1"].position() is not None
 
 
+@pytest.mark.parametrize("how", ["estop", "stop"])
+def test_after_a_stop_in_its_body_it_is_left_in_silence(how: str) -> None:
+    with machine(arm="1-2", exit="leave") as (made, _), Robot.of(made) as robot:
+        with robot.loop(RATE, ahead=True) as loop:
+            loop.goal["a1"] = 2.0
+            cycles(loop, 40)
+            getattr(robot if how == "estop" else robot["a1"], how)()
+        assert not robot.buses["arm"].turns.flying
+
+
 @pytest.mark.parametrize(
     ("made", "cause"),
     [
@@ -368,5 +436,7 @@ def test_it_is_refused_where_nothing_can_be_halved(made: dict[str, str], cause: 
         refused = robot.loop(RATE, ahead=True)
         with pytest.raises(RequestError, match=cause):
             refused.__enter__()
+        with pytest.raises(RequestError, match="the loop was left"):
+            refused.goal[refused.axes[0]] = 0.5
         with robot.loop(RATE) as loop:
             next(loop)

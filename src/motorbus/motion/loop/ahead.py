@@ -15,6 +15,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from motorbus.bus.loosed import Behind, Loosed
+from motorbus.core.family import Positions
 from motorbus.core.operation import Exchange
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.motion.abreast import Abreast
@@ -47,7 +48,8 @@ class RoundsAhead(Rounds):
         """
         air, grid = self._air, self._grid
         if air is None or grid is None or self._fresh:
-            self._come_down()
+            if (down := self._come_down()) is not None:
+                self._state(*down)
             state = yield from super().round()
             self._judge(1)
             orders = self._orders(1)
@@ -74,7 +76,8 @@ class RoundsAhead(Rounds):
     def leaving(self) -> Works:
         """As `Rounds.leaving`, when what is in the air has come down."""
         try:
-            self._come_down()
+            with suppress(Interrupted):  # nobody is led by then whom that concerns
+                self._come_down()
         finally:
             yield from super().leaving()
 
@@ -104,12 +107,13 @@ class RoundsAhead(Rounds):
         self._missing = part.take((found,))
         return not part.unsure
 
-    def _come_down(self) -> None:
-        if self._air is not None:
-            moment = self._air.moment
-            told = self._landed(self._air)
-            self._count(moment)
-            self._heard(told)
+    def _come_down(self) -> tuple[dict[str, Any], list[str], int] | None:
+        """What is in the air comes down, and nothing follows it: what it brought, who is missing, and its number."""
+        if (air := self._air) is None:
+            return None
+        told = self._landed(air)
+        self._count(air.moment)
+        return told, self._heard(told), air.number
 
     def _landed(self, air: Air, behind: Behind | None = None) -> dict[str, Any]:
         ((bus, part),) = self.parts.items()
@@ -119,7 +123,10 @@ class RoundsAhead(Rounds):
             found = air.volley.land(behind)
         except MotorbusError as failure:
             found = failure
-        part.ended = part.now if behind is None or behind.at is None else behind.at - part.origin
+        came = (
+            [one.at - part.origin for one in found if type(one) is Positions] if type(found) is list else []
+        )
+        part.ended = came[0] if came else part.now
         return {bus: found}
 
     def _believed(self, orders: dict[str, Sequence[Exchange[Any]]]) -> Sequence[Exchange[Any]]:

@@ -111,11 +111,13 @@ class Part:
         return [guarded(exchange) for exchange in self.train.goals(to)]
 
     def withheld(self) -> list[str]:
-        """Take out of the last orders, which have not left, who cannot be believed since; their names."""
+        """Take out of the last orders, which have not left, who cannot be believed since; their names.
+
+        They have made their step, and so have not to make it good, whenever it is known again where they are.
+        """
         lost = [place for node, place in self.places.items() if place.unsure and node in self.to]
         for place in lost:
             del self.to[place.node]
-            place.left += 1
         return [place.name for place in lost]
 
     def _of_some(self, periods: int) -> dict[int, float]:

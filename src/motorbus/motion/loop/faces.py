@@ -157,6 +157,7 @@ class Loop(LoopFace):
         if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
             self._rounds.only = buses[0]
         elif isinstance(self._rounds, RoundsAhead):
+            self._rounds.refuse()
             raise not_ahead(list(self._rounds.parts))
         return self
 

@@ -362,9 +362,13 @@ class Rounds:
         went wrong when all others rest.
         """
         grid, self._grid = self._grid, None
-        self._askable, self._left = {}, True
+        self.refuse()
         if grid is not None:
             yield from braked(self.parts, grid)
+
+    def refuse(self) -> None:
+        """It takes no goals and has no cycles any more."""
+        self._askable, self._left = {}, True
 
     def _refuse_outside(self) -> None:
         """Raise RequestError before it was entered, and when it was left."""

@@ -123,14 +123,14 @@ class Gate:
                 found[goal.node] = guard.ask()
         return list(found.values())
 
-    def passes(self, exchange: Exchange[Any]) -> bool:
-        """Whether this may surely leave: then it is noted as given. Else nothing is, and whoever asks looks closely.
+    def lets_move(self) -> bool:
+        """Whether anybody may be moved at this moment: nobody is at fault, and a lease that there is holds."""
+        return not self.faults and (self.lease is None or self.lease.lets_move(self._now() - self.origin))
 
-        It is the quick way of the orders of a control loop, which says the same as `look` and a call of the gate.
-        """
-        if not exchange.sure or self.faults:
-            return False
-        if self.lease is not None and not self.lease.lets_move(self._now() - self.origin):
+    def passes(self, exchange: Exchange[Any]) -> bool:
+        """Whether this may surely leave: then it is noted as given. Else nothing is, and whoever asks looks closely. It
+        is the quick way of the orders of a control loop, which says the same as `look` and a call of the gate."""
+        if not exchange.sure or not self.lets_move():
             return False
         if not self.guards:
             return not self.attended
