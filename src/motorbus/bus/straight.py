@@ -108,6 +108,7 @@ def brought(bus: Bus, course: Course, then: Then | None = None, arrived: list[Da
 
 
 def found(bus: Bus, exchange: Exchange[Any]) -> Course | None:
+    """`charted`; an interrupt in it leaves the bus usable."""
     try:
         return charted(bus.turns, exchange)
     except BaseException:
