@@ -258,6 +258,7 @@ def _air_time(turns: Turns, exchange: Exchange[Any]) -> float:
 
 
 def is_sure(turns: Turns, exchange: Exchange[Any]) -> bool:
+    """Whether this may surely leave, by what is known now; it is noted as given then. The caller holds the lock."""
     passes = turns.passes
     if passes is None or not exchange.sure:
         return False
