@@ -27,6 +27,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.recorder import Decoder, decode
 from motorbus.recorder.bulk import can_decode
+from motorbus.recorder.heard import captures_of
 from tests.conformance.subjects import FAMILIES, vectors
 
 BYTES = sorted(name for name, family in FAMILIES.items() if family.link.kind == "bytes")
@@ -165,6 +166,9 @@ def test_frames_may_have_times() -> None:
 def test_nothing_holds_nothing(name: str) -> None:
     found = decode(FAMILIES[name], b"" if name in BYTES else [])
     assert (len(found), list(found), found.node.tolist()) == (0, [], [])
+    bulk = captures_of(FAMILIES[name]).bulk
+    if bulk is not None and name in BYTES:
+        assert [len(column) for column in bulk(np, b"", "")] == [0] * 6
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,7 @@ class Heard(Packets):
 class Whole(Packets):
     """All of a recording; the columns are arrays, `size` (bytes) is one more, and `data` is cut out when asked for.
 
-    `cut` does that: bytes, starts and sizes. It is a function of a module, so that all of this can be pickled and copied.
+    `cut` does that: bytes, starts and sizes. It is a function of a module: so all of this can be pickled.
     """
 
     def __init__(self, cut: Cut, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
