@@ -22,6 +22,9 @@ from motorbus.families.feetech.driver.orders import Order, check_names, check_va
 Row: TypeAlias = "float | Sequence[float]"
 """The value of one servo where one register is written, else its values in the order of the names."""
 
+ROWS: Final = frozenset((list, tuple))
+"""Whose length is how many there are in it."""
+
 
 class SyncWriter:
     """Makes the exchange that writes these registers of these servos; see `sync_writer`."""
@@ -51,11 +54,11 @@ class SyncWriter:
         return exchange or self._slowly(values)
 
     def _flat(self, values: Any) -> list[Any] | None:
-        """Rows of values, one behind the other; None where a row is too long or too short, or none at all."""
-        try:
-            return [*chain.from_iterable(values)] if [*map(len, values)] == self._widths else None
-        except TypeError:  # a row that is none
-            return None
+        """Rows of values, one behind the other; None where a row is too long or too short, or neither list nor tuple:
+        of another kind may be as long as it likes, and the rows behind it would go to the wrong servos."""
+        if {*map(type, values)} <= ROWS and [*map(len, values)] == self._widths:
+            return [*chain.from_iterable(values)]
+        return None
 
     def _fit(self) -> Mould | None:
         """Made anew when the settings of a servo have changed."""
@@ -78,14 +81,17 @@ class SyncWriter:
             raise RequestError(
                 f"{len(values)} values for {len(self.servos)} servos", advice="nothing was sent"
             )
+        under = [
+            node.settings for node in self.servos
+        ]  # first of all: another thread may set others at any time
         for node in self.servos:
             known_row(node, "present_position")
         orders = [self._named(row) for row in values]
         for order in orders:
             check_values(order)
         blocks = [
-            block_of(node, order)._replace(under=node.settings)
-            for node, order in zip(self.servos, orders, strict=True)
+            block_of(node, order)._replace(under=settings)
+            for node, order, settings in zip(self.servos, orders, under, strict=True)
         ]
         return one_packet(list(sync_writes(self.servos, blocks)), len(self.servos))
 
