@@ -22,9 +22,6 @@ from motorbus.families.feetech.driver.orders import Order, check_names, check_va
 Row: TypeAlias = "float | Sequence[float]"
 """The value of one servo where one register is written, else its values in the order of the names."""
 
-ROWS: Final = frozenset((list, tuple))
-"""Whose length is how many there are in it."""
-
 
 class SyncWriter:
     """Makes the exchange that writes these registers of these servos; see `sync_writer`."""
@@ -34,6 +31,9 @@ class SyncWriter:
         self.names: Final = tuple(names)
         self._single: Final = len(self.names) == 1
         self._widths: Final = [len(self.names)] * len(self.servos)
+        self._kinds: Final = tuple(
+            [kind] * len(self.servos) for kind in (list, tuple)
+        )  # the quickest look of all
         self._mould: Mould | None = None
 
     def __call__(self, values: Sequence[Row]) -> Exchange[None]:
@@ -56,7 +56,7 @@ class SyncWriter:
     def _flat(self, values: Any) -> list[Any] | None:
         """Rows of values, one behind the other; None where a row is too long or too short, or neither list nor tuple:
         of another kind may be as long as it likes, and the rows behind it would go to the wrong servos."""
-        if {*map(type, values)} <= ROWS and [*map(len, values)] == self._widths:
+        if [*map(type, values)] in self._kinds and [*map(len, values)] == self._widths:
             return [*chain.from_iterable(values)]
         return None
 
