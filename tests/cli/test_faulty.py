@@ -30,8 +30,9 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
         from_option(str(tmp_path / "nothing"))
     for nothing in ("", "# nothing yet\n", "seed 3\n"):
         file.write_text(nothing)
-        with pytest.raises(RequestError, match="there is no fault in it"):
+        with pytest.raises(RequestError, match="there is no fault in it") as caught:
             from_option(str(file))
+        assert str(file) in caught.value.summary
     file.write_text("seed 3\nexchange 1: explode\n")
     with pytest.raises(RequestError, match="^line 2: "):
         from_option(str(file))
@@ -41,6 +42,19 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     assert len(from_option(long)) == 1000
     with pytest.raises(RequestError, match="neither a file nor a script"):
         from_option("\0")
+
+
+@pytest.mark.parametrize(
+    "contents", [bytes(range(256)), "exchange 1: drop\n".encode("utf-16"), b"\0", b"\xff"]
+)
+def test_a_file_that_is_no_text_is_named(tmp_path: Path, contents: bytes) -> None:
+    file = tmp_path / "noise"
+    file.write_bytes(contents)
+    with pytest.raises(RequestError, match="this is no text: line 1: ") as caught:
+        from_option(str(file))
+    assert str(file) in caught.value.summary
+    file.write_bytes(b"exchange 1: drop  # r\xfcckw\xe4rts")  # a remark may be written as it likes
+    assert from_option(str(file)) == parse("exchange 1: drop")
 
 
 def test_a_file_without_end_is_not_read_to_its_end(tmp_path: Path) -> None:

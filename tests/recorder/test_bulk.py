@@ -5,10 +5,12 @@ Streams are made of what is known of each family, whole, damaged and cut off, an
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from itertools import pairwise
 from math import inf, nan
 from random import Random
@@ -25,6 +27,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.recorder import Decoder, decode
 from motorbus.recorder.bulk import can_decode
+from motorbus.recorder.heard import captures_of
 from tests.conformance.subjects import FAMILIES, vectors
 
 BYTES = sorted(name for name, family in FAMILIES.items() if family.link.kind == "bytes")
@@ -163,6 +166,9 @@ def test_frames_may_have_times() -> None:
 def test_nothing_holds_nothing(name: str) -> None:
     found = decode(FAMILIES[name], b"" if name in BYTES else [])
     assert (len(found), list(found), found.node.tolist()) == (0, [], [])
+    bulk = captures_of(FAMILIES[name]).bulk
+    if bulk is not None and name in BYTES:
+        assert [len(column) for column in bulk(np, b"", "")] == [0] * 6
 
 
 @pytest.mark.parametrize(
@@ -276,3 +282,19 @@ def test_times_may_be_numbers_of_any_kind(kind: Any) -> None:
     fed = [packet for frame, at in zip(bus, times, strict=True) for packet in decoder.feed(frame, at)]
     assert [packet.at for packet in fed] == [packet.at for packet in decode("kst", bus, at=times)] == [1, 2]  # type: ignore[arg-type]
     assert [packet.at for packet in decode("kst", bus, at=list(times))] == [1, 2]
+
+
+@pytest.mark.parametrize("copied", [lambda one: pickle.loads(pickle.dumps(one)), deepcopy])
+@pytest.mark.parametrize("looked_at", [False, True])
+def test_what_is_decoded_can_be_sent_to_another_process(
+    copied: Callable[[Any], Any], looked_at: bool
+) -> None:
+    recording = bytes.fromhex("FF FF 01 02 01 FB 55 FF FF 01 02 00 FC") * 100
+    packets = decode(FAMILIES["feetech"], recording, at=[float(n) for n in range(len(recording))])
+    if looked_at:
+        assert len(packets.data) == len(packets)
+    again = copied(packets)
+    for name in ("start", "size", "kind", "node", "code", "fault", "at"):
+        assert (getattr(again, name) == getattr(packets, name)).all(), name
+    assert again.data == packets.data
+    assert list(again) == list(packets)

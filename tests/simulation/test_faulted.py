@@ -18,7 +18,7 @@ from motorbus.errors import RequestError
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.simulation.clients import CanClient, Door
-from motorbus.simulation.faulted import MOST, NEWS, TOLD, Faulted, read_order
+from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, NEWS, TOLD, Faulted, read_order
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
@@ -336,3 +336,22 @@ def test_news_that_nobody_reads_do_not_pile_up() -> None:
         for _ in range(3 * NEWS):
             hall.faulted.set("exchange 9: drop")
         assert len(hall.faulted.news()) == NEWS
+
+
+def test_a_script_that_is_too_long_for_a_flag_is_told_once() -> None:
+    many = [f"exchange {number}: drop" for number in range(10_000, 10_000 + LONGEST // 21)]
+    fits = "; ".join(["exchange 1: duplicate", *many])
+    fits = fits[: LONGEST + 1].rpartition(";")[0]
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        hall.faulted.set("exchange 9: drop")
+        hall.faulted.set(fits)
+        assert LONGEST - 25 < len(hall.faulted.script.line) <= LONGEST
+        assert hall.faulted.facts()["again"] == f"--faults '{fits}'"
+        hall.faulted.set(fits + "; exchange 99999: drop")
+        with reached(hall, listener) as client:
+            asked(client.fileno(), PING, 12)
+        facts = hall.faulted.facts()
+        assert (facts["script"], facts["again"]) == (fits + "; exchange 99999: drop", IN_A_FILE)
+        assert len(hall.faulted.replay()) < 200
+        assert hall.faulted.replay().endswith(f"; the same again: {IN_A_FILE}")

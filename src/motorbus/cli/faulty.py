@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.errors import RequestError
-from motorbus.simulation.faults import WORDS, Script
-from motorbus.simulation.faults.script import requested
+from motorbus.simulation.faults import WORDS, Script, parse
+from motorbus.simulation.faults.script import EXAMPLES, requested
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -47,14 +47,31 @@ def from_option(said: str | None) -> Script:
     if said is None:
         return Script()
     if _is_file(said):
-        said = _contents(Path(said)).decode("utf-8-sig", errors="replace")
-    elif ":" not in said:
+        return _of_file(Path(said))
+    if ":" not in said:
         raise RequestError(
             f"--faults {said}: neither a file nor a script",
             expected='a file, or a script as "exchange 17 byte 3: drop"',
             advice="`--faults help` lists what can be said",
         )
-    return requested(said or "#")  # a file with nothing in it is no "none"
+    return requested(said)
+
+
+def _of_file(file: Path) -> Script:
+    text = _contents(file).decode("utf-8-sig", errors="replace")
+    try:
+        made = parse(text)
+    except RequestError as error:
+        if "\0" not in text and "\N{REPLACEMENT CHARACTER}" not in text:
+            raise
+        raise RequestError(
+            f"--faults {file}: this is no text: {error.summary}",
+            expected="a script, one fault a line, in UTF-8",
+            advice="see that this is the file you mean; `--faults help` lists what can be said",
+        ) from None
+    if not made:
+        raise RequestError(f"--faults {file}: there is no fault in it", expected=EXAMPLES)
+    return made
 
 
 def _is_file(said: str) -> bool:

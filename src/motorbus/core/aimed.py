@@ -26,7 +26,7 @@ class Aim:
         self.ordered: Final = ordered
         self.goals: Final = goals
         self.refusal: Final = refusal
-        self.air: tuple[int, float] = 0, 0.0
+        self.air: tuple[int | None, float] = None, 0.0  # None is the rate of no bus
 
 
 class Aimed(Exchange[None]):

@@ -14,6 +14,7 @@ from motorbus.core.capture import FAULTS, KINDS, Columns, Packet
 from motorbus.core.entry import shown
 from motorbus.core.family import Family
 from motorbus.core.operation import CanFrame, Data
+from motorbus.core.spans import cut_out
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.recorder.decoder import Decoder, checked, fitting, timed
 from motorbus.recorder.heard import captures_of, spoken
@@ -51,7 +52,7 @@ def decode(
     else:
         packets = _fed(whose, whole, way)
         kept, columns = [packet.data for packet in packets], _columns(np, packets)
-    return Whole(np, kept, columns, None if times is None else times[columns.start])
+    return Whole(_cut, kept, columns, None if times is None else times[columns.start])
 
 
 def can_decode() -> bool:
@@ -96,6 +97,10 @@ def _times(np: Any, at: Any, count: int, what: str) -> Any:
         for one in at:
             timed(one)
     return times.astype(float)
+
+
+def _cut(recording: bytes, starts: Any, sizes: Any) -> list[bytes]:
+    return cut_out(_numpy(), recording, starts, sizes)
 
 
 def _numpy() -> Any:

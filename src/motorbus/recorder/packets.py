@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, repeat
-from typing import Any, Final, NamedTuple, overload
+from typing import Any, Final, NamedTuple, TypeAlias, overload
 
 from motorbus.core.capture import FAULTS, KINDS, NOBODY, NOISE, Columns, Packet, Told
 from motorbus.core.operation import CanFrame, Data
-from motorbus.core.spans import cut_out
 
 _new = tuple.__new__
 _VOID: Final = (NOISE, NOBODY, NOBODY)
+Cut: TypeAlias = Callable[[bytes, Any, Any], list[bytes]]
 
 
 class Mark(NamedTuple):
@@ -184,10 +184,13 @@ class Heard(Packets):
 
 
 class Whole(Packets):
-    """All of a recording; the columns are arrays, `size` (bytes) is one more, and `data` is cut out when asked for."""
+    """All of a recording; the columns are arrays, `size` (bytes) is one more, and `data` is cut out when asked for.
 
-    def __init__(self, np: Any, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
-        self._np: Final = np
+    `cut` does that: bytes, starts and sizes. It is a function of a module: so all of this can be pickled.
+    """
+
+    def __init__(self, cut: Cut, recording: bytes | Sequence[Data], columns: Columns, at: Any = None) -> None:
+        self._cut: Final = cut
         self._recording: Final = recording
         self._columns: Final = columns
         self._at: Final = at
@@ -225,7 +228,7 @@ class Whole(Packets):
         recording = self._recording
         if not isinstance(recording, bytes):
             return [one.flat() if isinstance(one, CanFrame) else one for one in recording]
-        return cut_out(self._np, recording, self.start, self.size)
+        return self._cut(recording, self.start, self.size)
 
     def __len__(self) -> int:
         return len(self.start)

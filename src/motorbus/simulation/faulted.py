@@ -24,6 +24,9 @@ TOLD: Final = 20
 """So many of them are told at once."""
 MOST: Final = 5
 """Lines in a second for whoever watches; what is beyond is counted."""
+LONGEST: Final = 64 << 10
+"""Bytes of a script that are told as a flag: Linux takes 128 KiB as one argument, and half of that is far from it."""
+IN_A_FILE: Final = "--faults FILE, where FILE holds what is told as `script`: it is too long for a flag"
 NEWS: Final = 100
 """Lines about scripts that have come and gone that wait for somebody to read them; the latest ones."""
 
@@ -153,8 +156,11 @@ class Faulted:
 
     @property
     def _again(self) -> str:
-        """The flag that sets the same script; "" for none."""
-        return f"--faults '{self._script.line}'" if self._script else ""
+        """The flag that sets the same script, or how to where that is too long for one; "" for none."""
+        line = self._script.line
+        if len(line.encode()) > LONGEST:
+            return IN_A_FILE
+        return f"--faults '{line}'" if self._script else ""
 
     def _ended(self) -> list[str]:
         """What came of a script that another takes the place of."""

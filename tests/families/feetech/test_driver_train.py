@@ -180,6 +180,7 @@ def test_goals_made_before_a_setting_was_changed_do_not_leave_and_later_ones_are
     before = only(led.goals({1: 1.0, 2: 1.0}))
     assert before.refusal is not None
     assert before.refusal(lambda node: 0) is None
+    led.goals({1: 1.0, 2: 1.0})  # by now it has found that nothing has changed
     learn(other, image(2, at_30=2))
     refused = before.refusal(lambda node: 0)
     assert refused is not None

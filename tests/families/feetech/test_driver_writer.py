@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import inf, nan
 from typing import Any
 
@@ -15,6 +16,8 @@ from motorbus.core.aimed import Aimed
 from motorbus.core.operation import Exchange
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError
 from motorbus.families.feetech.driver import Node, sync_write_positions, sync_writer
+from motorbus.families.feetech.driver import mould as of_mould
+from motorbus.families.feetech.driver import writer as of_writer
 from motorbus.families.feetech.driver.writer import SyncWriter
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import Line, packet, play
@@ -109,6 +112,56 @@ def test_positions_that_have_no_order_are_refused_too(positions: Any) -> None:
         sync_write_positions([met("sts", 1), met("sts", 2)], positions)
 
 
+class Odd(list[float]):
+    """Another number of values is in it than it says."""
+
+    given: tuple[float, ...] = ()
+
+    def __iter__(self) -> Iterator[float]:
+        return iter(self.given)
+
+
+@pytest.mark.parametrize(
+    "row", [dict.fromkeys((1.0, 5.0, 0.5)), {1.0, 5.0, 0.5}, frozenset((1.0, 5.0, 0.5)), None, 1.0]
+)
+def test_a_row_without_an_order_is_refused_whatever_is_in_it(row: Any) -> None:
+    write = sync_writer([met("sts", 1), met("sts", 2)], *NAMES)
+    with pytest.raises(RequestError, match="is no row of values"):
+        write([row, [1.0, 5.0, 0.5]])
+
+
+def test_no_value_moves_to_a_neighbour() -> None:
+    write = sync_writer([met("sts", 1), met("sts", 2)], *NAMES)
+    more, less = Odd([1.0, 5.0, 0.5]), Odd([1.0, 5.0, 0.5])
+    more.given, less.given = (1.0, 5.0, 0.5, 2.0), (6.0, 0.6)
+    with pytest.raises((RequestError, ValueError)):
+        write([more, less])
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_settings_that_another_thread_sets_meanwhile_never_make_wrong_bytes(
+    monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
+    node, other = met("sts", 1), met("sts", 1, at_30=2).settings
+    write = sync_writer([node], "goal_position")
+    module, name = (of_mould, "_cell") if kept else (of_writer, "block_of")
+    plain = getattr(module, name)
+
+    def meanwhile(*its: Any) -> Any:
+        found = plain(*its)
+        node.settings = other
+        return found
+
+    monkeypatch.setattr(module, name, meanwhile)
+    order = write([1.0 if kept else 1])
+    monkeypatch.undo()
+    assert order.refusal is not None
+    assert order.refusal(lambda _: 0) is not None or told(lambda: order) == told(
+        lambda: sync_write_positions([node], [1.0])
+    )
+    assert told(lambda: write([1.0])) == told(lambda: sync_write_positions([node], [1.0]))
+
+
 def test_who_is_not_prepared_does_not_heed_it_or_is_named_twice_is_refused() -> None:
     with pytest.raises(RequestError, match="not prepared"):
         sync_writer([Node(1)], "goal_position")([1.0])
@@ -129,6 +182,7 @@ def test_it_follows_the_settings_that_its_servos_have_now() -> None:
     nodes = [met("sts", 1), met("sts", 2)]
     write = sync_writer(nodes, "goal_position")
     assert isinstance(write([1.0, 1.0]), Aimed)
+    assert isinstance(write([1.0, 1.0]), Aimed)  # by now it has found that nothing has changed
     nodes[1].settings = met("sts", 2, at_30=2).settings
     again = write([1.0, 1.0])
     assert told(lambda: again) == told(lambda: sync_write_positions(nodes, [1.0, 1.0]))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from struct import Struct
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 from zlib import adler32
 
 from motorbus.core.aimed import Aim, Aimed
@@ -98,17 +98,22 @@ class Column:
         return None if self._whole and list(values) != raws else raws
 
 
+Under: TypeAlias = Sequence[tuple[Node, Node]]
+"""Nodes, each with itself as it was when the mould was begun. Whatever they are told later, by whichever thread, all
+of the mould is made of that: else values of one setting could leave under another, and nobody would notice."""
+
+
 class Mould:
     """The packet for these rows, which adjoin and have the same place for all of these nodes. Made by `mould`."""
 
-    def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]) -> None:
+    def __init__(self, under: Under, rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]) -> None:
+        nodes, as_made = [node for node, _ in under], [its for _, its in under]
         first, count = rows[0], len(rows[0])
         size = sum(row.size for row in first)
         item = "B" + "".join("BH"[row.size - 1] for row in first)
         self.ids: Final = tuple(node.node for node in nodes)
-        self._made_by: Final = [(node, node.settings) for node in nodes]
+        self._made_by: Final = [(node, its.settings) for node, its in under]
         self.seen: object = None  # `CHANGES.now` when they were found to be those
-        as_made = [copy(node) for node in nodes]  # whatever they are told later, these goals were meant so
         self._rows: Final = [(node, row) for node, its in zip(as_made, rows, strict=True) for row in its]
         self._columns: Final = [Column(cells[place::count]) for place in range(count)]
         self._each: Final = count + 1  # parts of a packet for each servo
@@ -118,8 +123,8 @@ class Mould:
         self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
         self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
         self._sum: Final = sum(self._head[2:])
-        self._aim: Final = Aim(self.ids, self._goals, changed_since((node, node.settings) for node in nodes))
-        self._places: Final = _places(nodes, rows, cells)
+        self._aim: Final = Aim(self.ids, self._goals, changed_since(self._made_by))
+        self._places: Final = _places(as_made, rows, cells)
 
     def holds(self) -> bool:
         """Whether the settings of all are those that it was made by."""
@@ -187,9 +192,10 @@ def mould(nodes: Sequence[Node], rows: Sequence[Sequence[Entry]]) -> Mould | Non
         return None
     if len(nodes) > wire.sync_write_capacity(sum(row.size for row in rows[0])):
         return None
-    cells = [_cell(node, row) for node, its in zip(nodes, rows, strict=True) for row in its]
+    under = [(node, copy(node)) for node in nodes]
+    cells = [_cell(node, row) for (_, node), its in zip(under, rows, strict=True) for row in its]
     found = [cell for cell in cells if cell is not None]
-    return Mould(nodes, rows, found) if len(found) == len(cells) else None
+    return Mould(under, rows, found) if len(found) == len(cells) else None
 
 
 def _places(

@@ -111,9 +111,10 @@ CHANGES: Final = Changes()
 
 
 def _set_settings(node: Any, settings: Settings | None) -> None:
-    CHANGES.now = object()  # in front, so that an interrupt between these lines is taken for a change
+    before, behind = object(), object()  # first of all, so that between the others nothing can fail
+    CHANGES.now = before  # in front, so that an interrupt between these lines is taken for a change
     node._settings = settings
-    CHANGES.now = object()  # behind, so that another thread that has looked in between looks again
+    CHANGES.now = behind  # behind, so that another thread that has looked in between looks again
 
 
 class Node:

@@ -31,6 +31,9 @@ class SyncWriter:
         self.names: Final = tuple(names)
         self._single: Final = len(self.names) == 1
         self._widths: Final = [len(self.names)] * len(self.servos)
+        self._kinds: Final = tuple(
+            [kind] * len(self.servos) for kind in (list, tuple)
+        )  # the quickest look of all
         self._mould: Mould | None = None
 
     def __call__(self, values: Sequence[Row]) -> Exchange[None]:
@@ -51,11 +54,11 @@ class SyncWriter:
         return exchange or self._slowly(values)
 
     def _flat(self, values: Any) -> list[Any] | None:
-        """Rows of values, one behind the other; None where a row is too long or too short, or none at all."""
-        try:
-            return [*chain.from_iterable(values)] if [*map(len, values)] == self._widths else None
-        except TypeError:  # a row that is none
-            return None
+        """Rows of values, one behind the other; None where a row is too long or too short, or neither list nor tuple:
+        of another kind may be as long as it likes, and the rows behind it would go to the wrong servos."""
+        if [*map(type, values)] in self._kinds and [*map(len, values)] == self._widths:
+            return [*chain.from_iterable(values)]
+        return None
 
     def _fit(self) -> Mould | None:
         """Made anew when the settings of a servo have changed."""
@@ -78,14 +81,17 @@ class SyncWriter:
             raise RequestError(
                 f"{len(values)} values for {len(self.servos)} servos", advice="nothing was sent"
             )
+        under = [
+            node.settings for node in self.servos
+        ]  # first of all: another thread may set others at any time
         for node in self.servos:
             known_row(node, "present_position")
         orders = [self._named(row) for row in values]
         for order in orders:
             check_values(order)
         blocks = [
-            block_of(node, order)._replace(under=node.settings)
-            for node, order in zip(self.servos, orders, strict=True)
+            block_of(node, order)._replace(under=settings)
+            for node, order, settings in zip(self.servos, orders, under, strict=True)
         ]
         return one_packet(list(sync_writes(self.servos, blocks)), len(self.servos))
 

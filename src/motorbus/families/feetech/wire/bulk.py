@@ -69,7 +69,7 @@ def _sums(np: Any, line: Any, starts: Any, ends: Any, form: Any) -> Any:
     apart = np.flatnonzero(form & (ends != np.append(starts[1:], -1)))
     stops = np.minimum(ends[apart], len(line) - 1)
     edges = np.stack((starts[apart], stops), axis=1).reshape(-1)
-    last = (ends[apart] > stops) * line[-1]
+    last = (ends[apart] > stops) * line[-1:]  # of nothing there is no last one
     sums[apart] = np.add.reduceat(line, edges, dtype=np.uint8)[::2] + last
     return sums
 
