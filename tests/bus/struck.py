@@ -157,11 +157,16 @@ def passing(_: Any) -> bool:
     return True
 
 
-def one_behind_the_other(bus: Bus, read: Any, begins: float = -inf) -> Any:
-    """Two volleys, of which the second leaves right behind the answer to the first where it can, or a while later."""
+def one_behind_the_other(bus: Bus, read: Any, begins: float = -inf, between: Any = None) -> Any:
+    """Two volleys, of which the second leaves right behind the answer to the first where it can, or a while later.
+
+    Something else may be asked in `between`.
+    """
     volley = Loosed(bus, (order(), read))
     behind = volley.behind((order(),), begins, passing)
     told = volley.land(behind)
+    if between is not None:
+        told.append(bus.run(between))
     if behind is None or (behind.at is None and not volley.leave(behind)):
         volley = Loosed(bus, (order(), read))
     return told, volley.land()

@@ -21,7 +21,7 @@ from tests.bus.struck import FAULTS, Landings, kept, one_behind_the_other, order
 Step = tuple[str, str, float]
 VOLLEYS = (
     *("volley group", "volley one", "loosed group", "loosed one"),
-    *("behind group", "behind one", "later group", "later one"),
+    *("behind group", "behind one", "later group", "later one", "between overlap", "between inside"),
 )
 READS = {
     "one": (1,),
@@ -103,6 +103,11 @@ def carried_out(steps: list[Step], *, looks: bool = False) -> Any:
         elif what.startswith("later"):
             bus.turns.passes = passing
             told.append(said(lambda read=what[6:]: one_behind_the_other(bus, reads[read], inf)))
+        elif what.startswith("between"):
+            bus.turns.passes = passing
+            told.append(
+                said(lambda read=what[8:]: one_behind_the_other(bus, reads[read], inf, reads["group"]))
+            )
         else:
             told.append(said(lambda what=what: bus.run(reads[what])))
         bus.link.advance(rest)  # type: ignore[attr-defined]
@@ -174,6 +179,7 @@ def test_loops_of_groups_and_single_ones_are_the_same(cycle: list[str], cycles: 
         ("loosed group", "loosed far", "one"),
         ("behind group",),
         ("later group",),
+        ("between overlap",),
     ],
 )
 def test_groups_go_straight_and_take_turns_with_their_other_form(

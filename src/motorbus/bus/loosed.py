@@ -221,6 +221,8 @@ def _go(bus: Bus, last: Course, behind: Behind) -> None:
         return
     if turns.lock.era != behind.era:
         return
+    if turns.group is not course.group:  # others may have gone straight since
+        turns.regroup(course)
     if course.first.length == course.length and course.first.run >= course.most:
         course = course.twin
     if course.era != turns.lock.era and not course.fits():

@@ -61,10 +61,8 @@ class RoundsAhead(Rounds):
         periods = max(1, slot - self._stepped)
         try:
             self._judge(periods)
-        except (
-            Interrupted
-        ):  # whoever has stopped them may have ended the question too, which is not told once more
-            with suppress(MotorbusError):
+        except Interrupted:
+            with suppress(MotorbusError):  # whoever has stopped them may have ended the question too
                 self._come_down()
             raise
         if self._clamps:
