@@ -36,8 +36,9 @@ An overrun is a cycle that was not over when the next one was due; a slot of
 the grid that went by as a whole is skipped. Neither is ever made up for. Late
 is a cycle by the time from its slot to its first byte. Without --rate the loop
 is as quick as 80% of what the slowest bus allows; `motorbus budget` says what
-that is. With --ahead, on one serial bus, the wire does not wait for the program
-that leads: for a loop near the limit of its wire. Ends with exit code 6 when readings were lost.
+that is. With --ahead, on one serial bus, the wire does not wait for the
+program that leads: for a loop near the limit of its wire. Ends with exit code
+6 when readings were lost.
 
 Examples:
 
