@@ -188,7 +188,7 @@ def _in_the_air(bus: Bus, *courses: Course | None) -> Course | None:
     return next((one for one in mine if one.is_detached or turns.flying.get(one.lane) is one), None)
 
 
-def _follow(bus: Bus, last: Course, behind: Behind, value: Any, at: float) -> None:
+def _follow(bus: Bus, last: Course, behind: Behind, value: Any) -> None:
     """This order and the same question leave right behind an answer that came just now, where nothing is against it."""
     if bus.link.now() >= behind.begins and behind.fits(value):
         _go(bus, last, behind)

@@ -15,8 +15,8 @@ from motorbus.core.operation import UNLIKE, Data
 if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
 
-Then = Callable[[Any, float], None]
-"""Is told what an answer means, and when it was there (s), as soon as it has landed."""
+Then = Callable[[Any], None]
+"""Is told what an answer means as soon as it has landed."""
 
 
 def gathered(bus: Bus, course: Course, arrived: list[Data], latest: float, then: Then | None = None) -> Any:
@@ -63,7 +63,7 @@ def _meant(bus: Bus, course: Course, latest: float, then: Then | None) -> Any:
             course.held = []  # first, or after an interrupt in between they would be those of the next flight
             course.lands(data, at)
             if then is not None:
-                then(value, at)
+                then(value)
             bus.relay.pumper = None
     lock.release()
     return value

@@ -2,9 +2,9 @@
 
 When the bus is as it was when it was found idle and clean, the request leaves, the whole answer comes at one look, or
 piece by piece, and all there is to do is to check it and to say what it means: `fly`. What nobody answers just leaves:
-`cast`. Who has something to do meanwhile lets it `loose`, and comes back to `land` it. Whatever is otherwise goes the
-usual way; an answer that is not exactly the one that is due finds a flight in the air like any other. A test proves
-that both ways give the same.
+`cast`. Who has something to do meanwhile halves it: `bus/loosed.py`. Whatever is otherwise goes the usual way; an
+answer that is not exactly the one that is due finds a flight in the air like any other. A test proves that both ways
+give the same.
 
 Here microseconds count, so what elsewhere would be three functions is one.
 """
@@ -97,7 +97,7 @@ def brought(bus: Bus, course: Course, then: Then | None = None, arrived: list[Da
             if value is not UNLIKE:
                 course.lands(arrived[0], at)
                 if then is not None:
-                    then(value, at)
+                    then(value)
                 bus.relay.pumper = None
                 lock.release()
                 return value
