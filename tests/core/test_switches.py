@@ -48,6 +48,8 @@ def test_yes_and_no_may_be_said_as_truth_where_there_are_more_choices() -> None:
         ("rate", "300", "'300' is not possible", "one of 250, 500"),
         ("byte", "256", "'256' is not possible", "a whole number, 0 to 255"),
         ("byte", "1.5", "'1.5' is not possible", "a whole number"),
+        ("byte", "1_0", "'1_0' is not possible", "a whole number"),
+        ("wait", "1_0", "'1_0' is not possible", "a number, 0 or more"),
         ("wait", "nan", "'nan' is not possible", "a number, 0 or more"),
         ("wait", "-1", "'-1' is not possible", "a number, 0 or more"),
     ],

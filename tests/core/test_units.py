@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.units import QUANTITIES, SCALES, parse, rate, raw, show, written
+from motorbus.core.units import QUANTITIES, SCALES, parse, rate, raw, real, show, whole, written
 from motorbus.errors import RequestError
 
 
@@ -186,3 +186,23 @@ def test_a_rate_is_spelled_in_one_way_everywhere(text: object, value: int) -> No
 def test_what_is_no_rate_is_refused(text: str) -> None:
     with pytest.raises(RequestError, match="is not a rate"):
         rate(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("37", 37), ("0x25", 37), ("-3", -3), ("0b101", 5), (" 7", 7), ("0", 0)]
+)
+def test_a_whole_number_is_decimal_or_says_its_base(text: str, value: int) -> None:
+    assert whole(text) == value
+    assert real(str(value)) == value
+
+
+@pytest.mark.parametrize("text", ["1_0", "0x1_0", "٣", "1.5", "", "seven", "007", "0x"])
+def test_what_is_no_whole_number_is_none(text: str) -> None:
+    with pytest.raises(ValueError, match="."):
+        whole(text)
+
+
+@pytest.mark.parametrize("text", ["1_0", "1_0.5", "٣", "", "seven", "0x10"])
+def test_what_is_no_number_is_none(text: str) -> None:
+    with pytest.raises(ValueError, match="."):
+        real(text)

@@ -65,7 +65,9 @@ def test_ids_are_lists_and_ranges(text: str, ids: tuple[int, ...]) -> None:
     assert parse_ids(text) == ids
 
 
-@pytest.mark.parametrize("text", ["", "a", "3-1", "1-", "-1", "1++2", "1-99999999", "1.5"])
+@pytest.mark.parametrize(
+    "text", ["", "a", "3-1", "1-", "-1", "1++2", "1-99999999", "1.5", "1_0", "1-1_0", "٣"]
+)
 def test_impossible_ids_are_refused(text: str) -> None:
     with pytest.raises(RequestError, match="ids"):
         parse_ids(text)

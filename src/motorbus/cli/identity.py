@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def id_said(text: str) -> int:
     """An id as it was typed, decimal or 0x. Raises RequestError when it is no whole number."""
     try:
-        return int(text, 0)
+        return units.whole(text)
     except ValueError:
         raise RequestError(
             f"{text!r} is not an id", expected="a whole number", advice="nothing was sent"

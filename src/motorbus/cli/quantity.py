@@ -41,7 +41,7 @@ def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
 
 def _whole(entry: Entry, text: str) -> int:
     try:
-        return int(text, 0)
+        return units.whole(text)
     except ValueError:
         raise RequestError(
             f"{entry.name}: {text!r} is not a whole number",

@@ -13,6 +13,7 @@ from difflib import get_close_matches
 from math import inf, isfinite
 from typing import Any, TypeVar
 
+from motorbus.core import units
 from motorbus.core.family import Option
 from motorbus.errors import RequestError
 
@@ -81,7 +82,7 @@ def _truth(name: str, value: object) -> bool:
 
 def _number(name: str, value: object, kind: type, span: tuple[float, float]) -> float:
     try:
-        number = int(str(value), 0) if kind is int else float(str(value))
+        number = (units.whole if kind is int else units.real)(str(value))
     except ValueError:
         number = float("nan")
     if not (isfinite(number) and span[0] <= number <= span[1]):

@@ -119,6 +119,25 @@ def raw(text: str) -> int | None:
     return int(match[1], 16 if "x" in match[1].lower() else 10)
 
 
+def whole(text: str) -> int:
+    """A whole number as people type it: `37`, `0x25`, `-3`, `0b101`.
+
+    Raises ValueError for anything else, also for what Python itself would take: `1_0`, and digits of other scripts.
+    """
+    return int(_plainly(text), 0)
+
+
+def real(text: str) -> float:
+    """A number as people type it: `0.5`, `-3`, `1e-3`. Raises ValueError as `whole` does."""
+    return float(_plainly(text))
+
+
+def _plainly(text: str) -> str:
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is not a number")
+    return text
+
+
 LONG: Final = 1e6
 """A number from here on is shown in six digits: nobody reads more, and there may be three hundred."""
 
@@ -211,7 +230,7 @@ def rate(text: object) -> int:
     said = str(text).strip()
     short = _RATE.fullmatch(said)
     try:
-        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(int(said, 0))
+        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(whole(said))
     except ValueError:
         found = Fraction(0)
     if found <= 0 or found.denominator != 1:

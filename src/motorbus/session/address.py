@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from motorbus.core import units
 from motorbus.errors import RequestError
 
 HIGHEST_NODE = 0x7FFFFFFF
@@ -59,8 +60,8 @@ def parse_ids(text: str) -> tuple[int, ...]:
     for part in text.replace("+", ",").split(","):
         low, dash, high = part.partition("-")
         try:
-            first = int(low, 0)
-            last = int(high, 0) if dash else first
+            first = units.whole(low)
+            last = units.whole(high) if dash else first
         except ValueError:
             raise _bad_ids(text, f"{part!r} is not a number or a range") from None
         if not 0 <= first <= last or last - first > 0xFFFF or last > HIGHEST_NODE:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from motorbus.core import units
 from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 from motorbus.simulation.faulted import Faulted, read_order
@@ -192,7 +193,7 @@ def _log(simulator: Simulator, words: list[str]) -> str:
     _expect(words, at_most=1, order="log [ID]")
     if words:
         _able(simulator, words[0], "log", "no log")
-    nodes = {int(words[0], 0): _node(simulator, words[0])} if words else simulator.nodes
+    nodes = {units.whole(words[0]): _node(simulator, words[0])} if words else simulator.nodes
     said = [
         {"id": id, **remark._asdict(), "at": round(remark.at, 6)}
         for id in sorted(nodes)
@@ -233,7 +234,7 @@ def _expect(words: list[str], *, at_least: int = 0, at_most: int, order: str) ->
 
 def _node(simulator: Simulator, text: str) -> SimulatedNode:
     try:
-        return simulator.nodes[int(text, 0)]
+        return simulator.nodes[units.whole(text)]
     except (ValueError, KeyError):
         ids = ", ".join(map(str, sorted(simulator.nodes)))
         raise RequestError(f"there is no node {text}; there are: {ids}") from None

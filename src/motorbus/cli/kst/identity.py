@@ -160,7 +160,7 @@ def _next(device_: str) -> str:
 def whole(text: str, what: str) -> int:
     """A whole number, decimal or 0x. Raises RequestError."""
     try:
-        return int(text, 0)
+        return units.whole(text)
     except ValueError:
         raise RequestError(
             f"{text!r} is not {what}", expected="a whole number", advice="nothing was sent"

@@ -30,7 +30,7 @@ def number(name: str, text: str) -> int:
     if text.casefold() in named:
         return named[text.casefold()]
     try:
-        return int(text, 0)
+        return units.whole(text)
     except ValueError:
         if row.unit in units.QUANTITIES and not text[-1:].isdigit():
             return _counted(row, text)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
+from motorbus.core import units
 from motorbus.core.goal import Goal, Stays
 from motorbus.core.operation import Answer, Due, Exchange, Rank
 from motorbus.errors import RequestError
@@ -38,7 +39,7 @@ def held_ids(said: str | Iterable[int]) -> frozenset[int]:
     for part in said.split("+") if said else ():
         first, _, last = part.partition("-")
         try:
-            ends = checked_id(int(first, 0)), checked_id(int(last or first, 0))
+            ends = checked_id(units.whole(first)), checked_id(units.whole(last or first))
         except ValueError:
             raise RequestError(
                 f"estop_hold={said}: {part!r} is not an id",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from motorbus.core import units
 from motorbus.core.family import Option
 from motorbus.core.switches import options as switches_of
 from motorbus.core.switches import switched
@@ -58,7 +59,7 @@ def _position(position: object) -> int | Mapping[int, int] | None:
 
 def _twin(word: str, ids: Sequence[int]) -> int:
     try:
-        id = int(word, 0)
+        id = units.whole(word)
     except ValueError:
         id = -1
     if id not in ids:

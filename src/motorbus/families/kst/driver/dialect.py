@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Final
 
+from motorbus.core import units
 from motorbus.core.operation import CanFrame, Data, Event, Notice, Reply
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
@@ -190,7 +191,7 @@ def alarm_names(data: bytes) -> tuple[str, ...]:
 def window(value: object) -> int:
     """Nodes in flight at once, 1 to 127. Raises RequestError."""
     try:
-        number = int(str(value), 0)
+        number = units.whole(str(value))
     except ValueError:
         number = 0
     if not 1 <= number <= MOST:

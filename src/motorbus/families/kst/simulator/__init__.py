@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+from motorbus.core import units
 from motorbus.core.family import Option
 from motorbus.core.switches import options as switches_of
 from motorbus.core.switches import switched
@@ -67,7 +68,7 @@ def _profile(name: str) -> Profile:
 
 def _number(word: str) -> int:
     try:
-        return int(word, 0)
+        return units.whole(word)
     except ValueError:
         raise RequestError(
             f"option duplicate: {word!r} is not a node id", expected="ids as 0x25 or 0x25+0x26"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from motorbus.core import units
 from motorbus.core.entry import Entry, Table, Value
 from motorbus.core.operation import Exchange
 from motorbus.errors import RequestError
@@ -70,7 +71,7 @@ def checked_id(node: int) -> int:
 def checked_motor(number: object) -> int:
     """The number of a motor, also as text. Raises RequestError for one that no frame can name."""
     try:
-        found = int(str(number), 0)
+        found = units.whole(str(number))
     except ValueError:
         found = 0
     if found not in wire.MOTORS:
