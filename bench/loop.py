@@ -13,11 +13,17 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from resource import RUSAGE_SELF, getrusage
+from statistics import median
 from time import perf_counter
 from typing import Any, Protocol
 
 from bench.workloads import EXPECTED, POSITION, WARM_UP, Workload, goals, named
+
+STRETCHES = 9
+"""Parts of a sample. Its processor time is the median of theirs: on a machine that is shared the same work takes twice
+as long for some hundredths of a second now and then."""
 
 
 class Contender(Protocol):
@@ -144,18 +150,32 @@ class Course:
 
 
 def measure(contender: Contender, workload: Workload, count: int) -> dict[str, Any]:
-    """Warm up, measure `count` exchanges, judge; seconds per exchange and the books."""
+    """Warm up, measure `count` exchanges, judge; seconds per exchange and the books.
+
+    Processor time is that of the stretch in the middle, wall time that of all of them.
+    """
     course = Course(contender, workload)
     course.run(WARM_UP)
-    course.processor = course.wall = 0.0
-    course.run(count)
+    course.wall, costs = 0.0, []
+    for size in shares(count, workload.stride or 1):
+        course.processor = 0.0
+        course.run(size)
+        costs.append(course.processor / size)
     course.judge()
     return {
-        "processor": course.processor / count,
+        "processor": median(costs),
         "wall": course.wall / count,
         "books": course.books(),
         "late": course.late(),
     }
+
+
+def shares(count: int, stride: int) -> list[int]:
+    """So many exchanges in about equal stretches that end where a stride does."""
+    strides = -(-count // stride)
+    stretches = min(STRETCHES, strides)
+    ends = [min(count, stride * (strides * number // stretches)) for number in range(stretches + 1)]
+    return [end - start for start, end in pairwise(ends)]
 
 
 def main(contender: Callable[[str, Workload], Contender]) -> None:

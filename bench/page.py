@@ -30,8 +30,9 @@ of one run, on {machine}.
 {goals}## On a pseudo-terminal
 
 {rounds} rounds. *{ours} needs of it* is our processor time divided by theirs, taken within each round: the median, and
-in brackets the least and the greatest. Below 1 is cheaper. A contender that has no call for a workload is not in its
-table.
+in brackets the least and the greatest. Below 1 is cheaper. Of each round nine stretches are timed one after the other,
+and the one in the middle counts, for a machine that is shared is slow now and then. A contender that has no call for a
+workload is not in its table.
 
 The other end is a responder in C that answers at once and in one burst, so what differs is the library. Wall time here
 is mostly the kernel waking two processes and does not separate good libraries; on a real line the wire sets it. The

@@ -13,9 +13,9 @@ from bench.rounds import CANDIDATES, OURS, Candidate, Sample
 from bench.row import SINGLE, Row, Say
 from bench.workloads import WORKLOADS, Workload
 
-MEMORY_COUNT, WIRE_COUNT = 2000, 2000
+MEMORY_COUNT, WIRE_COUNT = 9000, 2000
 """Exchanges of one sample."""
-LARGE = 600
+LARGE = 1800
 """Exchanges of one sample of thirty servos in process, where some need longer for them than for all the rest."""
 ESSENTIAL = ("read1", "sync-read-6x2", "sync-read-30x2", "cycle")
 """Workloads that have a goal on the pseudo-terminal and in process."""

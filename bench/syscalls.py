@@ -13,6 +13,8 @@ from shutil import which
 
 from bench.rounds import OURS, Candidate, Failed, Wrong, on_wire
 
+OF_MEASURING = {"getrusage", "brk", "mmap", "munmap", "mremap", "madvise"}
+"""Calls of the measuring itself, which looks at the clock, and keeps every reading until all are judged."""
 SHORT, LONG = 500, 1500
 TRIES = 5
 
@@ -38,7 +40,12 @@ def parse(summary: str) -> dict[str, int]:
 def per_exchange(program: Path, candidate: Candidate, workload: str) -> dict[str, float]:
     """Call -> how often per exchange, the frequent ones first; what the measuring itself calls is left out."""
     short, long = (_counted(program, candidate, workload, count) for count in (SHORT, LONG))
-    each = {name: (long[name] - short.get(name, 0)) / (LONG - SHORT) for name in long if name != "getrusage"}
+    return difference(short, long)
+
+
+def difference(short: dict[str, int], long: dict[str, int]) -> dict[str, float]:
+    """Call -> how often per exchange, from a run of SHORT exchanges and one of LONG."""
+    each = {name: (long[name] - short.get(name, 0)) / (LONG - SHORT) for name in long.keys() - OF_MEASURING}
     return dict(sorted(((n, c) for n, c in each.items() if abs(c) >= 0.01), key=lambda pair: -pair[1]))
 
 

@@ -24,6 +24,7 @@ from time import process_time
 from typing import Any, Final
 
 from bench import apart
+from bench.loop import STRETCHES
 from bench.memory import packet
 from bench.rounds import Failed
 from bench.row import SAMPLES, Row, Say, pairs
@@ -113,17 +114,19 @@ def measured(name: str, times: Mapping[str, int] = TIMES) -> dict[str, float]:
 
 
 def _each(name: str, encode: Encoder, inputs: Sequence[Any], due: Sequence[bytes]) -> float:
-    warm = len(inputs) // 10
-    made = [encode(one) for one in inputs[:warm]]
-    keep = made.append
-    began = process_time()
-    for one in inputs[warm:]:
-        keep(encode(one))
-    seconds = process_time() - began
+    stretch = max(1, len(inputs) // (STRETCHES + 1))  # the first one warms up
+    made = [encode(one) for one in inputs[:stretch]]
+    keep, costs = made.append, []
+    for start in range(stretch, len(inputs) - stretch + 1, stretch):
+        part = inputs[start : start + stretch]
+        began = process_time()
+        for one in part:
+            keep(encode(one))
+        costs.append((process_time() - began) / stretch)
     for index, one in enumerate(made):
         if bytes(one) != due[index]:
             raise Failed(f"{name} made {bytes(one).hex(' ')} where {due[index].hex(' ')} was due")
-    return seconds / (len(inputs) - warm)
+    return median(costs)
 
 
 def _read_packet() -> bytes:

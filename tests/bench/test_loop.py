@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import struct
+from itertools import count
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bench import memory
-from bench.loop import Late, WrongValue, check, measure
+from bench.loop import STRETCHES, Late, WrongValue, check, measure, shares
 from bench.rounds import CANDIDATES, Failed, Wrong, compare
 from bench.workloads import (
     FIELDS,
@@ -98,6 +100,33 @@ def test_honest_work_is_accepted_and_counted(workload: Any) -> None:
     reads, writes, _ = found["books"]["1"]
     barriers = {0: 0, 32: 11, 8: 38}[workload.stride]  # of the shorter ones 25 in the warm-up, 13 after it
     assert (reads, writes) == (done * bool(workload.reads) + barriers, done * bool(workload.writes))
+
+
+@pytest.mark.parametrize("exchanges", [1, 8, 9, 10, 100, 2000])
+@pytest.mark.parametrize("stride", [1, 8, 32])
+def test_a_sample_is_cut_into_about_equal_stretches_where_strides_end(exchanges: int, stride: int) -> None:
+    found = shares(exchanges, stride)
+    assert sum(found) == exchanges
+    assert len(found) == min(STRETCHES, -(-exchanges // stride))
+    assert all(size % stride == 0 for size in found[:-1])
+    assert max(found) - min(found) < 2 * stride
+
+
+def test_a_stretch_in_which_the_machine_was_slow_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    used, looks = 0.0, count(1)
+
+    def usage(who: int) -> SimpleNamespace:
+        nonlocal used
+        look = next(looks)
+        used += {8: 50.0}.get(
+            look, look % 2 == 0
+        )  # each stretch takes a second, the third after the warm-up 50
+        return SimpleNamespace(ru_utime=used, ru_stime=0.0)
+
+    monkeypatch.setattr("bench.loop.getrusage", usage)
+    load = WORKLOADS["read1"]
+    assert measure(Honest(load), load, 20 * STRETCHES)["processor"] == pytest.approx(1 / 20)
+    assert next(looks) == 2 * (STRETCHES + 1) + 1
 
 
 def test_the_sum_of_the_goals_is_the_sum_of_the_goals() -> None:

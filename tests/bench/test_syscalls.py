@@ -1,8 +1,8 @@
-"""The table of strace is read whether or not a call ever failed."""
+"""The table of strace is read whether or not a call ever failed, and what the measuring itself calls is left out."""
 
 from __future__ import annotations
 
-from bench.syscalls import parse
+from bench.syscalls import difference, parse
 
 TABLE = """% time     seconds  usecs/call     calls    errors syscall
 ------ ----------- ----------- --------- --------- ----------------
@@ -20,3 +20,13 @@ def test_every_call_is_counted_and_the_total_is_none() -> None:
 
 def test_a_table_of_nothing_is_empty() -> None:
     assert parse("") == {}
+
+
+def test_what_belongs_to_exchanges_is_what_the_longer_run_has_more() -> None:
+    short = {"read": 510, "write": 500, "openat": 80, "brk": 3, "getrusage": 20}
+    long = {"read": 1510, "write": 1505, "openat": 80, "brk": 13, "getrusage": 20, "futex": 1000}
+    assert difference(short, long) == {"read": 1.0, "write": 1.005, "futex": 1.0}
+
+
+def test_what_the_measuring_needs_for_its_readings_is_none_of_the_exchanges() -> None:
+    assert difference({}, dict.fromkeys(("brk", "mmap", "munmap", "madvise", "getrusage"), 1000)) == {}
