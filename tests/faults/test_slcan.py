@@ -74,6 +74,13 @@ def test_d14_what_names_the_reply_cannot_change_unseen(place: int) -> None:
     assert (tally.faults, tally.false) == (64, 0)
 
 
+def test_d14_no_character_makes_an_acknowledgement_of_a_refusal() -> None:
+    """Specifier 80 and 60 are one digit apart; but an acknowledgement has no code."""
+    specifier = ANSWER + VALUE.start - 8
+    changes = [Fault(1, specifier, "corrupt", Side.HOST, value=value) for value in EVERY[1:]]
+    assert harmed("refused write", Side.HOST, changes).false == 0
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", ONE_EXCHANGE)

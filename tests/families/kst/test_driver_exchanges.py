@@ -40,6 +40,13 @@ def test_a_value_of_another_size_is_no_value(back: str) -> None:
         play(upload_row(one, one.table["present_position"], int), (READ, back))
 
 
+def test_a_refusal_without_a_reason_is_told_with_what_it_may_have_been() -> None:
+    with pytest.raises(DeviceError, match="refused node_id") as raised:
+        play(order(one := node(), one.table["node_id"], 7), ("605#2200300007000000", abort(0x3000, 0)))
+    assert raised.value.code == 0
+    assert "may have made one of an acknowledgement" in raised.value.cause
+
+
 ROWS = [row for row in node("kst-ext").table.values() if row.readable]
 SPECIFIERS = st.one_of(st.sampled_from([0x4F, 0x4B, 0x47, 0x43, 0x42, 0x41, 0x80]), st.integers(0, 255))
 RESTS = st.one_of(st.binary(max_size=9), st.binary(min_size=4, max_size=4), st.just(b"\x84\x03\x00\x00"))

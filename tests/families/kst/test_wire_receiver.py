@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,6 +41,22 @@ def test_only_eight_bytes_from_a_node_in_an_expected_format_are_a_reply(
         assert frame.extended in formats
         assert event.lane == frame.id - 0x580
         assert wire.decode_reply(frame.data) is not None
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize("code", wire.ABORTS)
+def test_an_acknowledgement_with_the_code_of_a_refusal_was_a_refusal(code: int, order: Any) -> None:
+    """One digit of an adapter's text makes 60 of 80."""
+    refusal = b"\x80\x02\x60\x00" + code.to_bytes(4, order)
+    changed = b"\x60" + refusal[1:]
+    assert isinstance(heard(CanFrame(0x585, refusal)), Reply)
+    assert heard(CanFrame(0x585, changed)) == Noise(changed, "foreign", 5)
+
+
+@pytest.mark.parametrize("rest", [bytes(4), b"\1\2\3\4", b"\xff\xff\xff\xff", b"\2\0\1\7"])
+def test_an_acknowledgement_with_anything_else_behind_it_is_one(rest: bytes) -> None:
+    """CiA 301: what is reserved is ignored."""
+    assert isinstance(heard(CanFrame(0x585, b"\x60\x02\x60\x00" + rest)), Reply)
 
 
 def is_a_reply(specifier: int) -> bool:

@@ -232,6 +232,8 @@ def refused(node: Node, reply: SdoReply, index: int, subindex: int) -> DeviceErr
 def _cause(node: Node, code: int) -> str:
     if code in ABSENT:
         return f"this servo lacks what the profile {node.profile.name} has: older firmware, or another maker"
+    if not code:
+        return "no refusal has the code 0: an adapter's text may have made one of an acknowledgement; read it back"
     return ""
 
 

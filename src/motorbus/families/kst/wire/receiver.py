@@ -4,6 +4,9 @@ One frame is one event, so nothing is ever held back. A CAN controller checks wh
 no sense is not a damaged one: it stands by itself and casts no doubt on others. That goes too for eight bytes under a
 reply's identifier whose specifier is no reply's: if they came in place of an answer, the answer is missing, and that
 is what makes the node doubtful.
+
+An adapter that speaks text has no such check on its way to the host. One digit of a refusal, 80 that becomes 60, makes
+an acknowledgement of it; but that carries nothing, so what acknowledges with the code of a refusal is no reply either.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
+from motorbus.families.kst.wire.abort import ABORTS
 from motorbus.families.kst.wire.frames import LENGTH, NODES, REPLY, TOGGLE
 from motorbus.families.kst.wire.key import Key
 from motorbus.families.kst.wire.notices import decode_notice
@@ -18,6 +22,8 @@ from motorbus.families.kst.wire.sdo import reply_kind
 
 _KEY_KINDS: Final = tuple(reply_kind(specifier).removesuffix("-start") for specifier in range(256))
 """The kind of key for each byte 0; "" for what is no reply. An announced upload answers an upload."""
+_REFUSALS: Final = frozenset(code.to_bytes(4, order) for code in ABORTS for order in ("little", "big"))
+"""Bytes 4 to 7 of a refusal, also of a servo that sends its codes the wrong way round."""
 STANDARD: Final = frozenset({False})
 
 
@@ -58,7 +64,7 @@ class FrameReceiver:
 def _reply(node: int, data: bytes) -> Event:
     specifier = data[0]
     kind = _KEY_KINDS[specifier]
-    if not kind:
+    if not kind or (kind == "download" and data[4:] in _REFUSALS):
         return Noise(data, "foreign", node)
     if kind == "segment":
         return Reply(node, Key(kind, 0, 0, 1 if specifier & TOGGLE else 0), data)
