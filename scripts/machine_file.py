@@ -25,7 +25,9 @@ HEAD: Final = """# The machine file
 
 A machine is described in one file, `motorbus.toml`: its buses, the axes that move on them, groups of axes and poses.
 This page has every key. It is made by `python -m scripts.machine_file` from the types that the program reads the file
-with; the same is there [as JSON Schema](machine-file.json), with which an editor completes and checks as one writes.
+with; the same is there [as JSON Schema](machine-file.json), with which an editor completes and checks as one writes:
+keep a copy beside your file, and begin that with the line `#:schema ./machine-file.json`, which editors follow whose
+TOML support is Taplo's.
 
 ```toml
 format = 1
