@@ -12,6 +12,8 @@ from typing import Any
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import CanFrame, Data
 from motorbus.families.kst.simulator import KstBus
+from motorbus.link.adapters import DEVICE_LATENCY
+from motorbus.link.can_slcan import LINE_BITS, USUAL_BAUD
 from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.memory import MemoryLink
 from motorbus.link.slcan import SlcanAdapter
@@ -61,11 +63,18 @@ class Adapted:
 
 
 class TextLink(MemoryLink):
-    """Frames for the bus, text on the line."""
+    """Frames for the bus, text on the line; with a `baud` (bit/s) of the adapter's serial line, text needs its time."""
 
-    def __init__(self, simulator: Adapted, **options: Any) -> None:
-        self.reader = SlcanReader()
-        super().__init__(simulator, **options)
+    def __init__(self, simulator: Adapted, *, baud: int | None = None, **options: Any) -> None:
+        self.reader: Any = SlcanReader()
+        self.baud = baud
+        super().__init__(simulator, pace=baud is not None, **options)
+        self.paced = False  # of the frames nobody says when they were on the wire
+        if baud is not None:
+            self.latency = DEVICE_LATENCY + 2 * LINE_BITS / baud
+
+    def _air_time(self, data: Data) -> float:
+        return len(data) * self.bits_per_byte / (self.baud or self.rate)
 
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
@@ -84,6 +93,13 @@ class SlcanRig(KstRig):
 
     def linked(self, simulator: KstBus) -> MemoryLink:
         return TextLink(Adapted(simulator), rate=500_000)
+
+
+class SlowSlcanRig(SlcanRig):
+    """The same where the text takes its time, at the usual rate of such adapters."""
+
+    def linked(self, simulator: KstBus) -> MemoryLink:
+        return TextLink(Adapted(simulator), baud=USUAL_BAUD, rate=500_000)
 
 
 def value_changed(heard: Overheard) -> bool:
