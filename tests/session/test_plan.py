@@ -10,6 +10,7 @@ from motorbus import PortBusy, PortNotFound, RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.motion.machine import Machine
 from motorbus.session.plan import Plan, estop_options, loaded
+from tests.motion.machine.files import GOOD, UNOPENABLE, Broken
 from tests.motion.machines import described, machine
 
 
@@ -87,6 +88,24 @@ def test_a_file_is_loaded_with_its_addresses_checked(tmp_path: Path) -> None:
     file.write_text(described({"arm": "feetech:sim,colour=red"}, "1", "", False, {}, {}), encoding="utf-8")
     with pytest.raises(RequestError, match="motorbus.toml: .*colour"):
         loaded(file)
+
+
+def test_a_good_file_is_loaded_with_ports_that_are_not_there(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD, encoding="utf-8")
+    assert list(loaded(file).axes) == ["shoulder", "elbow", "slide"]
+
+
+@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:60]) for one in UNOPENABLE])
+def test_what_cannot_be_opened_is_refused_with_place_and_fix(broken: Broken, tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(broken.text, encoding="utf-8")
+    with pytest.raises(RequestError) as caught:
+        loaded(file)
+    error = caught.value
+    assert error.summary.startswith(f"{file}: {broken.says}")
+    assert broken.fix in f"{error.summary} / {error.expected} / {error.advice}"
+    assert error.advice.endswith("; nothing was opened")
 
 
 def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:

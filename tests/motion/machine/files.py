@@ -164,6 +164,21 @@ BROKEN = (
     Broken('"30 mm"', '"30 deg"', "pose.ready.slide: length '30 deg' has the unit", "leave travel out", False),
 )  # fmt: skip
 
+FEETECH, KST = "feetech:/dev/ttyACM0,baud=1000000", "kst:can://slcan/dev/ttyACM1,bitrate=500000"
+UNOPENABLE = (
+    # read without a fault; whoever knows the families sees before anything is opened that it cannot be
+    Broken(FEETECH, "feetech:sim,bauds=3", "bus.arm.address: 'feetech:sim,bauds=3': unknown", "did you mean baud?"),
+    Broken(FEETECH, "feetech:sim,id=1", "bus.arm.address: 'feetech:sim,id=1': unknown option 'id'", "mean ids?"),
+    Broken(FEETECH, "feetech:sim,colour=1", "bus.arm.address: 'feetech:sim,colour=1'", "take it out of the address"),
+    Broken("baud=1000000", "latncy=0", "bus.arm.address: 'feetech:/dev/ttyACM0,latncy=0'", "did you mean latency?"),
+    Broken("baud=1000000", "baud=fast", "bus.arm.address: baud=fast: not a rate", "bit/s, as 500000"),
+    Broken("baud=1000000", "latency=x", "bus.arm.address: latency=x: time 'x' is not", "change it in the address"),
+    Broken("baud=1000000", "sleep=1", "bus.arm.address: sleep=1: neither yes nor no", "yes or no"),
+    Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
+    Broken("bitrate=500000", "window=0", "bus.gimbal.address: window=0: not a number", "1 to 127"),
+    Broken("feetech:/dev", "fetech:/dev", "bus.arm.address: there is no family 'fetech'", "one of feetech, kst"),
+)  # fmt: skip
+
 
 def axis(**other: Any) -> AxisSpec:
     """A plain axis that turns, where nothing else is said."""
