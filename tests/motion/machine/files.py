@@ -177,6 +177,16 @@ UNOPENABLE = (
     Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
     Broken("bitrate=500000", "window=0", "bus.gimbal.address: window=0: not a number", "1 to 127"),
     Broken("feetech:/dev", "fetech:/dev", "bus.arm.address: there is no family 'fetech'", "one of feetech, kst"),
+    Broken("slcan/dev", "slcn/dev", "bus.gimbal.address: 'can://slcn/dev/ttyACM1'", "did you mean slcan?"),
+    Broken(KST, "kst:/dev/ttyACM0", "bus.gimbal.address: /dev/ttyACM0 is the port of bus.arm too", "one bus"),
+    Broken("ttyACM1", "ttyACM0", "bus.gimbal.address: /dev/ttyACM0 is the port of bus.arm too", "a port for each"),
+    # devices
+    Broken("arm#2", "arm#254", "axis.elbow.device: 254 is not the id of a servo", "0 to 253"),
+    Broken("arm#2", "arm#300", "axis.elbow.device: 300 is not the id of a servo", f"`motorbus scan {FEETECH}`"),
+    Broken("#0x25", "#200", "axis.slide.device: 200 is not the id of a servo", "1 to 127"),
+    Broken("#0x25", "#0", "axis.slide.device: 0 is not the id of a servo", "0 addresses everyone"),
+    Broken('low = "0 mm"', 'estop = "torque_off"\nlow = "0 mm"', "axis.slide.estop: an emergency", "take estop out"),
+    Broken('low = "0 mm"', 'exit = "torque_off"\nlow = "0 mm"', "axis.slide.exit: gimbal#0x25 (kst)", 'exit = "hold"'),
 )  # fmt: skip
 
 
