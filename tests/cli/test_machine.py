@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from motorbus.cli import machine
 from motorbus.errors import RequestError
 from tests.cli.conftest import Bench, Run
-from tests.motion.machine.files import BROKEN, Broken
+from tests.motion.machine.files import BROKEN, UNOPENABLE, Broken
 
 ARM = 'format = 1\n[bus.arm]\naddress = "feetech:sim,ids={}"\n[axis.shoulder]\ndevice = "arm#{}"\n'
 
@@ -232,13 +233,8 @@ def test_a_flag_goes_before_what_the_file_says(
 # -- broken files ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in BROKEN])
-@pytest.mark.parametrize("command", [["hold"], ["read", "shoulder"]], ids=["axes", "device"])
-def test_a_broken_file_ends_with_2_and_one_message(
-    broken: Broken, command: list[str], tmp_path: Path, run: Run
-) -> None:
+def judge(broken: Broken, command: list[str], file: Path, run: Run) -> None:
     """The buses in it do not exist: had one of them been opened, the exit code would be 3."""
-    file = tmp_path / "bench.toml"
     file.write_text(broken.text, encoding="utf-8")
     ran = run(*command, "--machine", str(file), "--json")
     assert (ran.code, ran.out) == (2, "")
@@ -247,7 +243,25 @@ def test_a_broken_file_ends_with_2_and_one_message(
     assert told["exit"] == 2
     assert told["summary"].startswith(f"{file}: {broken.says}")
     assert broken.fix in f"{told['summary']} / {told['expected']} / {told['advice']}"
-    assert told["advice"].endswith("nothing was opened")
+    assert len(told["expected"]) < 400
+    assert re.fullmatch(r".{6,}; nothing was opened", told["advice"])
+    assert told["advice"].count("nothing was") == 1
+
+
+@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in BROKEN])
+@pytest.mark.parametrize("command", [["hold"], ["read", "shoulder"]], ids=["axes", "device"])
+def test_a_broken_file_ends_with_2_and_one_message(
+    broken: Broken, command: list[str], tmp_path: Path, run: Run
+) -> None:
+    judge(broken, command, tmp_path / "bench.toml", run)
+
+
+@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in UNOPENABLE])
+@pytest.mark.parametrize("command", ["hold", "read shoulder", "pose", "budget", "safety"])
+def test_one_that_cannot_be_opened_does_so_too_whoever_reads_it(
+    broken: Broken, command: str, tmp_path: Path, run: Run
+) -> None:
+    judge(broken, command.split(), tmp_path / "bench.toml", run)
 
 
 def test_there_are_fifty_broken_files_and_more() -> None:

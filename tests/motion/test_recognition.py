@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from motorbus import NoReply, RequestError, Robot
+from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Pause
 from motorbus.core.verbs import verb
@@ -95,6 +97,54 @@ def test_what_the_file_asks_in_vain_is_refused_and_nothing_moves(
         assert all(_reads(title) for title in said(sims))
         with Robot.of(made, [name for name in made.axes if name != axis]) as robot:
             assert robot.axes, "and the ports were given back"
+
+
+@pytest.mark.parametrize(
+    ("axis", "park", "limits"),
+    [("c1", "200 deg", "-90.0 deg to 90.0 deg"), ("a1", "-181 deg", "-180.0 deg to 179.9 deg")],
+)
+def test_a_place_to_park_beyond_the_device_is_refused_before_anything_moves(
+    axis: str, park: str, limits: str
+) -> None:
+    keys = {"exit": "park", "park": park, "low": None, "high": None}
+    with machine(arm="1", can="0x25", axes={axis: keys}) as (made, sims):
+        listened(sims)
+        with pytest.raises(
+            RequestError, match=rf"^axis\.{axis}\.park: {park[:-4]}.0 deg is outside"
+        ) as caught:
+            Robot.of(made)
+        assert caught.value.expected == limits
+        assert caught.value.advice == 'change park, or write exit = "hold"; nothing was sent but questions'
+        assert all(_reads(title) for title in said(sims))
+    near = {**keys, "park": "89 deg"}
+    with machine(arm="1", can="0x25", axes={axis: near}) as (made, _), Robot.of(made) as robot:
+        assert robot.axes
+
+
+@pytest.mark.parametrize("exit_", ["hold", "leave"])
+def test_a_place_to_park_where_nobody_parks_is_not_judged(exit_: str) -> None:
+    keys = {"exit": exit_, "park": "200 deg", "low": None, "high": None}
+    with machine(can="0x25", axes={"c1": keys}) as (made, _), Robot.of(made) as robot:
+        assert robot["c1"].spec.park is not None
+
+
+def test_what_a_device_is_refused_for_names_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    with machine(arm="1-2", axes={"a1": {"current": "0.4 A"}, "a2": {"current": "1 A"}}) as (made, _):
+        file.write_text(made.text(), encoding="utf-8")
+        with pytest.raises(RequestError) as caught:
+            Robot.load(file)
+        assert caught.value.summary.startswith(f"{file}: axis.a1.current: arm#1 (STS3215) does not have")
+        assert caught.value.advice == "take current out of the file; nothing was sent but questions"
+        assert "axis.a2.current" in caught.value.__notes__[0]
+        asyncio.run(_refused_with(file))
+
+
+async def _refused_with(file: Path) -> None:
+    robot = AsyncRobot.load(file)
+    with pytest.raises(RequestError) as caught:
+        await robot.__aenter__()
+    assert caught.value.summary.startswith(f"{file}: axis.a1.current: ")
 
 
 def test_a_place_to_park_needs_a_way_to_it() -> None:

@@ -66,6 +66,25 @@ def test_what_cannot_be_is_refused_without_touching_the_port(address: str, why: 
 
 
 @pytest.mark.parametrize(
+    ("address", "first", "advice"),
+    [
+        ("feetech:sim,bauds=3", "one of baud, ids, model, faults, ", "did you mean baud?"),
+        ("kst:sim,profil=kst", "one of bitrate, ids, model, faults, profile, ", "did you mean profile?"),
+        ("feetech:/dev/ttyACM0,latenci=0", "one of baud, estop_hold, latency, ", "did you mean latency?"),
+        ("stepper:/dev/ttyACM0,colour=red", "one of baud, motor, ", "take it out of the address"),
+    ],
+)
+def test_an_unknown_option_is_told_with_the_nearest_and_the_most_usual(
+    address: str, first: str, advice: str
+) -> None:
+    with pytest.raises(RequestError) as caught:
+        prepare(address, {})
+    assert caught.value.expected.startswith(first)
+    assert caught.value.expected.count(",") < 12
+    assert caught.value.advice == f"{advice}; nothing was opened"
+
+
+@pytest.mark.parametrize(
     ("bus", "name"),
     [
         ("feetech:/dev/ttyACM0,baud=500000", "/dev/ttyACM0"),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
 
-from motorbus import PortBusy, PortNotFound, RequestError
+from motorbus import LinkError, PortBusy, PortNotFound, RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.motion.machine import Machine
 from motorbus.session.plan import Plan, estop_options, loaded
+from tests.motion.machine.files import GOOD, UNOPENABLE, Broken, axis
 from tests.motion.machines import described, machine
 
 
@@ -43,7 +45,7 @@ def test_an_address_that_cannot_be_is_refused_naming_its_bus() -> None:
         Plan.of(made_of("feetech:sim,ids=1", "kst:sim,colour=red"))
 
 
-def test_two_buses_on_one_port_are_refused() -> None:
+def test_two_buses_on_one_port_are_refused(tmp_path: Path) -> None:
     one, other = "feetech:/dev/ttyACM0", "feetech:/dev/ttyACM0,baud=500000"
     text = f'format = 1\n[bus.a]\naddress = "{one}"\n[bus.b]\naddress = "{other}"\n'
     axes = '[axis.x]\ndevice = "a#1"\n[axis.y]\ndevice = "b#2"\n'
@@ -51,6 +53,12 @@ def test_two_buses_on_one_port_are_refused() -> None:
     with pytest.raises(RequestError, match="bus.b.address: /dev/ttyACM0 is the port of bus.a too"):
         Plan.of(found)
     assert Plan.of(found, "x").buses == ("a",)
+    file = tmp_path / "motorbus.toml"
+    file.write_text(text + axes, encoding="utf-8")
+    with pytest.raises(
+        RequestError, match=r"motorbus.toml: bus.b.address: /dev/ttyACM0 is the port of bus.a"
+    ):
+        loaded(file)
 
 
 def test_simulators_that_are_made_anew_are_no_port() -> None:
@@ -87,6 +95,52 @@ def test_a_file_is_loaded_with_its_addresses_checked(tmp_path: Path) -> None:
     file.write_text(described({"arm": "feetech:sim,colour=red"}, "1", "", False, {}, {}), encoding="utf-8")
     with pytest.raises(RequestError, match="motorbus.toml: .*colour"):
         loaded(file)
+
+
+def test_a_good_file_is_loaded_with_ports_that_are_not_there(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD, encoding="utf-8")
+    assert list(loaded(file).axes) == ["shoulder", "elbow", "slide"]
+
+
+@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:60]) for one in UNOPENABLE])
+def test_what_cannot_be_opened_is_refused_with_place_and_fix(broken: Broken, tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(broken.text, encoding="utf-8")
+    with pytest.raises(RequestError) as caught:
+        loaded(file)
+    error = caught.value
+    assert error.summary.startswith(f"{file}: {broken.says}")
+    assert broken.fix in f"{error.summary} / {error.expected} / {error.advice}"
+    assert error.advice.endswith("; nothing was opened")
+
+
+def test_a_file_is_loaded_without_what_only_another_bus_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "can", None)
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD, encoding="utf-8")
+    assert Plan.of(loaded(file), "left").buses == ("arm",)
+    with pytest.raises(LinkError, match="bus.gimbal: .* needs python-can"):
+        Plan.of(loaded(file))
+
+
+def test_a_machine_by_hand_is_refused_for_an_id_that_no_device_has() -> None:
+    found = made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")
+    wrong = Machine(buses=found.buses, axes={"x": axis(device="can#200"), "y": axis(device="arm#1")})
+    with pytest.raises(RequestError, match="^axis.x.device: 200 is not the id of a servo"):
+        Plan.of(wrong)
+    assert Plan.of(wrong, "y").buses == ("arm",)
+
+
+def test_what_a_machine_of_a_file_is_refused_for_names_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD.replace("#0x25", "#200"), encoding="utf-8")
+    with pytest.raises(RequestError) as caught:
+        Plan.of(Machine.load(file))
+    assert caught.value.summary.startswith(f"{file}: axis.slide.device: 200 is not")
+    assert str(caught.value).count(str(file)) == 1
 
 
 def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:

@@ -45,5 +45,5 @@ def explain(error: RequestError, command: Callable[..., object], options: dict[s
         if meant:
             error.summary = f"--{option}: no such flag"
             error.expected = f"did you mean --{meant[0]}?"
-        error.advice = error.advice or "`--help` lists the flags; nothing was sent"
+        error.advice = "`--help` lists the flags; nothing was sent"
         error.args = (error.summary,)

@@ -7,15 +7,19 @@ who wrote down a cap or a way to end relies on it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import MotorbusError, NoReply, RequestError
+from motorbus.errors import LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.limits import Device, check_goal
+from motorbus.motion.machine.refusal import of_file
 from motorbus.motion.several import everyone, of_each, raised
+
+ASKED: Final = "nothing was sent but questions"
 
 
 def recognise(body: Body) -> Abreast[None]:
@@ -31,14 +35,27 @@ def recognise(body: Body) -> Abreast[None]:
         for name, one in told.items():
             axis = body.axes[name]
             told[name] = _unheard(axis, body, one) if isinstance(one, NoReply) else _judged(axis, one)
-        raised(told)
+        with of_file(body.machine.file):
+            raised(told)
 
     return Abreast({bus: everyone(there, _asked) for bus, there in parts.items()}, combine)
 
 
-def _asked(axis: AxisVerbs) -> Operation[Identity]:
+class Asked(NamedTuple):
+    """What a device is, and its own limits where it has to be known whether it can be parked."""
+
+    identity: Identity
+    limits: Device = None
+
+
+def _asked(axis: AxisVerbs) -> Operation[Asked]:
     identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
-    return (yield from identify)
+    identity = yield from identify
+    able = axis.bus.family.axis(identity.model)
+    if axis.spec.exit != "park" or "limits" not in able:
+        return Asked(identity)
+    limits: Device = yield from able["limits"](axis.device)
+    return Asked(identity, limits)
 
 
 def _unheard(axis: AxisVerbs, body: Body, silence: NoReply) -> NoReply:
@@ -49,7 +66,7 @@ def _unheard(axis: AxisVerbs, body: Body, silence: NoReply) -> NoReply:
         received=silence.received,
         expected=f"the device with the id {axis.spec.node}",
         cause=silence.cause or "it has no power, another id or another rate, or its cable is off",
-        advice="see to that, or open the machine with other axes only; nothing was sent but questions",
+        advice=f"see to that, or open the machine with other axes only; {ASKED}",
         node=axis.spec.node,
     )
     found.__cause__ = silence
@@ -60,14 +77,15 @@ def _judged(axis: AxisVerbs, told: Any) -> MotorbusError | None:
     """Tell the axis what its device can do; the error when that does not do."""
     if isinstance(told, MotorbusError):
         return told
-    axis.recognised(axis.bus.family.axis(told.model), told.model)
+    model = told.identity.model
+    axis.recognised(axis.bus.family.axis(model), model)
     if not axis.able:
         return RequestError(
-            f"{axis.spec.device} is {told.model}, of which nobody has said what it can do",
+            f"{axis.spec.device} is {model}, of which nobody has said what it can do",
             expected="a device that moves",
-            advice="take the axis out of the file, or use its own commands; nothing was sent but questions",
+            advice=f"take the axis out of the file, or use its own commands; {ASKED}",
         )
-    return _lacking(axis)
+    return _lacking(axis) or _unreachable(axis, told.limits)
 
 
 def _lacking(axis: AxisVerbs) -> RequestError | None:
@@ -81,12 +99,28 @@ def _lacking(axis: AxisVerbs) -> RequestError | None:
     )
     for key, what, wanted, needs, instead in wants:
         if wanted and not any(one in able for one in needs):
+            another = "=" in instead
             return RequestError(
                 f"axis.{axis.name}.{key}: {spec.device} ({axis.model}) does not have {what}",
-                expected=f"a key that its device can follow, as {instead}"
-                if "=" in instead
-                else "no such key",
-                advice=f"write {instead}" if "=" in instead else f"{instead} of the file; nothing was sent",
+                expected=f"a key that its device can follow, as {instead}" if another else "no such key",
+                advice=f"write {instead}; {ASKED}" if another else f"{instead} of the file; {ASKED}",
                 node=spec.node,
             )
+    return None
+
+
+def _unreachable(axis: AxisVerbs, device: Device) -> RequestError | None:
+    """The error for a place to park beyond the limits of the device (rad of it): it would be found out at the end."""
+    spec = axis.spec
+    if spec.exit != "park" or spec.park is None:
+        return None
+    try:
+        check_goal(axis.name, spec, spec.park, device=device)
+    except LimitExceeded as error:
+        return RequestError(
+            f"axis.{axis.name}.park: {spec.show(spec.park)} is outside the limits of {spec.device} ({axis.model})",
+            expected=error.expected,
+            advice=f'change park, or write exit = "hold"; {ASKED}',
+            node=spec.node,
+        )
     return None

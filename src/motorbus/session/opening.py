@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from motorbus import families
@@ -57,11 +57,22 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
         more = {LATENCY, SLEEP} if _is_serial(family, spot.port) else set()
-        allowed = {word, RECONNECT, *more, *known, *(option.name for option in family.link.settings)}
-        raise RequestError(
-            f"{address!r}: unknown option {unknown[0]!r}", expected=f"one of {', '.join(sorted(allowed))}"
-        )
+        here = [option.name for option in family.link.settings]
+        usual = [name for name in ("ids", "model", FAULTS) if name in known]
+        raise _unknown(address, unknown[0], [word, *usual, *here, *sorted(more), RECONNECT, *sorted(known)])
     return Opening(family.configured(**settings), spot.port, rate, {**rest, **timing}, reconnect)
+
+
+def _unknown(address: str, option: str, known: Iterable[str]) -> RequestError:
+    """The error for an option that nobody takes; of those that are `known` the most usual come first."""
+    from motorbus.motion.machine.refusal import listed, nearest  # whoever opens a bus alone needs no machine
+
+    there = dict.fromkeys(known)
+    return RequestError(
+        f"{address!r}: unknown option {option!r}",
+        expected=listed(there),
+        advice=f"{nearest(option, there, 'take it out of the address')}; nothing was opened",
+    )
 
 
 def _is_serial(family: Family, port: str) -> bool:
@@ -81,7 +92,10 @@ def _timing(merged: dict[str, object]) -> dict[str, object]:
 
 def _latency(said: object) -> float:
     """The option in s."""
-    seconds = units.parse(str(said), "time")
+    try:
+        seconds = units.parse(str(said), "time")
+    except RequestError as refusal:
+        raise RequestError(f"{LATENCY}={said}: {refusal.summary}", expected=refusal.expected) from None
     if not 0 <= seconds <= LATEST:
         raise RequestError(
             f"{LATENCY}={said}: no adapter holds bytes back for that long",

@@ -10,15 +10,17 @@ from motorbus import families
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import shown
-from motorbus.errors import MotorbusError, RequestError
+from motorbus.core.family import Family
+from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
+from motorbus.motion.machine.refusal import of_file, path, refused
 from motorbus.motion.several import named
 from motorbus.session.address import parse_address
 from motorbus.session.buses import AnyBus, open, open_async
-from motorbus.session.opening import lock_name, prepare
+from motorbus.session.opening import lock_name
 
 
 class Plan(NamedTuple):
@@ -33,7 +35,7 @@ class Plan(NamedTuple):
         """What these axes, groups and buses of a machine need; None: all of its axes.
 
         Raises RequestError for a name that it does not have, a machine that does not fit together, an address that
-        cannot be, two buses on one port, and an emergency stop that a device does not have.
+        cannot be, two buses on one port, an id that no device has, and an emergency stop or an end that it cannot have.
         """
         if not isinstance(machine, Machine):
             raise RequestError(
@@ -41,13 +43,15 @@ class Plan(NamedTuple):
                 expected="a motorbus.Machine",
                 advice="`load` opens the machine of a file; nothing was opened",
             )
-        check(machine)
+        with of_file(machine.file):
+            check(machine)
         names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
         if not names:
             raise RequestError("the machine has no axis", expected="a file with [axis.NAME]")
         buses = tuple(dict.fromkeys(machine.axes[name].bus for name in names))
-        _check_ports(machine, buses)
-        _check_estops(machine, buses)
+        with of_file(machine.file):
+            _check_ports(machine, buses)
+            _check_devices(machine, buses)
         return cls(machine, names, buses)
 
     def open(self, name: str, report: Callable[[object], None] | None) -> Bus:
@@ -85,9 +89,22 @@ class Plan(NamedTuple):
             yield name, spec, buses[spec.bus]
 
 
-def loaded(path: str | PathLike[str]) -> Machine:
-    """The machine of a file, with every address in it checked. Raises RequestError as `Machine.load`."""
-    return Machine.load(path, check_address=lambda address: prepare(address, {}))
+def loaded(file: str | PathLike[str]) -> Machine:
+    """The machine of a file, with every address, port and id in it checked. Raises RequestError as `Machine.load`."""
+    machine = Machine.load(file, check_address=_can_be_judged)
+    with of_file(machine.file):
+        _check_ports(machine, [name for name, bus in machine.buses.items() if _can_be_judged(bus.address)])
+        _check_devices(machine, machine.buses)
+    return machine
+
+
+def _can_be_judged(address: str) -> bool:
+    """False without python-can: whoever opens that bus is told so, and others can do without it."""
+    try:
+        lock_name(address, {})
+    except LinkError:
+        return False
+    return True
 
 
 def estop_options(machine: Machine, bus: str) -> dict[str, object]:
@@ -103,13 +120,27 @@ def estop_options(machine: Machine, bus: str) -> dict[str, object]:
     return {"estop_hold": "+".join([*([said] if said else []), *held])}
 
 
-def _check_estops(machine: Machine, buses: Iterable[str]) -> None:
-    """Raise RequestError for an axis whose device an emergency stop cannot stop as the file says."""
+def _check_devices(machine: Machine, buses: Iterable[str]) -> None:
+    """Raise RequestError for an axis on these buses whose device cannot be, or cannot stop or end as the file says."""
     for bus in buses:
-        family = families.load(parse_address(machine.buses[bus].address).family)
+        address = machine.buses[bus].address
+        family = families.load(parse_address(address).family)
         for name, axis in machine.axes.items():
-            if axis.bus == bus and axis.estop is not None and axis.estop not in family.link.stops:
-                raise _no_such_stop(name, axis, family.name, family.link.stops)
+            if axis.bus == bus:
+                device = _device(name, axis, address, family)
+                if axis.estop is not None and axis.estop not in family.link.stops:
+                    raise _no_such_stop(name, axis, family.name, family.link.stops)
+                if axis.exit == "torque_off" and not hasattr(device, "disable_torque"):
+                    raise _no_switch(name, axis, family.name)
+
+
+def _device(name: str, axis: AxisSpec, address: str, family: Family) -> object:
+    """The device of an axis, of which nothing is known yet; it needs no bus to check its id."""
+    try:
+        return family.devices.blocking(None, axis.node)
+    except RequestError as error:
+        advice = f"give the id of its device; `motorbus scan {address}` lists them"
+        raise refused(path("axis", name, "device"), error.summary, error.expected, advice) from None
 
 
 def _no_such_stop(name: str, axis: AxisSpec, family: str, stops: Iterable[str]) -> RequestError:
@@ -118,6 +149,16 @@ def _no_such_stop(name: str, axis: AxisSpec, family: str, stops: Iterable[str]) 
         expected=" or ".join(f'"{one}"' for one in stops) or "no such key: it has one kind of stop",
         cause="its protocol has no order for that",
         advice="take estop out of the file; nothing was opened",
+        node=axis.node,
+    )
+
+
+def _no_switch(name: str, axis: AxisSpec, family: str) -> RequestError:
+    return RequestError(
+        f"axis.{name}.exit: {axis.device} ({family}) does not have a switch for its torque",
+        expected='"hold", "park" or "leave"',
+        cause="its protocol has no order for that",
+        advice='write exit = "hold"; nothing was opened',
         node=axis.node,
     )
 

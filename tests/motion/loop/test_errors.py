@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.motion.loop.errors import as_number, check_loop, not_ahead, silence, stopped
+from motorbus.motion.loop.errors import as_number, check_loop, never_ahead, not_ahead, silence, stopped
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, nan, inf])
@@ -35,6 +35,12 @@ def test_what_is_no_number_is_no_goal(goal: object) -> None:
 def test_where_no_loop_can_be_ahead_it_is_told_why() -> None:
     assert "these are on arm, can: each bus waits for itself" in str(not_ahead(["arm", "can"]))
     assert "these are on can: there the answers of several are awaited at once" in str(not_ahead(["can"]))
+
+
+def test_on_an_event_loop_none_can_be_ahead() -> None:
+    told = never_ahead()
+    assert "AsyncRobot" in told.summary
+    assert "use a Robot" in told.advice
 
 
 def test_who_was_stopped_and_who_is_silent_is_named() -> None:

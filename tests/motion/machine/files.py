@@ -164,6 +164,31 @@ BROKEN = (
     Broken('"30 mm"', '"30 deg"', "pose.ready.slide: length '30 deg' has the unit", "leave travel out", False),
 )  # fmt: skip
 
+FEETECH, KST = "feetech:/dev/ttyACM0,baud=1000000", "kst:can://slcan/dev/ttyACM1,bitrate=500000"
+UNOPENABLE = (
+    # read without a fault; whoever knows the families sees before anything is opened that it cannot be
+    Broken(FEETECH, "feetech:sim,bauds=3", "bus.arm.address: 'feetech:sim,bauds=3': unknown", "did you mean baud?"),
+    Broken(FEETECH, "feetech:sim,id=1", "bus.arm.address: 'feetech:sim,id=1': unknown option 'id'", "mean ids?"),
+    Broken(FEETECH, "feetech:sim,colour=1", "bus.arm.address: 'feetech:sim,colour=1'", "take it out of the address"),
+    Broken("baud=1000000", "latncy=0", "bus.arm.address: 'feetech:/dev/ttyACM0,latncy=0'", "did you mean latency?"),
+    Broken("baud=1000000", "baud=fast", "bus.arm.address: baud=fast: not a rate", "bit/s, as 500000"),
+    Broken("baud=1000000", "latency=x", "bus.arm.address: latency=x: time 'x' is not", "change it in the address"),
+    Broken("baud=1000000", "sleep=1", "bus.arm.address: sleep=1: neither yes nor no", "yes or no"),
+    Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
+    Broken("bitrate=500000", "window=0", "bus.gimbal.address: window=0: not a number", "1 to 127"),
+    Broken("feetech:/dev", "fetech:/dev", "bus.arm.address: there is no family 'fetech'", "one of feetech, kst"),
+    Broken("slcan/dev", "slcn/dev", "bus.gimbal.address: 'can://slcn/dev/ttyACM1'", "did you mean slcan?"),
+    Broken(KST, "kst:/dev/ttyACM0", "bus.gimbal.address: /dev/ttyACM0 is the port of bus.arm too", "one bus"),
+    Broken("ttyACM1", "ttyACM0", "bus.gimbal.address: /dev/ttyACM0 is the port of bus.arm too", "a port for each"),
+    # devices
+    Broken("arm#2", "arm#254", "axis.elbow.device: 254 is not the id of a servo", "0 to 253"),
+    Broken("arm#2", "arm#300", "axis.elbow.device: 300 is not the id of a servo", f"`motorbus scan {FEETECH}`"),
+    Broken("#0x25", "#200", "axis.slide.device: 200 is not the id of a servo", "1 to 127"),
+    Broken("#0x25", "#0", "axis.slide.device: 0 is not the id of a servo", "0 addresses everyone"),
+    Broken('low = "0 mm"', 'estop = "torque_off"\nlow = "0 mm"', "axis.slide.estop: an emergency", "take estop out"),
+    Broken('low = "0 mm"', 'exit = "torque_off"\nlow = "0 mm"', "axis.slide.exit: gimbal#0x25 (kst)", 'exit = "hold"'),
+)  # fmt: skip
+
 
 def axis(**other: Any) -> AxisSpec:
     """A plain axis that turns, where nothing else is said."""

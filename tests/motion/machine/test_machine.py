@@ -60,6 +60,7 @@ def test_it_is_loaded_from_a_file(tmp_path: Path) -> None:
     file = tmp_path / "motorbus.toml"
     file.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
     assert Machine.load(file) == MACHINE
+    assert (Machine.load(file).file, MACHINE.file) == (str(file), "")
     assert source(str(file)).count("\r\n") == GOOD.count("\n")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.motion.machine.refusal import listed, nearest, path, refused, said
+from motorbus.motion.machine.refusal import listed, nearest, path, refused, said, to_do
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,21 @@ def test_a_refusal_says_where_what_and_what_to_do() -> None:
     error = refused("axis.a", "is missing", "a table", "add it")
     assert str(error) == ("axis.a: is missing\n  expected: a table\n  what to do: add it; nothing was opened")
     assert refused("", "the file is odd", "TOML", "x").summary == "the file is odd"
+
+
+@pytest.mark.parametrize(
+    ("advice", "told"),
+    [
+        ("see to that", "see to that; nothing was opened"),
+        ("see to that; nothing was sent", "see to that; nothing was opened"),
+        ("see to that; or leave it; nothing was opened", "see to that; or leave it; nothing was opened"),
+        ("nothing was sent", "change it; nothing was opened"),
+        ("", "change it; nothing was opened"),
+    ],
+)
+def test_what_was_not_done_is_said_once_and_what_to_do_always(advice: str, told: str) -> None:
+    assert refused("bus.arm.address", "no", "yes", advice).advice == told
+
+
+def test_where_nothing_is_to_be_done_something_else_may_be_said() -> None:
+    assert to_do("nothing was opened", "turn back") == "turn back"

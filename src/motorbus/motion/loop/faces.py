@@ -37,7 +37,7 @@ from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.ahead import RoundsAhead
-from motorbus.motion.loop.errors import not_ahead
+from motorbus.motion.loop.errors import never_ahead, not_ahead
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
@@ -253,8 +253,11 @@ def awaiting_loop(
     jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
+    ahead: bool = False,
 ) -> AsyncLoop:
-    """The same for an `async with` and an `async for` in it; see `blocking_loop`."""
+    """The same for an `async with` and an `async for` in it; see `blocking_loop`. None of these can be `ahead`."""
+    if ahead:
+        raise never_ahead()
     how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
     return AsyncLoop(robot, robot.conductor, rate, axes, **how)
 

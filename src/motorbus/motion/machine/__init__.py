@@ -21,18 +21,23 @@ from motorbus.motion.machine import reading, writing
 from motorbus.motion.machine.edits import edited, renamed
 from motorbus.motion.machine.model import FORMAT, AxisSpec, BusSpec, Description, GroupSpec
 from motorbus.motion.machine.reading import CheckAddress
-from motorbus.motion.machine.refusal import listed, nearest
+from motorbus.motion.machine.refusal import listed, nearest, of_file
 from motorbus.motion.machine.schema import schema
 
 NAME: Final = "motorbus.toml"
 """What the file is called where nobody says otherwise."""
 
 
-class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
     """A machine: `name`, and by their names `buses`, `axes`, `groups` and `poses`, in the order of the file.
 
     One that was read fits together; one that is made of parts by hand is judged by `text`.
     """
+
+    @property
+    def file(self) -> str:
+        """The path that it was loaded from, "" where there is none; machines that differ in it only are equal."""
+        return str(self.__dict__.get("file", ""))
 
     # -- from what it is made ----------------------------------------------------------------------------------------
 
@@ -48,12 +53,10 @@ class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True
     @classmethod
     def load(cls, path: str | PathLike[str], *, check_address: CheckAddress | None = None) -> Machine:
         """From a file. Raises RequestError, beginning with its path, when it cannot be read or for what it says."""
-        try:
-            return cls.parse(source(path), check_address=check_address)
-        except RequestError as error:
-            error.summary = f"{path}: {error.summary}"
-            error.args = (error.summary,)
-            raise
+        with of_file(path):
+            found = cls.parse(source(path), check_address=check_address)
+        found.__dict__["file"] = str(path)
+        return found
 
     # -- what it becomes -----------------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from motorbus.motion.machine import keys
 from motorbus.motion.machine.agreement import check, no_axis
 from motorbus.motion.machine.keys import Key
 from motorbus.motion.machine.model import FORMAT, NAME, AxisSpec, BusSpec, Description, GroupSpec
-from motorbus.motion.machine.refusal import listed, nearest, path, refused, said
+from motorbus.motion.machine.refusal import listed, nearest, path, refused, said, to_do
 
 CheckAddress: TypeAlias = Callable[[str], object]
 LONGEST: Final = 1 << 20
@@ -132,7 +132,8 @@ def _bus(name: str, table: Mapping[str, Any], check_address: CheckAddress | None
             check_address(address)
         except RequestError as error:
             where = path("bus", name, "address")
-            raise refused(where, error.summary, error.expected, error.advice) from None
+            advice = to_do(error.advice, "change it in the address")
+            raise refused(where, error.summary, error.expected, advice) from None
     return BusSpec(address=address)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
+from os import PathLike
 from typing import Any
 
 from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 
 _BARE = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_NOTHING = ("nothing was sent", "nothing was opened")
 _KINDS = {dict: "a table", list: "a list", bool: "true or false", str: "text"}
 
 
@@ -22,7 +25,24 @@ def path(*keys: str) -> str:
 def refused(where: str, what: str, expected: str, advice: str) -> RequestError:
     """The error for what stands at `where`; `advice` is what to do about it."""
     summary = f"{where}: {what}" if where else what
-    return RequestError(summary, expected=expected, advice=f"{advice}; nothing was opened")
+    return RequestError(summary, expected=expected, advice=f"{to_do(advice)}; nothing was opened")
+
+
+def to_do(advice: str, otherwise: str = "change it") -> str:
+    """What an advice says is to be done, without what was not done; `otherwise` where that is all it says."""
+    return "; ".join(part for part in advice.split("; ") if part not in ("", *_NOTHING)) or otherwise
+
+
+@contextmanager
+def of_file(file: str | PathLike[str]) -> Iterator[None]:
+    """Within it, what a machine is refused for begins with the path of its file; "" where it is of none."""
+    try:
+        yield
+    except RequestError as error:
+        if str(file) and not error.summary.startswith(f"{file}: "):
+            error.summary = f"{file}: {error.summary}"
+            error.args = (error.summary,)
+        raise
 
 
 def said(value: Any) -> str:
