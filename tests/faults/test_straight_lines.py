@@ -17,6 +17,7 @@ from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from tests.bus.struck import Landings
 from tests.conftest import Figures, Rounds
+from tests.faults.off import are_off
 from tests.faults.single import tried_again
 from tests.faults.straight import GROUP, KEPT, StraightRig
 from tests.faults.test_lines import Doubled
@@ -145,8 +146,10 @@ def test_l7_what_comes_before_the_question_behind_an_order_can_be_answered_is_no
     )
     order = rig.order([float(rig.row.to_value(place)) for place in places])
     came = rig.link.now() + later * 1e-6
-    heapq.heappush(rig.link._under_way, (came, -1, Side.HOST, b"".join(packets)))
+    if not are_off():
+        heapq.heappush(rig.link._under_way, (came, -1, Side.HOST, b"".join(packets)))
     _, told = rig.bus.volley(order, rig.positions)
+    assert [rig.bus.statistics.nodes[node].errors["early"] for node in GROUP] == [1, 1, 1], "it was not heard"
     assert [rig.row.to_raw(angle) for angle in told.values.values()] == places
 
 
