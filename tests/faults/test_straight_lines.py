@@ -74,7 +74,7 @@ def test_l7_a_copy_of_an_answer_is_not_taken_for_the_next_one_on_the_straight_wa
     rounds: Rounds, figures: Figures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A single reading takes turns with its other form, and each copy is as long as the answer before."""
-    seed, landings, total = 5, Landings(monkeypatch), rounds(100_000, 2_000)
+    seed, landings, total = 5, Landings(monkeypatch), rounds(100_000)
     line = Doubled(seed, 0.001)
     rig = StraightRig(line)
     good = sum(try_("position()", rig) for _ in range(total))
@@ -108,7 +108,7 @@ def test_l7_what_comes_sooner_than_its_bits_can_travel_answers_an_older_question
     name: str, rounds: Rounds, figures: Figures, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The copy of a whole train looks just like the next one: on a line that takes its time it is too soon."""
-    seed, landings, total = 6, Landings(monkeypatch), rounds(100_000, 800)
+    seed, landings, total = 6, Landings(monkeypatch), rounds(100_000)
     rig, kind = StraightRig(options={"pace": True}), KEPT[name]
     request = kind.kept(rig).request
     assert isinstance(request, bytes)
