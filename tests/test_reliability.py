@@ -5,12 +5,11 @@ from __future__ import annotations
 import ast
 import json
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from scripts import reliability, soaked
+from scripts import reliability, soaked, tests_told
 from scripts.fault_rows import ROWS
 
 COMMIT = soaked.commit
@@ -153,7 +152,7 @@ def test_a_file_that_differs_is_a_plus_but_not_what_a_long_run_writes(
 
 
 def test_every_kind_of_fault_has_its_tests() -> None:
-    found = reliability.tests_of_rows()
+    found = tests_told.of_rows()
     assert [row for row in ROWS if row not in found] == []
     assert [row for row in found if row not in ROWS] == []
 
@@ -162,33 +161,14 @@ def test_the_rows_are_those_of_the_matrix() -> None:
     assert list(ROWS) == [*(f"L{n}" for n in range(1, 19)), *(f"D{n}" for n in range(1, 16))]
 
 
-def telling() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
-    """Every test that tells figures, with its name."""
-    for file in sorted(reliability.TESTS.rglob("test_*.py")):
-        text = file.read_text("utf-8")
-        if "figures" not in text:
-            continue
-        found = [
-            one
-            for one in ast.walk(ast.parse(text))
-            if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef) and one.name.startswith("test_")
-        ]
-        for one in found:
-            if "figures" in taken(one):
-                yield f"{file.relative_to(soaked.ROOT)}::{one.name}", one
-
-
-def taken(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
-    return {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
-
-
 def test_whoever_tells_figures_is_in_the_long_runs_which_bring_them_to_the_page() -> None:
-    told = dict(telling())
+    told = dict(tests_told.telling())
     assert len(told) > 40
     never = [
         name
         for name, one in told.items()
-        if "rounds" not in taken(one) and not any("soak" in ast.unparse(mark) for mark in one.decorator_list)
+        if "rounds" not in tests_told.taken(one)
+        and not any("soak" in ast.unparse(mark) for mark in one.decorator_list)
     ]
     assert never == []
 
@@ -196,10 +176,82 @@ def test_whoever_tells_figures_is_in_the_long_runs_which_bring_them_to_the_page(
 def test_a_figure_that_is_0_was_counted() -> None:
     zeros = [
         f"{name}: {word.arg}"
-        for name, one in telling()
+        for name, one in tests_told.telling()
         for call in ast.walk(one)
         if isinstance(call, ast.Call) and ast.unparse(call.func) == "figures"
         for word in call.keywords
         if word.arg != "promise" and isinstance(word.value, ast.Constant) and word.value.value == 0
     ]
     assert zeros == []
+
+
+def test_a_test_that_names_several_rows_stands_under_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources(tmp_path, monkeypatch, "def test_l3_l4_two(): ...\n", "async def test_l15_d15_frozen(): ...\n")
+    assert tests_told.of_rows() == {
+        "L3": ["tests/test_0.py::test_l3_l4_two"],
+        "L4": ["tests/test_0.py::test_l3_l4_two"],
+        "L15": ["tests/test_1.py::test_l15_d15_frozen"],
+        "D15": ["tests/test_1.py::test_l15_d15_frozen"],
+    }
+
+
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *texts: str) -> None:
+    """The tests are these for once."""
+    monkeypatch.setattr(soaked, "ROOT", tmp_path)
+    monkeypatch.setattr(tests_told, "TESTS", tmp_path / "tests")
+    (tmp_path / "tests").mkdir()
+    for number, text in enumerate(texts):
+        (tmp_path / "tests" / f"test_{number}.py").write_text(text, "utf-8")
+
+
+def test_a_long_run_without_figures_is_seen_to_be_absent(
+    apart: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources(apart, monkeypatch, "def test_a(rounds, figures): ...\ndef test_b(rounds, figures): ...\n")
+    soaked.record("A", test="tests/test_0.py::test_a[1]", wrong=0)
+    page = written(monkeypatch, "--take")
+    part = page[page.index("## Not measured at length yet") : page.index("## What may pass")]
+    assert "Of these 1 long runs" in part
+    assert "| `tests/test_0.py::test_b` |" in part
+    assert "test_a" not in part
+    soaked.record("B", test="tests/test_0.py::test_b", wrong=0)
+    assert "None: every long run has figures" in written(monkeypatch, "--take")
+
+
+def test_whoever_needs_no_fault_is_on_the_page_with_the_reason(
+    apart: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    some = '@pytest.mark.parametrize("a", [pytest.param(1, marks=pytest.mark.faultless("not lost")), 2])\n'
+    whole = '@pytest.mark.faultless("why one")\ndef test_one(): ...\n'
+    sources(
+        apart,
+        monkeypatch,
+        'pytestmark = pytest.mark.faultless("why all")\n',
+        f"{whole}{some}def test_two(a): ...",
+    )
+    part = written(monkeypatch).partition("## What may pass")[2]
+    assert "| why all | `tests/test_0.py` |" in part
+    assert "| why one | `tests/test_1.py::test_one` |" in part
+    assert "| not lost | `tests/test_1.py::test_two, some of its cases` |" in part
+    for name in (*tests_told.PROCESSES, *tests_told.NO_FAULTS):
+        assert f"`{name}" in part
+
+
+def test_every_mark_of_that_kind_is_found() -> None:
+    """As many as there are in the text: one that is put on in another way would be left out, and told nowhere."""
+    told = [one for why, left in tests_told.exempt().items() for one in left if why != tests_told.KILLED]
+    files = [file for file in tests_told.TESTS.rglob("test_*.py") if file != Path(__file__)]
+    marks = sum(file.read_text("utf-8").count("mark.faultless(") for file in files)
+    assert len(told) - len(tests_told.NO_FAULTS) == marks
+
+
+def test_a_deviation_is_told_with_its_figures(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for byte, neither in enumerate((12, 3)):
+        soaked.record(
+            f"D10 write cut, {byte}", family="stepper", promise=4, cuts=20_000, neither_but_told=neither
+        )
+    said = " ".join(written(monkeypatch, "--take").partition("## Promise 4")[2].partition("|")[0].split())
+    assert said.startswith("**One deviation from what was asked")
+    assert "is left neither old nor new after 15 of 40 000 cuts.**" in said

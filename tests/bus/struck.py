@@ -90,11 +90,15 @@ FAULTS = (
 
 
 class Struck(PerfectLine):
-    """A line that keeps what was written, and does the next fault to what comes back."""
+    """A line that keeps what was written, and does the next fault to what comes back.
+
+    `struck` counts the answers that did not come as they were sent.
+    """
 
     def __init__(self) -> None:
         self.sent: list[Data] = []
         self.fault = ""
+        self.struck = 0
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         if sender is Side.HOST:
@@ -104,7 +108,9 @@ class Struck(PerfectLine):
             return super().carry(sender, data, at) + heard
         assert isinstance(data, bytes)
         fault, self.fault = self.fault, ""
-        return [Delivery(at + later, Side.HOST, piece) for later, piece in struck(fault, data)]
+        pieces = struck(fault, data)
+        self.struck += pieces != [(0.0, data)]
+        return [Delivery(at + later, Side.HOST, piece) for later, piece in pieces]
 
 
 def kept(*nodes: int, longer: bool = False) -> Exchange[Any]:

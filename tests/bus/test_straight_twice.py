@@ -24,8 +24,8 @@ def is_free(bus: Bus) -> bool:
     return free
 
 
-def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list[str]]:
-    """What came of it, and what is wrong afterwards."""
+def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, int, list[str]]:
+    """What came of it, how many answers the line has struck, and what is wrong afterwards."""
     nodes, call = CALLS[what]
     bus, simulator, line, exchange = flown(nodes)
     line.fault = fault
@@ -33,11 +33,12 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list
     came = cut(lambda: call(bus, exchange), at, KeyboardInterrupt, later, Twice)
     wrong = [] if isinstance(came.error, KeyboardInterrupt) else [f"it ended with {came.error!r}"]
     if bus.relay.pumper is not None:
-        return came, [*wrong, "nobody else may pump any more"]
+        return came, line.struck, [*wrong, "nobody else may pump any more"]
     if not in_another_thread(lambda: is_free(bus)):
-        return came, [*wrong, "the lock is held"]
+        return came, line.struck, [*wrong, "the lock is held"]
     wrong += [f"{node} is believed" for node in unanswered(bus) if not bus.turns.trust.nodes[node].tainted]
     line.fault = line.fault if line.sent else ""
+    due = bool(fault) and bool(line.sent)  # an answer meets the fault, here or in what is asked now
     for node in nodes:
         simulator.memory[node][57] = 99
     value = in_another_thread(lambda: bus.run(exchange))
@@ -46,7 +47,9 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, list
         wrong.append(f"a wrong value: {value}")
     if bus.run(position(6)) != 6:
         wrong.append("another one is not read")
-    return came, wrong
+    if line.struck != due:
+        wrong.append(f"the line struck {line.struck} answers, and {int(due)} was due")
+    return came, line.struck, wrong
 
 
 @pytest.mark.timeout(1800)
@@ -60,18 +63,20 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
     line.fault = fault
     whole = cut(lambda: call(bus, exchange))
     assert whole.error is None
-    cuts, twice, wrong = 0, 0, list[str]()
+    cuts, twice, struck, wrong = 0, 0, 0, list[str]()
     most = rounds(NEVER, 12)
     for number, at in enumerate(places(whole.walked, 1, most)):
         for later in range(1, LATER) if most == NEVER else (1 + number * 7 % 23, 1 + number * 13 % LATER):
-            came, found = cut_twice(what, fault, at, later)
+            came, met, found = cut_twice(what, fault, at, later)
             assert came.where is not None
             cuts += 1
             twice += came.again is not None
+            struck += met
             wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
     figures(
         f"L17 interrupted twice: {what}, {fault or 'no fault'}, the straight way",
-        family="feetech", cuts=cuts, twice=twice, wrong=len(wrong),
+        family="feetech", cuts=cuts, twice=twice, struck=struck, wrong=len(wrong),
     )  # fmt: skip
     assert wrong == []
-    assert twice >= cuts / 3  # the others were over by then
+    assert twice >= cuts / 3 > 0  # the others were over by then
+    assert (struck > 0) is bool(fault)

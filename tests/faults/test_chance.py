@@ -99,7 +99,7 @@ def damaged(what: str, total: int, expected: float) -> Ledger:
 @pytest.mark.timeout(7200)
 def test_l3_one_byte_in_a_hundred_is_another_one(rounds: Rounds, figures: Figures) -> None:
     """Expected are 2.2 wrong positions in 10^6 reads."""
-    total = rounds(1_000_000, 2_000)
+    total = rounds(1_000_000)
     expected = mean(lambda reply: expected_of_bytes(len(reply), WORD, SHARE))
     assert 2.1 < expected * 1e6 < 2.3
     ledger = damaged("corrupt", total, expected)
@@ -113,7 +113,7 @@ def test_l3_one_byte_in_a_hundred_is_another_one(rounds: Rounds, figures: Figure
 @pytest.mark.timeout(7200)
 def test_l4_one_bit_in_eight_hundred_is_turned(rounds: Rounds, figures: Figures) -> None:
     """Expected are about 37 wrong positions in 10^6 reads."""
-    total = rounds(1_000_000, 2_000)
+    total = rounds(1_000_000)
     expected = mean(lambda reply: expected_of_bits(reply, WORD, SHARE))
     ledger = damaged("flip", total, expected)
     assert ledger.wrong <= 57
@@ -157,7 +157,7 @@ def test_l3_l4_confirmed_nothing_is_wrong(row: str, what: str, rounds: Rounds, f
 @pytest.mark.parametrize("family", ["feetech", "kst"])
 def test_l7_late_replies_give_no_stale_value(family: str, rounds: Rounds, figures: Figures) -> None:
     """1 % late by up to half a second, and all behind it held up; every read has another right answer."""
-    total = rounds(1_000_000, 2_000)
+    total = rounds(1_000_000)
     rig: Rig | KstRig = Rig(ids=(1,)) if family == "feetech" else KstRig()
     ledger = Ledger(rig, "seed 7; 1% of packets to host: delay 0.001-0.5")
     for _ in range(total):

@@ -29,7 +29,7 @@ def try_(exchange: Callable[[Rig], None], rig: Rig) -> bool:
 def test_l7_replies_that_are_overtaken_within_the_quiet_time_are_not_stale_either(
     rounds: Rounds,
 ) -> None:
-    total = rounds(100_000, 3_000)
+    total = rounds(100_000)
     rig = Rig(NoisyLine(8, late=0.01, late_by=(0.001, 0.04), overtake=True))
     assert isinstance(rig.line, NoisyLine)
     good = sum(try_(read_word, rig) for _ in range(total))
@@ -42,7 +42,7 @@ def test_l7_replies_overtaken_by_more_than_that_are_the_known_limit(rounds: Roun
 
     The probe is a barrier only where nothing is overtaken. This measures what is left where that does not hold.
     """
-    total = rounds(100_000, 3_000)
+    total = rounds(100_000)
     rig = Rig(NoisyLine(7, late=0.01, late_by=(0.05, 0.5), overtake=True))
     assert isinstance(rig.line, NoisyLine)
     stale = good = 0
@@ -93,7 +93,7 @@ class Doubled:
 
 def test_a_reply_that_comes_twice_is_believed_once(rounds: Rounds) -> None:
     """The copy reaches a host that already waits for the next answer, which looks just like it but for its length."""
-    total = rounds(100_000, 3_000)
+    total = rounds(100_000)
     line = Doubled(5, 0.001)
     rig = Rig(line)
     good = sum(try_(read_word, rig) for _ in range(total))

@@ -2,9 +2,8 @@
 
 All of them are run once more, in a process of its own, where no line, no plug, no supply and no interruption does any
 harm; whatever passes there proves nothing and has to say why it may, by the mark `faultless`. Those that are named by
-a row and stand with what they try are among them. Left out are three files, `link/test_lock.py`,
-`motion/safety/test_killed.py` and `session/test_attended_frozen.py`: they kill or stop a process of the system, and
-look what became of that very process.
+a row and stand with what they try are among them. What is left out stands with its reason in
+`scripts/tests_told.py`, and so on the page docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -17,24 +16,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from scripts import reliability
+from scripts import tests_told
 from tests.conftest import Figures
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 OTHERS = ("tests/families/stepper/test_faults.py", "tests/families/stepper/test_single_faults.py")
 """Tests of faults that stand with their family, and have no row in their names."""
-PROCESSES = (
-    "tests/link/test_lock.py",
-    "tests/motion/safety/test_killed.py",
-    "tests/session/test_attended_frozen.py",
-)
-NO_FAULTS = {
-    "D8": "somebody asks for what is refused",
-    "D9": "the same is written again",
-    "D12": "a bus runs at another rate",
-}
-"""Rows in which nothing breaks. Those of their tests that stand among the tests of faults are judged all the same."""
 USUAL = 3
 """Every so many-th file is judged with every commit, and all of them in the long runs."""
 
@@ -47,10 +35,14 @@ def judged() -> list[str]:
 
 def elsewhere() -> Iterator[str]:
     """Those outside this folder that are named by a row."""
-    for row, tests in reliability.tests_of_rows().items():
+    for row, tests in tests_told.of_rows().items():
         for test in tests:
             file = test.partition("::")[0]
-            if not file.startswith("tests/faults/") and row not in NO_FAULTS and file not in PROCESSES:
+            if (
+                not file.startswith("tests/faults/")
+                and row not in tests_told.NO_FAULTS
+                and file not in tests_told.PROCESSES
+            ):
                 yield test
 
 
@@ -89,7 +81,7 @@ def test_no_test_of_a_fault_passes_without_its_fault(every: int, tmp_path: Path,
 @pytest.mark.faultless("it is about which are judged")
 def test_what_is_left_out_is_there() -> None:
     """A file that has gone, or a row that has no test, is no reason."""
-    rows = reliability.tests_of_rows()
+    rows = tests_told.of_rows()
     files = {test.partition("::")[0] for tests in rows.values() for test in tests}
-    assert files >= set(PROCESSES)
-    assert rows.keys() >= NO_FAULTS.keys()
+    assert files >= set(tests_told.PROCESSES)
+    assert rows.keys() >= tests_told.NO_FAULTS.keys()
