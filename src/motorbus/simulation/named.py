@@ -23,6 +23,7 @@ from motorbus.simulation.faults import Fault, FaultyLine, Script, World
 from motorbus.simulation.faults.script import requested
 from motorbus.simulation.faults.struck import is_calm, on_a_wire, without_adapter
 from motorbus.simulation.served import LinkClient, Served, check_harmless, join
+from motorbus.simulation.told import told
 
 Faults: TypeAlias = str | Script | Iterable[Fault]
 KNOCK: Final = 0.1
@@ -165,8 +166,10 @@ class Simulation:
         try:
             return self.simulator.nodes[node]
         except KeyError:
-            ids = ", ".join(map(str, sorted(self.simulator.nodes)))
-            raise RequestError(f"{self.url} has no node {node}", expected=f"one of {ids}") from None
+            raise RequestError(
+                f"{self.url} has no node {told(self.simulator, [node])}",
+                expected=f"one of {told(self.simulator, self.simulator.nodes)}",
+            ) from None
 
     def link(self, rate: int | None = None) -> MemoryLink:
         """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
