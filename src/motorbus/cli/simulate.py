@@ -142,7 +142,7 @@ def simulate(
     found = families.load(family)
     if switches or faults == "help":
         return _list(found, output) if switches else faulty.listed(output)
-    script = faulty.from_option(faults)
+    script = _script(faults, can, found)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
@@ -150,8 +150,6 @@ def simulate(
     rate = asked or usual
     simulator.tune(rate)
     _scripted(simulator, inputs, family)
-    if script.faults and can and found.link.kind == "frames":
-        check_harmless(f"can://{can}", {})
     if usual != found.link.rate and found.link.kind == "bytes":
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
@@ -167,6 +165,14 @@ def simulate(
         _serve(mount, stop, faulted, None if quiet else output)
         _ended(output, faulted)
     return Exit.OK
+
+
+def _script(said: str | None, can: str, family: Family) -> Script:
+    """What is to go wrong. Raises RequestError for a bad script, and for any where real devices may be."""
+    script = faulty.from_option(said)
+    if script.faults and can and family.link.kind == "frames":
+        check_harmless(f"can://{can}", {})
+    return script
 
 
 def _faulted(mount: Mount, world: World, script: Script, controls: Iterable[ControlSocket]) -> Faulted:
