@@ -24,8 +24,12 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
     file.write_text("seed 3\n1%: drop  # now and then\n")
     assert from_option(str(file)) == from_option("seed 3; 1%: drop") == parse("seed 3; 1%: drop")
     assert len(from_option(None)) == 0
-    with pytest.raises(RequestError, match="neither a file nor a script"):
-        from_option("")  # as of a variable of a shell that is not set
+    for empty in ("", " \n"):  # as of a variable of a shell that is not set
+        with pytest.raises(RequestError, match="^--faults: the text is empty"):
+            from_option(empty)
+    for nothing in ("seed 1", "# exchange 1 drop", ";"):
+        with pytest.raises(RequestError, match="there is no fault in it"):
+            from_option(nothing)
     with pytest.raises(RequestError, match="neither a file nor a script"):
         from_option(str(tmp_path / "nothing"))
     for nothing in ("", "# nothing yet\n", "seed 3\n"):
@@ -133,6 +137,12 @@ def test_help_lists_every_word(run: Run) -> None:
         (("--faults", "exchange 1: unplug 1"), "no port here that could be pulled"),
         (("--faults", "exchange 1 on adapter: drop"), "text of an adapter"),
         (("--faults", "nothing-there"), "neither a file nor a script"),
+        (("--faults", ""), "the text is empty"),
+        (("--faults", "seed 1"), "'seed 1': there is no fault in it"),
+        (
+            ("--faults", "exchange 17 byte 3; drop"),
+            "'exchange 17 byte 3' is not a fault: it does not say what",
+        ),
         (("--faults", "# no fault: yet"), "there is no fault in it"),
         (("--faults", "exchange 1: clock-step 1e308"), "a year at most"),
         (("--faults", "at 1e300 s: unplug 1"), "a year of them at most"),

@@ -17,8 +17,10 @@ from typing import Any
 import pytest
 
 import motorbus
+from motorbus.cli.exits import Exit
 from motorbus.cli.simulated import Simulated
 from motorbus.errors import LinkLost, MotorbusError, NoReply
+from tests.cli.conftest import Run
 from tests.interop.test_peers import SDK, Peer
 
 PATIENCE = 30.0
@@ -208,3 +210,82 @@ def test_the_vendors_own_library_on_a_line_that_does_harm(tmp_path: Path) -> Non
         assert sdk.read_word(1, 56) == 2048
         assert sdk.read(1, 5, 1) == [1]
         assert control.fired()[:3] == script.split("; ")[:3]
+
+
+# A CAN bus that others have.
+
+
+@pytest.mark.parametrize("bus", ["socketcan/can0", "slcan/dev/nothing", "socketcand/127.0.0.1:1/can0"])
+def test_faults_are_refused_on_a_can_bus_that_may_have_real_devices(
+    bus: str, run: Run, tmp_path: Path
+) -> None:
+    flags = ["--can", bus, "--link", str(tmp_path / "can"), "--control", str(tmp_path / "control")]
+    said = run("simulate", "kst", "--ids", "0x25", *flags, "--faults", "100%: echo")
+    assert said.code == Exit.USAGE
+    assert f"can://{bus}: faults are refused on a CAN bus that may have real devices" in said.err
+    for word in ("vcan0", "--link", "--socketcand"):
+        assert word in said.err
+    assert said.out == ""
+    assert list(tmp_path.iterdir()) == []  # nothing was opened or made
+
+
+def test_a_bus_of_programs_takes_faults() -> None:
+    with Simulated("kst", ids="0x25", can="virtual/here", faults="100%: echo") as simulated:
+        assert simulated.bus == "kst:can://virtual/here"
+
+
+def test_an_order_for_faults_is_refused_on_such_a_bus_and_it_goes_on(tmp_path: Path) -> None:
+    """The bus is another simulation behind an adapter: what is behind one, nobody can know."""
+    with (
+        Control() as control,
+        Simulated("kst", ids="0x26", link=tmp_path / "adapter", tcp="0") as real,
+        Simulated("kst", ids="0x25", can=f"slcan{tmp_path / 'adapter'}", control=control.path),
+        motorbus.open(real.buses[1]) as bus,
+    ):
+        said = control.order("faults 100%: echo")
+        assert said.startswith(f"error: can://slcan{tmp_path / 'adapter'}: faults are refused")
+        assert control.order("faults off") == "ok"
+        assert control.facts()["script"] == ""
+        assert motorbus.kst.Servo(bus, 0x25).ping()
+        assert motorbus.kst.Servo(bus, 0x26).ping()
+
+
+# A stepper, whose line has one device and no check sum.
+
+
+@pytest.mark.parametrize("way", ["link", "tcp"])
+def test_a_stepper_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
+    ways: dict[str, Any] = {"link": tmp_path / "stepper"} if way == "link" else {"tcp": "0"}
+    with (
+        Control() as control,
+        Simulated("stepper", faults="exchange 1: split 0.001", control=control.path, **ways) as simulated,
+        motorbus.open(simulated.bus) as bus,
+    ):
+        stepper = motorbus.stepper.Controller(bus)
+        assert stepper.read_input(1) is False
+        assert control.fired() == ["exchange 1: split 0.001"]
+        assert control.order("faults 100%: truncate") == "ok"
+        with pytest.raises(MotorbusError):
+            stepper.read_input(1)
+        assert control.facts()["count"] >= 1
+        assert control.order("faults 100% to device: drop") == "ok"
+        assert not stepper.ping()
+        assert control.order("faults exchange 1: duplicate-id 1").startswith("error: fault exchange 1")
+        assert not stepper.ping()  # what was set goes on
+        assert control.order("faults off") == "ok"
+        assert stepper.read_input(1) is False
+
+
+def test_a_stepper_that_loses_its_power_lets_go_of_its_outputs() -> None:
+    with (
+        Control() as control,
+        Simulated("stepper", tcp="0", control=control.path) as simulated,
+        motorbus.open(simulated.bus) as bus,
+    ):
+        stepper = motorbus.stepper.Controller(bus)
+        stepper.set_output(1, True)
+        assert json.loads(control.order("status"))["nodes"][0]["outputs"] == [True, False, False]
+        assert control.order("faults exchange 1: power-cycle 1") == "ok"
+        stepper.ping()
+        assert control.fired() == ["exchange 1: power-cycle 1"]
+        assert json.loads(control.order("status"))["nodes"][0]["outputs"] == [False, False, False]

@@ -190,3 +190,29 @@ def test_options_of_a_back_end_that_cannot_be_looked_at_are_passed_on() -> None:
 def test_numbers_are_numbers() -> None:
     assert config("can://kvaser/0").channel == 0
     assert os.sep not in str(config("can://virtual/7").channel)
+
+
+@pytest.mark.parametrize(
+    ("port", "free"),
+    [
+        ("can://virtual/bench", True),
+        ("can://udp_multicast/239.74.163.2", True),
+        ("can://socketcan/vcan0", True),
+        ("can://SocketCAN/vxcan1", True),
+        ("can://socketcan/can0", False),
+        ("can://socketcan/slcan0", False),
+        ("can://socketcan/can0vcan", False),
+        ("can://slcan/dev/ttyACM0", False),
+        ("can://slcan/vcan0", False),
+        ("can://socketcand/localhost/vcan0", False),
+        ("can://pcan/PCAN_USBBUS1", False),
+    ],
+)
+def test_what_is_made_of_programs_alone(port: str, free: bool) -> None:
+    assert config(port).no_wire is free
+
+
+def test_a_wire_that_only_the_environment_names_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CAN_INTERFACE", "socketcan")
+    monkeypatch.setenv("CAN_CHANNEL", "can0")
+    assert not config("can://").no_wire

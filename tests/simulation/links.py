@@ -19,9 +19,17 @@ class QueueLink:
     paced = virtual = simulated = False
     warnings: tuple[str, ...] = ()
 
-    def __init__(self, *, descriptor: bool = False, name: str = "can://queue/0", rate: int = 500_000) -> None:
+    def __init__(
+        self,
+        *,
+        descriptor: bool = False,
+        name: str = "can://queue/0",
+        rate: int = 500_000,
+        no_wire: bool = True,
+    ) -> None:
         self.name = name
         self.rate = rate
+        self.no_wire = no_wire
         self.closed = False
         self.is_lost = False
         self.is_full = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from motorbus.core.family import SimulatedNode
+from motorbus.core.frame import Audience
 from motorbus.core.operation import CanFrame, Data
 
 ANSWER = 0x80
@@ -13,7 +14,10 @@ THINKS = 0.0002
 
 
 class Parrots:
-    """Answers what it hears at its own rate, `thinks` seconds later. `heard` is what that was, with the moments."""
+    """Answers what it hears at its own rate, `thinks` seconds later. `heard` is what that was, with the moments.
+
+    All is for them but what is in `others`, and for everyone what is in `calls`.
+    """
 
     def __init__(self, rate: int = 500_000, *, thinks: float = THINKS) -> None:
         self.rate = rate
@@ -22,6 +26,14 @@ class Parrots:
         self.heard: list[tuple[float, Data]] = []
         self.saying: list[tuple[float, CanFrame]] = []
         self.poked = 0
+        self.others: set[int] = set()
+        self.calls: set[int] = set()
+
+    def audience(self, data: Data) -> Audience:
+        assert isinstance(data, CanFrame)
+        if data.id in self.others:
+            return Audience.NOBODY
+        return Audience.EVERYONE if data.id in self.calls else Audience.OURS
 
     @property
     def nodes(self) -> Mapping[int, SimulatedNode]:

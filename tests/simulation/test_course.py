@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
 
 from motorbus.core.can_bits import bits
@@ -10,6 +12,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.link.memory import NoisyLine
 from motorbus.simulation.course import AHEAD, BACKLOG, HASTE, PIECE, Course
+from motorbus.simulation.faults import FaultyLine
 from tests.simulation.parrots import ANSWER, THINKS, Parrots
 
 RATE = 100_000
@@ -207,3 +210,61 @@ def test_frames_are_not_given_early_for_others_see_them_too() -> None:
     end = 1.0 + bits(FRAME) / RATE
     assert course.next() == pytest.approx(end)
     assert told(course, end - 1e-6) == []
+
+
+OTHERS = CanFrame(0x626, bytes(8))
+CALL = CanFrame(0x600, bytes(8))
+
+
+def shared(script: str) -> tuple[Parrots, Course, FaultyLine]:
+    """Devices on a bus that others share, with this going wrong, and answers that take a moment."""
+    bus, line = Parrots(thinks=1.0), FaultyLine(script)
+    bus.others, bus.calls = {OTHERS.id}, {CALL.id}
+    return bus, Course(bus, line=line, shared=True), line
+
+
+@pytest.mark.parametrize(
+    "harm", ["drop", "duplicate", "flip", "corrupt", "truncate", "delay 0.5", "stall 0.5", "reorder", "merge"]
+)
+def test_what_is_for_others_on_a_shared_bus_passes_unharmed_and_is_no_exchange(harm: str) -> None:
+    bus, course, line = shared(f"100% to device: {harm}")
+    course.hear(OTHERS, 1.0, "me")
+    assert told(course, 1.5) == [(1.0, OTHERS, "me")]
+    assert bus.heard == [(1.0, OTHERS)]
+    assert (line.exchange, line.count) == (0, 0)
+    course.hear(FRAME, 1.6, "me")
+    assert (line.exchange, line.count) == (1, 1)
+
+
+def test_an_echo_on_a_shared_bus_is_of_what_is_for_these_devices_only() -> None:
+    _, course, line = shared("100%: echo")
+    for frame in (OTHERS, CALL, FRAME):
+        course.hear(frame, 1.0, "me")
+    assert Counter(told(course, 1.0)) == Counter(
+        [(1.0, OTHERS, "me"), (1.0, CALL, "me"), (1.0, FRAME, "me"), (1.0, FRAME, None)]
+    )
+    assert line.exchange == 2
+
+
+@pytest.mark.parametrize(("harm", "heard"), [("drop", 0), ("duplicate", 2), ("corrupt", 0)])
+def test_of_what_is_for_everyone_only_these_devices_get_less_or_more(harm: str, heard: int) -> None:
+    bus, course, line = shared(f"exchange 1 to device: {harm}")
+    course.hear(CALL, 1.0, "me")
+    assert told(course, 1.5) == [(1.0, CALL, "me")]
+    assert bus.heard == [(1.0, CALL)] * heard
+    assert (line.exchange, line.count) == (1, 1)
+
+
+def test_what_is_said_by_these_devices_on_a_shared_bus_suffers() -> None:
+    bus, course, _ = shared("exchange 0: duplicate")
+    bus.say(REPLY, 1.0)
+    assert told(course, 1.0) == [(1.0, REPLY, None)] * 2
+
+
+def test_devices_that_cannot_tell_what_is_theirs_leave_a_shared_bus_alone() -> None:
+    class Mute(Parrots):
+        audience = None  # type: ignore[assignment]  # as of one that has no such method
+
+    course = Course(Mute(), line=FaultyLine("100% to device: drop"), shared=True)
+    course.hear(FRAME, 1.0, "me")
+    assert told(course, 1.0)[0] == (1.0, FRAME, "me")

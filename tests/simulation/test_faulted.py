@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from motorbus import families
+from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
@@ -22,6 +23,8 @@ from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, NEWS, TOLD, Fa
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
+from motorbus.simulation.served import LinkClient
+from tests.simulation.links import QueueLink
 from tests.simulation.served import PATIENCE, asked, received, served
 
 PING, PONG = "FF FF 01 02 01 FB", "FF FF 01 02 00 FC"
@@ -355,3 +358,23 @@ def test_a_script_that_is_too_long_for_a_flag_is_told_once() -> None:
         assert (facts["script"], facts["again"]) == (fits + "; exchange 99999: drop", IN_A_FILE)
         assert len(hall.faulted.replay()) < 200
         assert hall.faulted.replay().endswith(f"; the same again: {IN_A_FILE}")
+
+
+def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
+    link = QueueLink(no_wire=False, name="can://socketcan/can0")
+    hall = Hall(LinkClient(link), "kst")
+    line = hall.mount.line
+    for script in ("1%: drop", "at 1 s: power-cycle 1", "exchange 1 on adapter: drop"):
+        with pytest.raises(RequestError, match="can://socketcan/can0: faults are refused"):
+            read_order(hall.faulted, script)
+    assert hall.mount.line is line
+    assert not hall.faulted.used
+    assert read_order(hall.faulted, "off") is None
+
+
+def test_faults_are_taken_on_a_bus_of_programs() -> None:
+    hall = Hall(LinkClient(QueueLink()), "kst")
+    hall.faulted.set("exchange 1 to device: drop")
+    hall.mount.course.hear(CanFrame(0x602, bytes(8)), hall.clock())
+    hall.mount.course.hear(CanFrame(0x601, bytes(8)), hall.clock())
+    assert [one["fault"] for one in hall.faulted.facts()["fired"]] == ["exchange 1 to device: drop"]

@@ -6,8 +6,10 @@ import pytest
 
 import motorbus
 from motorbus import families
+from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.link.base import PerfectLine
+from motorbus.link.memory import NoisyLine
 from motorbus.simulation.faults import FaultyLine, parse
 from motorbus.simulation.named import KNOCK, Simulation
 from tests.simulation.links import QueueLink
@@ -124,3 +126,45 @@ def test_served_on_a_channel_it_suffers_and_cannot_be_pulled(monkeypatch: pytest
             sim.faults = "exchange 1: power-cycle 37"
             assert served.line is sim.faults
             assert served.simulator is not sim.simulator
+
+
+def test_a_bus_that_may_have_real_devices_suffers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+
+    def open_link(port: str, **options: object) -> QueueLink:
+        opened.append(port)
+        return QueueLink(name=port, no_wire=False)
+
+    monkeypatch.setattr("motorbus.link.can.CanLink", open_link)
+    real = "can://socketcan/can0"
+    with Simulation(families.load("kst"), (37,), faults="1%: drop") as sim:
+        for line in (sim.line, NoisyLine(1)):
+            sim.line = line
+            with pytest.raises(RequestError, match="can0: faults are refused on a CAN bus"):
+                sim.serve(real)
+        assert opened == []
+        sim.faults = ""
+        with sim.serve(real) as served:
+            with pytest.raises(RequestError, match="can0: faults are refused on a CAN bus"):
+                sim.faults = "1%: echo"
+            with pytest.raises(RequestError, match="can0: faults are refused on a CAN bus"):
+                sim.line = NoisyLine(1)
+            assert str(sim.faults) == ""
+            assert served.line is sim.line
+            sim.faults = ""
+
+
+def test_a_bus_that_others_share_keeps_what_is_theirs(monkeypatch: pytest.MonkeyPatch) -> None:
+    channel = QueueLink()
+    monkeypatch.setattr("motorbus.link.can.CanLink", lambda port, **options: channel)
+    asks = bytes.fromhex("40 02 60 00 00 00 00 00")
+    with (
+        Simulation(families.load("kst"), (37,), faults="100%: echo; 100%: duplicate") as sim,
+        sim.serve("can://virtual/here"),
+    ):
+        for id in (0x626, 0x5A6, 0x125, 0x625):
+            channel.arrive(CanFrame(id, asks))
+        said = [channel.next_sent() for _ in range(3)]
+        assert [frame.id for frame in said if isinstance(frame, CanFrame)] == [0x625, 0x5A5, 0x5A5]
+        assert sim.faults.exchange == 1
+    assert channel.nothing_sent()

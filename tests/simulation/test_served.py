@@ -13,7 +13,8 @@ from motorbus.errors import LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Line
 from motorbus.link.can import CanLink
 from motorbus.link.memory import NoisyLine
-from motorbus.simulation.served import LinkClient, Served, join
+from motorbus.simulation.faults import FaultyLine
+from motorbus.simulation.served import LinkClient, Served, check_harmless, join
 from tests.simulation.links import QueueLink
 from tests.simulation.parrots import ANSWER, Parrots
 
@@ -147,3 +148,41 @@ def test_a_bus_of_the_system_is_not_locked_by_its_devices(
     with pytest.raises(MotorbusError):  # there is no such interface
         CanLink("can://socketcan/nocan7", rate=500_000, shared=shared)
     assert bool(taken) is locked
+
+
+# On a bus that may have real devices.
+
+
+def test_a_line_that_does_harm_is_refused_where_devices_may_be_real() -> None:
+    link = QueueLink(no_wire=False, name="can://socketcan/can0")
+    with pytest.raises(RequestError, match="can://socketcan/can0: faults are refused"):
+        Served(Parrots(), LinkClient(link), line=FaultyLine("1%: drop"))
+    with Served(Parrots(), LinkClient(link)) as served:
+        before = served.line
+        for harmful in (NoisyLine(1), FaultyLine("1%: drop")):
+            with pytest.raises(RequestError, match="may have real devices; nothing was changed"):
+                served.line = harmful
+        assert served.line is before
+        served.line = FaultyLine()  # nothing goes wrong by that
+        link.arrive(FRAME)
+        assert link.next_sent() == REPLY
+
+
+def test_what_is_asked_before_a_channel_is_opened() -> None:
+    for there in ("can://virtual/here", "can://socketcan/vcan0"):
+        check_harmless(there, {})
+    for there in ("can://socketcan/can0", "can://slcan/dev/nothing"):
+        with pytest.raises(RequestError, match="faults are refused"):
+            check_harmless(there, {})
+    check_harmless("/dev/nothing", {})  # no channel: to join it is refused
+
+
+def test_what_is_for_others_is_not_repeated_on_their_bus() -> None:
+    bus, link = Parrots(), QueueLink()
+    bus.others = {0x626}
+    with Served(bus, LinkClient(link), line=FaultyLine("100%: echo")):
+        link.arrive(CanFrame(0x626, b"\1\2"))
+        link.arrive(FRAME)
+        answers = [link.next_sent() for _ in range(3)]
+    assert sorted(answers) == sorted([CanFrame(0x626 ^ ANSWER, b"\1\2"), FRAME, REPLY])
+    assert link.nothing_sent()

@@ -12,7 +12,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.errors import RequestError
 from motorbus.simulation.faults import WORDS, Script, parse
-from motorbus.simulation.faults.script import EXAMPLES, requested
+from motorbus.simulation.faults.script import EXAMPLES, is_meant, requested
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -48,7 +48,13 @@ def from_option(said: str | None) -> Script:
         return Script()
     if _is_file(said):
         return _of_file(Path(said))
-    if ":" not in said:
+    if not said.strip():
+        raise RequestError(
+            "--faults: the text is empty",
+            expected='a file, or a script as "exchange 17 byte 3: drop"',
+            advice="leave --faults out where nothing is to go wrong",
+        )
+    if not is_meant(said):
         raise RequestError(
             f"--faults {said}: neither a file nor a script",
             expected='a file, or a script as "exchange 17 byte 3: drop"',

@@ -30,6 +30,7 @@ from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.remarks import Remarks
+from motorbus.simulation.served import check_harmless, join
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -59,7 +60,8 @@ semicolons, or a file or a pipe with one, of 1 MiB at most: `exchange 17
 byte 3: drop`, `1% of bytes: corrupt`, `at 2.5 s: unplug 0.5`. `--faults
 help` lists all of them. A pipe that is silent for 10 s is an error. What
 happened is said on stderr, and at the end how to have it again and which
-of them have not happened.
+of them have not happened. With --can they are refused unless that bus is
+made of programs alone: virtual, udp_multicast, or socketcan with vcan0.
 
 Whatever --switches lists may be given as a flag: --profile kst-ext.
 
@@ -140,7 +142,7 @@ def simulate(
     found = families.load(family)
     if switches or faults == "help":
         return _list(found, output) if switches else faulty.listed(output)
-    script = faulty.from_option(faults)
+    script = _script(faults, can, found)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
@@ -163,6 +165,14 @@ def simulate(
         _serve(mount, stop, faulted, None if quiet else output)
         _ended(output, faulted)
     return Exit.OK
+
+
+def _script(said: str | None, can: str, family: Family) -> Script:
+    """What is to go wrong. Raises RequestError for a bad script, and for any where real devices may be."""
+    script = faulty.from_option(said)
+    if script.faults and can and family.link.kind == "frames":
+        check_harmless(f"can://{can}", {})
+    return script
 
 
 def _faulted(mount: Mount, world: World, script: Script, controls: Iterable[ControlSocket]) -> Faulted:
@@ -262,8 +272,6 @@ def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tup
         door = Door(TcpPort(*parse_endpoint(ways.socketcand)), lambda: SocketcandAdapter(epoch=epoch))
         yield stack.enter_context(closing(door)), f"can://socketcand/{door.port.address}/can0"
     if ways.can:
-        from motorbus.simulation.served import join
-
         yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
 
 

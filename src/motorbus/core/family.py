@@ -255,7 +255,7 @@ class Simulator(Protocol):
 
     One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s). One whose
     devices have inputs takes what happens there as `script(text)`. One on whose line there may be two devices with one
-    id takes `duplicate(id)`: from now on there are two.
+    id takes `duplicate(id)`: then there are two. One on CAN tells by `audience(frame)` whom that is for (`core.frame`).
     """
 
     @property

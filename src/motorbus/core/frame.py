@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Final, NamedTuple
 
 ERROR_FLAG: Final = 1 << 29
 """Set in the identifier of what is no data frame but the adapter's report of a bus error, as SocketCAN does it."""
 REMOTE_FLAG: Final = 1 << 30
 """Set in the identifier of a remote frame."""
+
+
+class Audience(Enum):
+    """Whom a frame is for, as simulated devices see it: none of them, some of them alone, or everyone on the bus."""
+
+    NOBODY = "nobody"
+    OURS = "ours"
+    EVERYONE = "everyone"
 
 
 class CanFrame(NamedTuple):

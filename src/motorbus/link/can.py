@@ -18,7 +18,7 @@ from typing import Any, Final
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link import adapters
-from motorbus.link.can_config import SERIAL_PORTS, CanConfig, configured
+from motorbus.link.can_config import NO_WIRE, SERIAL_PORTS, CanConfig, configured
 from motorbus.link.can_port import ASK_AGAIN
 from motorbus.link.can_rates import check_rate, ip_line, kernel_rate
 from motorbus.link.can_refusal import INSTALL, device_of, refused
@@ -31,8 +31,6 @@ from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, not_found
 from motorbus.link.serial import could_be_a_port, ports
 
-NO_WIRE: Final = ("virtual", "udp_multicast")
-"""Interfaces without a bit rate, where any number of programs meet."""
 BY_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
 """Back ends in which a readable descriptor means a frame, and a silent one that there is none."""
 TELLS_ERRORS: Final = ("socketcan", "socketcand")
@@ -65,7 +63,7 @@ class CanLink:
     SocketCAN interface do, so that one is not locked. Raises RequestError for an unknown interface or option,
     PortNotFound, PortBusy, or LinkError: for a bit rate that this adapter does not really have, a missing driver, a
     refusal. `kept` is a lock that we have already, maybe this one. `lock_name` is the name of the adapter by which it
-    is locked and listens for an emergency stop.
+    is locked and listens for an emergency stop. `no_wire`: it is made of programs alone.
     """
 
     paced = False  # adapters say nothing of when a frame was on the wire
@@ -91,6 +89,7 @@ class CanLink:
         self.latency = LATENCY.get(self._config.interface, adapters.DEVICE_LATENCY)
         self.rate = self._settled_rate(usual)
         self.listen_only = self._config.listen_only
+        self.no_wire = self._config.no_wire
         self._tells = self._config.interface in TELLS_ERRORS
         self._tuning = False
         self._told = (0, 0)
@@ -323,6 +322,11 @@ class CanLink:
     def close(self) -> None:
         self._wire.close()
         self.lock.release()
+
+
+def no_wire(port: str, options: Mapping[str, object]) -> bool:
+    """Whether a port that need not be open is made of programs alone. Raises as `lock_name`."""
+    return configured(python_can(port), port, 0, options).no_wire
 
 
 def lock_name(port: str, options: Mapping[str, object]) -> str:

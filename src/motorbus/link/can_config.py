@@ -18,6 +18,8 @@ from motorbus.errors import RequestError
 
 SOCKETCAND_PORT: Final = 29536
 """The usual TCP port of socketcand."""
+NO_WIRE: Final = ("virtual", "udp_multicast")
+"""Interfaces without a bit rate, where any number of programs meet."""
 TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
 """A bit timing of python-can: clock of the controller (Hz), prescaler, two segments, jump width, samples."""
 EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
@@ -48,6 +50,13 @@ class CanConfig(NamedTuple):
     sets_rate: bool
     bits: int = 0
     warnings: tuple[str, ...] = ()
+
+    @property
+    def no_wire(self) -> bool:
+        """Whether it is made of programs alone, so that no device on it can be real; a virtual interface of the Linux
+        kernel (modules vcan and vxcan) is known by its name."""
+        kernel = self.interface == "socketcan" and str(self.channel).startswith(("vcan", "vxcan"))
+        return kernel or self.interface in NO_WIRE
 
 
 def split_port(port: str) -> tuple[str, dict[str, Any]]:

@@ -41,10 +41,13 @@ class Endpoint(Protocol):
 class Participant(ABC):
     """Whoever takes part in a simulated bus beside the devices.
 
-    `lost` counts what found no room because it does not read: bytes of a serial line, else frames.
+    `lost` counts what found no room because it does not read: bytes of a serial line, else frames. `shared`: behind it
+    is a bus with devices of others. `real` names a bus on which there may be real ones; "": there are none.
     """
 
     lost = 0
+    shared = False
+    real = ""
 
     @abstractmethod
     def fileno(self) -> int | None:

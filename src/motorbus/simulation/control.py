@@ -19,6 +19,7 @@ from motorbus.core import units
 from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 from motorbus.simulation.faulted import Faulted, read_order
+from motorbus.simulation.told import told
 
 LONGEST_LINE = 1 << 16
 """Bytes of an order; a long script is the longest."""
@@ -236,8 +237,9 @@ def _node(simulator: Simulator, text: str) -> SimulatedNode:
     try:
         return simulator.nodes[units.whole(text)]
     except (ValueError, KeyError):
-        ids = ", ".join(map(str, sorted(simulator.nodes)))
-        raise RequestError(f"there is no node {text}; there are: {ids}") from None
+        raise RequestError(
+            f"there is no node {text}; there are: {told(simulator, simulator.nodes)}"
+        ) from None
 
 
 def _listen(path: Path) -> socket.socket:

@@ -12,7 +12,7 @@ of the request are still on the wire.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
@@ -20,6 +20,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.can_bits import bits
 from motorbus.core.family import Simulator
+from motorbus.core.frame import Audience
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
@@ -40,7 +41,7 @@ class Event(NamedTuple):
     """Data that reaches one side at a moment; `order` keeps equal moments in the order they came about.
 
     `sender` is the client who sent it, None for a device or an echo; `rate` that of the client (bit/s), None when it
-    has set none.
+    has set none. `alone`: the devices get it, and no client.
     """
 
     at: float
@@ -49,6 +50,7 @@ class Event(NamedTuple):
     data: Data
     sender: object = None
     rate: int | None = None
+    alone: bool = False
 
 
 class Course:
@@ -56,15 +58,20 @@ class Course:
 
     `pace`  bit/s at which data take their time, until the bus is tuned to another rate; None: no waiting
     `rate`  bit/s that the bus was tuned to last; None: never
+    `shared`  there are devices of others on it: what is not for these here passes as if there were no line, and of what
+              is for everyone nobody else gets less, more or anything other than what was sent
     """
 
-    def __init__(self, simulator: Simulator, *, line: Line | None = None, pace: int | None = None) -> None:
+    def __init__(
+        self, simulator: Simulator, *, line: Line | None = None, pace: int | None = None, shared: bool = False
+    ) -> None:
         if pace is not None and pace <= 0:
             raise RequestError(f"pace {pace} is not a rate", expected="bit/s, more than 0")
         self.simulator = simulator
         self.line: Line = line or PerfectLine()
         self.pace = pace
         self.rate: int | None = None
+        self._shared = shared
         self._events: list[Event] = []
         self._order = count()
         self._free_at = -inf
@@ -88,12 +95,26 @@ class Course:
     def hear(self, data: Data, now: float, sender: object = None, rate: int | None = None) -> None:
         """A client has sent this, at this rate (bit/s) if it has set one."""
         at = self._passed(data, now)
+        audience = self._audience(data)
+        if audience is Audience.NOBODY:
+            self._push(Delivery(at, Side.DEVICE, data), sender, rate)
+            return
+        alone = audience is Audience.EVERYONE
+        if alone:
+            self._push(Delivery(at, Side.HOST, data), sender)
         for delivery in self.line.carry(Side.HOST, data, at):
-            if delivery.to is Side.HOST:  # the client hears an echo as others do
+            if delivery.to is Side.DEVICE:
+                for piece in self._pieces(delivery):
+                    self._push(piece, sender, rate, alone)
+            elif not alone:  # the client hears an echo as others do
                 self._push(delivery)
-                continue
-            for piece in self._pieces(delivery):
-                self._push(piece, sender, rate)
+
+    def _audience(self, data: Data) -> Audience:
+        """Whom this is for. Where nobody else is, all of it is for these devices."""
+        if not self._shared:
+            return Audience.OURS
+        told: Callable[[Data], Audience] | None = getattr(self.simulator, "audience", None)
+        return told(data) if told else Audience.NOBODY
 
     def next(self) -> float:
         """The next moment at which something happens by itself."""
@@ -112,7 +133,7 @@ class Course:
                     self._heard_at = max(self._heard_at, event.at)
                     self.tune(event.rate)
                     self.simulator.receive(event.data, event.at)
-                if event.to is Side.HOST or isinstance(event.data, CanFrame):
+                if event.to is Side.HOST or (isinstance(event.data, CanFrame) and not event.alone):
                     yield event
             else:
                 self._speak(now)
@@ -160,7 +181,8 @@ class Course:
         self._free_at = max(at, self._free_at) + length / (self.rate or self.pace)
         return self._free_at
 
-    def _push(self, delivery: Delivery, sender: object = None, rate: int | None = None) -> None:
-        heappush(
-            self._events, Event(delivery.at, next(self._order), delivery.to, delivery.data, sender, rate)
-        )
+    def _push(
+        self, delivery: Delivery, sender: object = None, rate: int | None = None, alone: bool = False
+    ) -> None:
+        at, to, data = delivery
+        heappush(self._events, Event(at, next(self._order), to, data, sender, rate, alone))

@@ -14,7 +14,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
 from motorbus.simulation.faults.script import requested
-from motorbus.simulation.faults.struck import without_adapter
+from motorbus.simulation.faults.struck import on_a_wire, without_adapter
 from motorbus.simulation.mount import Mount
 
 SCHEMA: Final = "motorbus.simulator-script/1"
@@ -73,6 +73,8 @@ class Faulted:
         given = requested(script)
         if given.by_chance:
             given = given.seeded(secrets.randbelow(1 << 32))
+        if given.faults and self._mount.real:
+            raise on_a_wire(self._mount.real)
         if not self._mount.texts:
             without_adapter(given)
         ended = self._ended()  # before the world forgets
@@ -82,7 +84,7 @@ class Faulted:
         self._sets, self._set_at = self._sets + 1, self._world.now
         self._left += self.count - self._seen
         self._before = self._seen = self.count
-        self._mount.course.line = line if len(given) else PerfectLine()
+        self._mount.line = line if len(given) else PerfectLine()
         self._mount.text(text if text.faults else None)
         self._lines, self._script = (line, text), given
         if given.by_chance:

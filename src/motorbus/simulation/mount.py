@@ -17,6 +17,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Adapter, Line
 from motorbus.simulation.clients import CanClient, Door, Endpoint, Participant, SerialClient
 from motorbus.simulation.course import HASTE, Course
+from motorbus.simulation.faults.struck import is_calm, on_a_wire
 
 __all__ = ["HASTE", "Attendant", "Endpoint", "Mount", "Place"]
 
@@ -43,7 +44,8 @@ class Mount:
 
     `places`      one endpoint for bytes; or any number of CAN clients, doors and other participants of one CAN bus
     `adapter`     what a single endpoint speaks when the simulator speaks CAN frames
-    `line`        what lies between clients and devices, faults included
+    `line`        what lies between clients and devices, faults included; on a bus that others share they strike only
+                  what is for these devices or comes from them
     `pace`        bit/s at which data take their time, unless a client sets another rate; None: no waiting
     `rate`        bit/s of the bus until a client sets one. On a serial line the client's own is followed then, and a
                   device set to another one stays silent; None: every device hears every client. On CAN the rate set
@@ -66,15 +68,34 @@ class Mount:
         if adapter is not None and len(places) != 1:
             raise RequestError("an adapter belongs to one endpoint", expected="a CanClient for each")
         self.simulator = simulator
-        self.course = Course(simulator, line=line, pace=pace)
         self.attendants = tuple(attendants)
         self._clock = clock
         self._usual = rate
         self._doors = [place for place in places if isinstance(place, Door)]
         self._fixed = [_participant(place, adapter, rate) for place in places if not isinstance(place, Door)]
+        shared = any(place.shared for place in self._fixed)
+        self.course = Course(simulator, pace=pace, shared=shared)
+        if line is not None:
+            self.line = line
         self._lost_before = 0
         self._pull: float | None = None
         self._back_at: float | None = None
+
+    @property
+    def line(self) -> Line:
+        """What lies between clients and devices. Setting one that does harm raises RequestError where it is `real`."""
+        return self.course.line
+
+    @line.setter
+    def line(self, line: Line) -> None:
+        if self.real and not is_calm(line):
+            raise on_a_wire(self.real)
+        self.course.line = line
+
+    @property
+    def real(self) -> str:
+        """The CAN bus among its places on which there may be real devices; "" when none is."""
+        return next((place.real for place in self._fixed if place.real), "")
 
     @property
     def fixed(self) -> str:

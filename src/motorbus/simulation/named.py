@@ -21,8 +21,9 @@ from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
 from motorbus.simulation.faults.script import requested
-from motorbus.simulation.faults.struck import without_adapter
-from motorbus.simulation.served import LinkClient, Served, join
+from motorbus.simulation.faults.struck import is_calm, on_a_wire, without_adapter
+from motorbus.simulation.served import LinkClient, Served, check_harmless, join
+from motorbus.simulation.told import told
 
 Faults: TypeAlias = str | Script | Iterable[Fault]
 KNOCK: Final = 0.1
@@ -99,6 +100,7 @@ class Simulation:
     @line.setter
     def line(self, line: Line) -> None:
         with self._gate:
+            self._check_wire(line)
             self._line = line
             if self._link is not None:
                 self._link.simulator, self._link.line = self._devices, line
@@ -116,6 +118,8 @@ class Simulation:
         given = requested(script)
         without_adapter(given)
         link = self._link
+        if given.faults:
+            self._check_wire()
         self._world.port = None if isinstance(link, Served) else self
         with link.still() if isinstance(link, Served) else nullcontext():
             self._world.now = max(self._world.now, self._now())
@@ -162,8 +166,10 @@ class Simulation:
         try:
             return self.simulator.nodes[node]
         except KeyError:
-            ids = ", ".join(map(str, sorted(self.simulator.nodes)))
-            raise RequestError(f"{self.url} has no node {node}", expected=f"one of {ids}") from None
+            raise RequestError(
+                f"{self.url} has no node {told(self.simulator, [node])}",
+                expected=f"one of {told(self.simulator, self.simulator.nodes)}",
+            ) from None
 
     def link(self, rate: int | None = None) -> MemoryLink:
         """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
@@ -179,7 +185,8 @@ class Simulation:
 
         They work there in real time, by a thread, until what is given back is closed; use it in a `with`. `rate` is
         the bit rate of that bus, `options` are for its adapter. Raises RequestError for devices that do not speak CAN
-        and for what is no channel, PortBusy while the simulation is open elsewhere, LinkError for the channel.
+        and for what is no channel, with faults for one on which there may be real devices, PortBusy while the
+        simulation is open elsewhere, LinkError for the channel.
         """
         if self.family.link.kind != "frames":
             raise RequestError(f"{self.family.name} devices do not speak CAN")
@@ -188,6 +195,8 @@ class Simulation:
             raise RequestError(f"{port}: unplug pulls a port, and this channel is not ours to pull")
         with self._gate, _lock:
             self._check_free()
+            if not is_calm(self._line):
+                check_harmless(port, options)
             client = join(port, said, self.family.link.rate, **options)
             start = self._left_at if self.clock == "virtual" else None
             pace = rate if self.pace else None
@@ -217,6 +226,11 @@ class Simulation:
         if self._link is not None:
             return self._link.now()
         return self._left_at if self.clock == "virtual" else time.monotonic()
+
+    def _check_wire(self, line: Line | None = None) -> None:
+        """No harm is done where a device may be real; None: the line does some."""
+        if isinstance(self._link, Served) and self._link.real and (line is None or not is_calm(line)):
+            raise on_a_wire(self._link.real)
 
     def _check_there(self) -> None:
         """The port has not been pulled; asking takes its time."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -18,6 +18,7 @@ from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, Link
 from motorbus.simulation.clients import Participant
+from motorbus.simulation.faults.struck import on_a_wire
 from motorbus.simulation.mount import Mount
 
 if TYPE_CHECKING:
@@ -31,8 +32,11 @@ _LOOK: Final = 0.1
 class LinkClient(Participant):
     """A whole CAN bus behind a link: everyone there hears the devices, and they hear everyone."""
 
+    shared = True
+
     def __init__(self, link: Link) -> None:
         self.link = link
+        self.real = "" if getattr(link, "no_wire", False) else link.name
 
     def fileno(self) -> int | None:
         return self.link.fileno()
@@ -65,6 +69,15 @@ def join(port: str, rate: int = 0, usual: int = 0, **options: object) -> LinkCli
     from motorbus.link.can import CanLink
 
     return LinkClient(CanLink(port, rate=rate, usual=usual, options=options, shared=True))
+
+
+def check_harmless(port: str, options: Mapping[str, object]) -> None:
+    """Raises RequestError for a channel that may have real devices, so that no faults may be there; opens nothing."""
+    if port.startswith(_CAN):
+        from motorbus.link.can import no_wire
+
+        if not no_wire(port, options):
+            raise on_a_wire(port)
 
 
 class Served:
@@ -111,12 +124,17 @@ class Served:
 
     @property
     def line(self) -> Line:
-        """What lies between hosts and devices; set it to do harm, at any time."""
-        return self._mount.course.line
+        """What lies between hosts and devices; set it to do harm, at any time, where no device can be real."""
+        return self._mount.line
 
     @line.setter
     def line(self, line: Line) -> None:
-        self._mount.course.line = line
+        self._mount.line = line
+
+    @property
+    def real(self) -> str:
+        """Its bus when there may be real devices on it, and so no harm may be done; else ""."""
+        return self._mount.real
 
     @contextmanager
     def still(self) -> Iterator[None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.core.frame import Audience
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import simulate
@@ -276,3 +277,22 @@ def test_the_next_report_is_known_anew_when_somebody_begins_stops_or_changes_its
     assert host.bus.due() == first.report_due()
     first.unplug()
     assert host.bus.due() is None
+
+
+@pytest.mark.parametrize(
+    ("frame", "audience"),
+    [
+        (CanFrame(0x625, bytes(8)), Audience.OURS),
+        (CanFrame(0x625, b"\1"), Audience.OURS),
+        (CanFrame(0x600, bytes(8)), Audience.EVERYONE),
+        (CanFrame(0x626, bytes(8)), Audience.NOBODY),
+        (CanFrame(0x5A5, bytes(8)), Audience.NOBODY),
+        (CanFrame(0x625, bytes(8), extended=True), Audience.NOBODY),
+        (CanFrame(0x600, bytes(8), extended=True), Audience.NOBODY),
+        (b"\0", Audience.NOBODY),
+    ],
+)
+def test_whom_a_frame_is_for(frame: Data, audience: Audience) -> None:
+    bus = simulate((0x25, 0x30), id_format="std")
+    bus.nodes[0x25].unplug()  # it is simulated all the same
+    assert bus.audience(frame) is audience

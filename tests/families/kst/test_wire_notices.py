@@ -99,3 +99,25 @@ def test_what_no_frame_can_carry_is_refused(make: Callable[[], object]) -> None:
     with pytest.raises(RequestError) as raised:
         make()
     assert raised.value.expected
+
+
+@pytest.mark.parametrize(
+    ("frame", "node"),
+    [
+        (wire.encode_upload(0x25, 0x6002), 0x25),
+        (CanFrame(0x625, b""), 0x25),  # what makes no sense is for it all the same
+        (CanFrame(0x625, bytes(8), extended=True), 0x25),
+        (CanFrame(REMOTE_FLAG | 0x625, b""), 0x25),
+        (CanFrame(0x600, bytes(8)), wire.EVERYONE),
+        (wire.encode_start("standard", 0x25, True), 0x25),
+        (wire.encode_start("standard", wire.EVERYONE, False), wire.EVERYONE),
+        (wire.encode_start("vendor", 0x25, True), 0x25),
+        (CanFrame(0x5A5, bytes(8)), None),
+        (CanFrame(0x680, bytes(8)), None),
+        (CanFrame(0x025, bytes(8)), None),
+        (CanFrame(0x000, b"\x81\x25"), None),
+        (CanFrame(ERROR_FLAG | 0x625, bytes(8)), None),
+    ],
+)
+def test_whom_a_frame_of_a_host_is_for(frame: CanFrame, node: int | None) -> None:
+    assert wire.addressed(frame) == node

@@ -12,7 +12,7 @@ import motorbus
 from motorbus.errors import RequestError
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, Fault, Script, parse
-from motorbus.simulation.faults.script import as_script, requested
+from motorbus.simulation.faults.script import as_script, is_meant, requested
 from tests.simulation.faults.scripts import scripts
 
 
@@ -259,3 +259,71 @@ def test_who_asks_for_a_script_without_a_fault_is_told(text: str) -> None:
     for ask in asks:
         with pytest.raises(RequestError, match="there is no fault in it"):
             ask()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "exchange 17 byte 3; drop",
+            "line 1: 'exchange 17 byte 3' is not a fault: it does not say what goes wrong",
+        ),
+        (
+            "seed 1\nexchange 17:",
+            "line 2: 'exchange 17:' is not a fault: it does not say what goes wrong there",
+        ),
+        ("1% of bytes", "'1% of bytes' is not a fault: it does not say what goes wrong there"),
+        ("drop", "'drop' is not a fault: it does not say where"),
+        (": delay 0.1", "': delay 0.1' is not a fault: it does not say where"),
+        ("drop: ", "'drop:' is not a fault: it does not say where"),
+        ("exchange 17 drop", "'exchange 17 drop' is not a fault: there is no colon before drop"),
+        ("seed x", "'seed x' is no seed"),
+        ("seed", "'seed' is no seed"),
+    ],
+)
+def test_what_a_part_lacks_is_said(text: str, says: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        parse(text)
+    assert says in caught.value.summary
+    assert caught.value.expected
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("1%: stall 0", "line 1: '1%: stall 0' is not a fault: impossible stall"),
+        (
+            "exchange 1 byte 2: echo",
+            "line 1: 'exchange 1 byte 2: echo' is not a fault: echo is for a whole packet",
+        ),
+        (
+            "exchange 1 on adapter: delay 1",
+            "'exchange 1 on adapter: delay 1' is not a fault: delay cannot be done to",
+        ),
+        ("101%: drop", "line 1: '101%: drop' is not a fault: impossible chance"),
+        ("1%: stall x:y", "line 1: '1%: stall x:y' is not a fault: impossible 'x:y'"),
+    ],
+)
+def test_a_fault_that_is_impossible_is_said_once(text: str, says: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        parse(text)
+    assert says in caught.value.summary
+    assert caught.value.summary.count("fault") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("seed 1", True),
+        ("drop", True),
+        ("exchange 1", True),
+        ("exchange 1: x", True),
+        ("# nothing", True),
+        ("noise", False),
+        ("exchange.txt", False),
+        ("/tmp/noise; more", False),
+        ("\0", False),
+    ],
+)
+def test_a_script_is_told_from_the_name_of_a_file(text: str, meant: bool) -> None:
+    assert is_meant(text) is meant

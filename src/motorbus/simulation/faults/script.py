@@ -80,11 +80,10 @@ def parse(text: str) -> Script:
     faults: list[Fault] = []
     seed: int | None = None
     for count, line in enumerate(text.splitlines(), start=1):
-        for part in line.partition("#")[0].split(";"):
-            said = part.strip()
+        for said in _parts(line):
             if re.fullmatch(r"seed\s+\d+", said, re.ASCII):
                 seed = _one_seed(seed, said, count)
-            elif said:
+            else:
                 faults.append(_fault(said, count))
     return Script(tuple(faults), seed)
 
@@ -123,14 +122,17 @@ def _fault(said: str, count: int) -> Fault:
     match = _WHERE.fullmatch(where.strip())
     words = what.split()
     if not colon or match is None or not words:
-        raise _nonsense(said, count)
+        raise _incomplete(said, count) or _nonsense(said, count)
     if words[0] not in WORDS:
         raise _unknown(words[0], said, count)
     try:
         return _made(match, words)
     except RequestError as error:
+        why = error.summary
+        if why.startswith("fault "):  # what follows says the same fault again, in its own words
+            why = why.rpartition(": ")[2]
         raise RequestError(
-            f"line {count}: {short(said)!r} is not a fault: {error.summary}", expected=error.expected
+            f"line {count}: {short(said)!r} is not a fault: {why}", expected=error.expected
         ) from None
 
 
@@ -215,6 +217,43 @@ def _float(text: str) -> float:
         return _real(text)
     except ValueError:
         raise RequestError(f"{text} is no number") from None
+
+
+def is_meant(text: str) -> bool:
+    """Whether whoever wrote this meant a script, be it a bad or an empty one, and not the name of a file."""
+    parts = list(_parts(text))
+    return ":" in text or not parts or any(_lack(part) or part.split()[0] == "seed" for part in parts)
+
+
+def _parts(text: str) -> Iterator[str]:
+    for line in text.splitlines():
+        yield from filter(None, map(str.strip, line.partition("#")[0].split(";")))
+
+
+def _lack(said: str) -> str:
+    """What a part of a script lacks, where that can be told; else ""."""
+    where, colon, what = map(str.strip, said.partition(":"))
+    place = _WHERE.match(where)
+    word = where[place.end() :].split()[:1] if place else []
+    if place and not word and not what:
+        return "it does not say what goes wrong there"
+    if word and word[0] in WORDS and not colon:
+        return f"there is no colon before {word[0]}"
+    first = (where or what).split()[:1]
+    if first and first[0] in WORDS and not (where and what):
+        return "it does not say where"
+    return ""
+
+
+def _incomplete(said: str, count: int) -> RequestError | None:
+    """What is wrong with a part that lacks something; None: it is another thing."""
+    if said.split()[0] == "seed":
+        return RequestError(
+            f"line {count}: {short(said)!r} is no seed", expected="a whole number, as `seed 42`"
+        )
+    if lack := _lack(said):
+        return RequestError(f"line {count}: {short(said)!r} is not a fault: {lack}", expected=EXAMPLES)
+    return None
 
 
 def _nonsense(said: str, count: int) -> RequestError:

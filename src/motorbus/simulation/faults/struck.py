@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from motorbus.errors import RequestError
+from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults.fault import Fault
 from motorbus.simulation.faults.line import FaultyLine
@@ -32,3 +33,18 @@ def without_adapter(script: Script, why: str = "nothing here speaks the text of 
             raise RequestError(
                 f"fault {fault}: {why}", expected="a CAN bus that is served by slcan or socketcand"
             )
+
+
+def is_calm(line: Line) -> bool:
+    """Whether this line can do no harm."""
+    return type(line) is PerfectLine or (isinstance(line, FaultyLine) and not line.faults)
+
+
+def on_a_wire(port: str) -> RequestError:
+    """Why there are no faults on this CAN bus: whatever else is on it may be real."""
+    return RequestError(
+        f"{port}: faults are refused on a CAN bus that may have real devices; nothing was changed",
+        expected="a bus of programs alone: can://virtual, can://udp_multicast, or can://socketcan/vcan0 (vxcan0)",
+        cause="what is done to frames there, other devices suffer or obey too",
+        advice="serve the devices by --link, --tcp or --socketcand, or on can://socketcan/vcan0",
+    )

@@ -18,6 +18,7 @@ from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.core.operation import Data
 from motorbus.errors import RequestError
 from motorbus.simulation.faults.fault import Fault
+from motorbus.simulation.told import told
 
 _STORES = "midway"
 _TWINS = "duplicate"
@@ -80,8 +81,10 @@ class World:
         if fault.action == "unplug" and self.port is None:
             raise RequestError(f"fault {fault}: there is no port here that could be pulled", cause=self.why)
         if fault.node is not None and fault.node not in self.nodes:
-            ids = ", ".join(map(str, sorted(self.nodes)))
-            raise RequestError(f"fault {fault}: there is no node {fault.node}", expected=f"one of {ids}")
+            raise RequestError(
+                f"fault {fault}: there is no node {told(self.simulator, [fault.node])}",
+                expected=f"one of {told(self.simulator, self.nodes)}",
+            )
         if fault.action == "duplicate-id" and not hasattr(self.simulator, _TWINS):
             raise RequestError(f"fault {fault}: there can be no second device on this line")
         if (

@@ -14,6 +14,7 @@ from itertools import count
 from typing import Final, NamedTuple
 
 from motorbus.core.can_bits import precedence
+from motorbus.core.frame import Audience
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
@@ -148,6 +149,16 @@ class KstBus:
             self._roster()
         report = self._report_at
         return due if report is None or (due is not None and due <= report) else report
+
+    def audience(self, data: Data) -> Audience:
+        """Whom a frame is for. What no host sends, as replies of other devices, is for none of these."""
+        node = wire.addressed(data) if isinstance(data, CanFrame) else None
+        if node is None or not isinstance(data, CanFrame):
+            return Audience.NOBODY
+        heeding = [servo for servo in self.servos if servo.takes(data.extended)]
+        if not any(node in (wire.EVERYONE, servo.node) for servo in heeding):
+            return Audience.NOBODY
+        return Audience.EVERYONE if node == wire.EVERYONE else Audience.OURS
 
     obeys_at_once = False
 

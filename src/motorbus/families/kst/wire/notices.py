@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Notice
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notice
 from motorbus.errors import RequestError
-from motorbus.families.kst.wire.frames import EVERYONE, LENGTH, NODES, REPLY, one
+from motorbus.families.kst.wire.frames import EVERYONE, LENGTH, NODES, REPLY, REQUEST, one
 
 PDO: Final = 0x180
 """Second identifier (plus node) under which reports have been seen."""
@@ -113,6 +113,19 @@ def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> C
     if form == "vendor":
         return CanFrame(who, bytes((command, 0)), extended)
     return CanFrame(0, bytes((command, who)), extended)
+
+
+def addressed(frame: CanFrame) -> int | None:
+    """Whom a frame of a host is for, by its identifier, whether it makes sense or not; None: it is no frame of a host.
+
+    `EVERYONE` for all. A start or stop is known by its data too, for others use such identifiers for their own.
+    """
+    identifier = frame.id & ~REMOTE_FLAG
+    node = identifier - REQUEST
+    if node == EVERYONE or node in NODES:
+        return node
+    start = decode_start(frame)
+    return None if start is None else start.node
 
 
 def decode_start(frame: CanFrame) -> Start | None:
