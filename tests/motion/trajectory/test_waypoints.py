@@ -43,7 +43,7 @@ def test_it_is_at_each_waypoint_at_its_time_and_between_them_in_between(
                 assert low - 1e-9 <= place <= high + 1e-9
 
 
-@given(st.sampled_from(["cubic", "minimum_jerk"]), st.tuples(places, places), stops)
+@given(st.sampled_from(["cubic", "spline", "minimum_jerk"]), st.tuples(places, places), stops)
 def test_velocity_begins_and_ends_with_nothing_and_never_jumps(
     kind: Interpolation, first: tuple[float, float], following: list[tuple[float, float, float]]
 ) -> None:
@@ -153,8 +153,8 @@ def test_what_is_no_route_is_refused(given_: list[Waypoint], says: str) -> None:
     assert refused.value.expected
 
 
-def test_a_kind_is_one_of_three() -> None:
+def test_a_kind_is_one_of_four() -> None:
     kind: Any = "quintic"
     with pytest.raises(RequestError, match="'quintic' is no kind") as refused:
         interpolated([HERE, HERE], kind)
-    assert refused.value.expected == "one of linear, cubic, minimum_jerk"
+    assert refused.value.expected == "one of linear, cubic, spline, minimum_jerk"
