@@ -90,12 +90,10 @@ def replay(
         Any option of the buses, as a flag.
     """
     share = _share(speed)
-    check_smooth(smooth)
     if repeat < 1:
         raise RequestError(f"--repeat {repeat}: not at least 1", advice="nothing was sent")
     wanted = _read(file, smooth)
-    course = _paced(wanted, share, interpolation)
-    _judge(course, machine().axes)
+    course = _course(wanted, share, interpolation)
     with robot(list(wanted.axes), options, output) as hand:
         _led(hand, wanted)
         first = wanted.positions(0.0)
@@ -126,6 +124,7 @@ def _share(speed: str) -> float:
 def _read(file: Path, smooth: float) -> Trajectory:
     from motorbus.motion.trajectory import Trajectory
 
+    check_smooth(smooth)
     try:
         wanted = Trajectory.load(file, machine().axes)
     except RequestError as error:
@@ -135,10 +134,13 @@ def _read(file: Path, smooth: float) -> Trajectory:
     return wanted.smoothed(smooth) if smooth else wanted
 
 
-def _paced(wanted: Trajectory, share: float, interpolation: Interpolation) -> Paced:
+def _course(wanted: Trajectory, share: float, interpolation: Interpolation) -> Paced:
+    """The way on which the axes shall be led. Raises as `_judge`."""
     from motorbus.motion.moving.along import Paced
 
-    return Paced(wanted.joined(interpolation), share)
+    course = Paced(wanted.joined(interpolation), share)
+    _judge(course, machine().axes)
+    return course
 
 
 def _judge(course: Paced, axes: Mapping[str, AxisSpec], rate: float = 0.0) -> Trajectory:
