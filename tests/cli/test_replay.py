@@ -72,6 +72,16 @@ def test_corners_are_too_hard_and_nothing_moves(bench: Bench, run: Run) -> None:
     assert at(run, "a1") == pytest.approx([0], abs=0.1)
 
 
+def test_rows_that_are_coarser_than_goals_are_joined_by_what_was_chosen(bench: Bench, run: Run) -> None:
+    Path("gentle.csv").write_text("time (s),a1 (deg)\n0,0\n1,20\n2,-20\n3,0\n", encoding="utf-8")
+    assert "within all limits" in run("replay", "gentle.csv", "--dry-run").out
+    for words in (("--dry-run",), ()):
+        ran = run("replay", "gentle.csv", "--interpolation", "linear", *words)
+        assert (ran.code, ran.out) == (8, "")
+        assert "its acceleration at 0 s is 4000 deg/s²" in ran.err
+        assert "--speed 50%" in ran.err
+
+
 def test_a_dry_run_says_how_it_would_go_and_nothing_moves(bench: Bench, run: Run, wave: Path) -> None:
     ran = run("replay", "wave.csv", "--smooth", "1.5", "--speed", "0.5", "--dry-run")
     assert ran.code == 0, ran.err

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import App, Parameter
 
@@ -18,11 +18,15 @@ from motorbus.core import units
 from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from motorbus.cli.robot import InHand
     from motorbus.motion.machine import AxisSpec
+    from motorbus.motion.moving.along import Paced
     from motorbus.motion.moving.moved import Moved
     from motorbus.motion.trajectory import Trajectory
 
+Interpolation = Literal["linear", "cubic", "spline", "minimum_jerk"]
 FASTEST: Final = 1000.0
 """How many times as fast as in the file, or as slow, at most; beyond that its samples would fall together."""
 
@@ -30,10 +34,15 @@ app = App(
     name="replay",
     usage="Usage: motorbus replay FILE.csv [OPTIONS]",
     help_epilogue="""The file is CSV, as `motorbus teach` writes it: a column time, then one for
-each axis of the machine file, units in the header. All of it is judged by the
-limits of its axes before anything moves, and refused with exit code 8 where it
-goes beyond them. The axes go to its first point together, then along it. A way
-there of more than 180 degrees needs --yes. Ctrl-C stops them.
+each axis of the machine file, units in the header. Its rows are joined, and
+the goals that leave on the way are judged by the limits of their axes before
+anything moves: it is refused with exit code 8 where one goes beyond them. The
+axes go to its first point together, then along it. A way there of more than
+180 degrees needs --yes. Ctrl-C stops them.
+
+Rows are joined by a spline, without a jump of velocity; where an axis turns
+back it goes a little beyond the outermost row. cubic rests there instead,
+minimum_jerk rests at each row, and linear goes straight: its corners are hard.
 
 What was taught by hand comes in steps, which are hard: --smooth 5 takes out
 what is quicker than 5 Hz. A stepper controller cannot be led along a file.
@@ -55,6 +64,7 @@ def replay(
     speed: str = "",
     repeat: int = 1,
     smooth: float = 0.0,
+    interpolation: Interpolation = "spline",
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -72,27 +82,28 @@ def replay(
         How many times.
     smooth
         Leave out what is quicker than this, in Hz, as 5; nothing is left out at 0.
+    interpolation
+        What is between two rows of the file.
     yes
         Do not ask before a long way to the first point.
     options
         Any option of the buses, as a flag.
     """
     share = _share(speed)
-    check_smooth(smooth)
     if repeat < 1:
         raise RequestError(f"--repeat {repeat}: not at least 1", advice="nothing was sent")
     wanted = _read(file, smooth)
-    _judge(wanted.scaled(1 / share))
+    course = _course(wanted, share, interpolation)
     with robot(list(wanted.axes), options, output) as hand:
         _led(hand, wanted)
         first = wanted.positions(0.0)
         present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
         if dry_run:
-            return _plan(hand, wanted.scaled(1 / share), present)
+            return _plan(hand, course, present)
         consent_to_far(hand, present, first, yes=yes)
         for number in range(repeat):
             with hand.working(f"replaying {number + 1} of {repeat}" if repeat > 1 else "replaying"):
-                moved = hand.robot.replay(wanted, speed=share)
+                moved = hand.robot.replay(wanted, speed=share, interpolation=interpolation)
         tell(hand, "replay", moved)
         output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
     return Exit.OK
@@ -113,6 +124,7 @@ def _share(speed: str) -> float:
 def _read(file: Path, smooth: float) -> Trajectory:
     from motorbus.motion.trajectory import Trajectory
 
+    check_smooth(smooth)
     try:
         wanted = Trajectory.load(file, machine().axes)
     except RequestError as error:
@@ -122,12 +134,26 @@ def _read(file: Path, smooth: float) -> Trajectory:
     return wanted.smoothed(smooth) if smooth else wanted
 
 
-def _judge(wanted: Trajectory) -> None:
-    """Raise LimitExceeded, in words of the shell, for a movement that goes beyond the limits of its axes."""
-    from motorbus.motion.trajectory import check
+def _course(wanted: Trajectory, share: float, interpolation: Interpolation) -> Paced:
+    """The way on which the axes shall be led. Raises as `_judge`."""
+    from motorbus.motion.moving.along import Paced
 
+    course = Paced(wanted.joined(interpolation), share)
+    _judge(course, machine().axes)
+    return course
+
+
+def _judge(course: Paced, axes: Mapping[str, AxisSpec], rate: float = 0.0) -> Trajectory:
+    """The goals of these axes as they leave at `rate` (Hz; 0: the usual one).
+
+    Raises LimitExceeded, in words of the shell, for a movement that goes beyond their limits.
+    """
+    from motorbus.motion.moving.along import judged
+    from motorbus.motion.moving.stream import USUAL
+
+    there = course.positions(0.0)
     try:
-        check(wanted, machine().axes)
+        return judged(course, {name: axes[name] for name in there if name in axes}, rate or USUAL)
     except LimitExceeded as error:
         in_words_of_the_shell(error)
         raise
@@ -148,9 +174,14 @@ def _worst(hand: InHand, moved: Moved) -> str:
     return ", ".join(f"{name} {axes[name].show(track.worst)}" for name, track in moved.tracks.items())
 
 
-def _plan(hand: InHand, wanted: Trajectory, present: dict[str, float]) -> Exit:
-    """How it would go: no frames, for those are made on the way."""
+def _plan(hand: InHand, course: Paced, present: dict[str, float]) -> Exit:
+    """How it would go: no frames, for those are made on the way. Judged is each bus, at the rate that it carries."""
+    from motorbus.motion.safety.assurance import cycle
+
     axes = hand.robot.machine.axes
+    for bus in hand.robot.budget(axes=list(present)).buses.values():
+        _judge(course, {name: axes[name] for name in bus.axes}, 1 / cycle(bus.highest_rate))
+    wanted = _judge(course, axes)
     facts = [
         {"name": name, "present": present[name], "first": places[0], "low": min(places), "high": max(places)}
         for name, places in wanted.axes.items()

@@ -171,8 +171,13 @@ def check_course(
     Judged are positions, velocities and accelerations; see `trajectory.check`.
     """
     check_samples(trajectory, axes)
+    check_reach(trajectory, axes, devices or {})
+
+
+def check_reach(trajectory: Trajectory, axes: Mapping[str, AxisSpec], devices: Mapping[str, Device]) -> None:
+    """Raise LimitExceeded where a trajectory leads farther than an axis or its device goes."""
     for name, places in trajectory.axes.items():
-        device = (devices or {}).get(name)
+        device = devices.get(name)
         for place in (min(places), max(places)):
             check_goal(name, axes[name], place, device=device)
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from motorbus.motion.moving.along import Along
 from motorbus.motion.moving.moved import Arrived, Track
 from motorbus.motion.moving.plan import Fact, Gone, Plan
-from motorbus.motion.moving.verbs import Along, PointToPoint
+from motorbus.motion.moving.verbs import PointToPoint
 from motorbus.motion.trajectory import Trajectory
 
 
-def test_an_axis_of_which_only_its_place_is_known_has_no_limits_and_no_grain() -> None:
-    assert Fact(0.5) == (0.5, None, 0.0)
+def test_an_axis_of_which_only_its_place_is_known_has_no_limits_no_grain_and_no_rate() -> None:
+    assert Fact(0.5) == (0.5, None, 0.0, 0.0)
 
 
 def test_a_part_without_led_axes_has_no_cycles() -> None:

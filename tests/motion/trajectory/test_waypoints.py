@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from motorbus.errors import RequestError
 from motorbus.motion.trajectory import Interpolation, Waypoint, interpolated
+from motorbus.motion.trajectory.waypoints import joined
 
 KINDS: tuple[Interpolation, ...] = ("linear", "cubic", "minimum_jerk")
 places = st.floats(-100, 100)
@@ -43,7 +44,7 @@ def test_it_is_at_each_waypoint_at_its_time_and_between_them_in_between(
                 assert low - 1e-9 <= place <= high + 1e-9
 
 
-@given(st.sampled_from(["cubic", "minimum_jerk"]), st.tuples(places, places), stops)
+@given(st.sampled_from(["cubic", "spline", "minimum_jerk"]), st.tuples(places, places), stops)
 def test_velocity_begins_and_ends_with_nothing_and_never_jumps(
     kind: Interpolation, first: tuple[float, float], following: list[tuple[float, float, float]]
 ) -> None:
@@ -153,8 +154,24 @@ def test_what_is_no_route_is_refused(given_: list[Waypoint], says: str) -> None:
     assert refused.value.expected
 
 
-def test_a_kind_is_one_of_three() -> None:
+def test_a_spline_meets_a_constant_acceleration_exactly_and_turns_back_between_rows() -> None:
+    times = [0.0, 0.1, 0.25, 0.3, 0.45, 0.6]
+    tossed = joined(times, {"lift": [at * (0.5 - at) for at in times]})
+    for at in (0.22, 0.251, 0.28, 0.31):
+        assert tossed.positions(at) == pytest.approx({"lift": at * (0.5 - at)})
+        assert tossed.accelerations(at) == pytest.approx({"lift": -2.0})
+    assert [*tossed.profiles["lift"]][1].goal == tossed.positions(0.25)["lift"]
+
+
+def test_a_spline_rests_until_the_row_at_which_a_movement_begins() -> None:
+    times = [0.1 * number for number in range(8)]
+    begun = joined(times, {"lift": [max(0.0, at - 0.3) ** 2 for at in times]})
+    assert begun.positions(0.26)["lift"] == pytest.approx(0.0, abs=1e-15)
+    assert begun.positions(0.44)["lift"] == pytest.approx(0.14**2)
+
+
+def test_a_kind_is_one_of_four() -> None:
     kind: Any = "quintic"
     with pytest.raises(RequestError, match="'quintic' is no kind") as refused:
         interpolated([HERE, HERE], kind)
-    assert refused.value.expected == "one of linear, cubic, minimum_jerk"
+    assert refused.value.expected == "one of linear, cubic, spline, minimum_jerk"

@@ -161,11 +161,12 @@ class LedPart:
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
         possible = {node: _inside(angles[node], device) for node, device in devices.items()}
         steps = grains(train, possible)
+        rate = rate_for(self._bus, train, possible, self._journey.rate)
         facts = {
-            axis.name: Fact(axis.spec.from_device(angles[node]), devices[node], steps[node])
+            axis.name: Fact(axis.spec.from_device(angles[node]), devices[node], steps[node], rate)
             for node, axis in ((axis.spec.node, axis) for axis in self._axes)
         }
-        return rate_for(self._bus, train, possible, self._journey.rate), facts
+        return rate, facts
 
     def _angles(self, train: Any) -> Operation[dict[int, float]]:
         """Where each stands (rad of the device), by id. Raises NoReply for one that is silent."""

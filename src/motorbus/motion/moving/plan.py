@@ -18,12 +18,14 @@ from motorbus.motion.trajectory import Course
 class Fact(NamedTuple):
     """Where an axis stands (rad, m), and of its device (rad) its own limits, and the smallest step that it can be told.
 
-    Of an axis that moves by its own profile that step is 0: it is no matter there.
+    `rate` (Hz) is that at which its goals will leave. Of an axis that moves by its own profile that step and the rate
+    are 0: they are no matter there.
     """
 
     position: float
     device: limits.Device = None
     grain: float = 0.0
+    rate: float = 0.0
 
 
 class Planned(NamedTuple):

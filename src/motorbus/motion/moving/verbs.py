@@ -6,8 +6,7 @@ raise what is wrong with them before anything is sent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Mapping
 from math import copysign, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,14 +15,16 @@ from motorbus.core.operation import Operation, outcome
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast
+from motorbus.motion.moving.along import Along, Approach, Paced
 from motorbus.motion.moving.journey import Journey
 from motorbus.motion.moving.moved import Arrived, Moved
 from motorbus.motion.moving.plan import Fact, Planned
 from motorbus.motion.moving.stream import USUAL
-from motorbus.motion.profile import Kind, Limiting, Limits, Move, Profile, Synchronised, synchronised
+from motorbus.motion.profile import Kind, Limits, Move, Profile, Synchronised, synchronised
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.profile.together import KINDS
-from motorbus.motion.trajectory import Course, Trajectory, sampled
+from motorbus.motion.trajectory import Course, Interpolation, Trajectory
+from motorbus.motion.trajectory.waypoints import check_kind
 
 if TYPE_CHECKING:
     from motorbus.motion.body import Body
@@ -91,44 +92,6 @@ class PointToPoint(NamedTuple):
         speeds = {name: profile.peak for name, profile in whole.profiles.items()}
         ways = {name: abs(move.goal - move.start) for name, move in moves.items()}
         return Planned(Crisp(whole, grains), goals, ways, speeds, self.limits, whole.limited_by)
-
-
-class Along(NamedTuple):
-    """Along a trajectory, from its first sample on; all axes can be led. See `journey.Plan`."""
-
-    axes: Mapping[str, AxisVerbs]
-    trajectory: Trajectory
-    asked: float | None = None
-
-    def planned(self, facts: Mapping[str, Fact], duration: float | None = None) -> Planned:
-        """The movement; raises LimitExceeded for the first sample that an axis or its device does not allow."""
-        specs = {name: axis.spec for name, axis in self.axes.items()}
-        limits.check_course(self.trajectory, specs, {name: fact.device for name, fact in facts.items()})
-        own = {name: Limits.of(spec) for name, spec in specs.items()}
-        samples = self.trajectory.axes
-        goals = {name: places[-1] for name, places in samples.items()}
-        ways = {name: max(places) - min(places) for name, places in samples.items()}
-        speeds = {name: _peak(self.trajectory.times, places) for name, places in samples.items()}
-        return Planned(self.trajectory, goals, ways, speeds, own, Limiting("", "duration"))
-
-
-class Approach(NamedTuple):
-    """To where a trajectory begins. All of that is judged before anybody goes there. See `journey.Plan`."""
-
-    way: PointToPoint
-    then: Along
-    asked: float | None = None
-
-    def planned(self, facts: Mapping[str, Fact], duration: float | None = None) -> Planned:
-        """The movement to its beginning; raises LimitExceeded as either of the two does."""
-        self.then.planned(facts)
-        return self.way.planned(facts, duration)
-
-
-def _peak(times: Sequence[float], places: Sequence[float]) -> float:
-    """The highest speed between two samples (rad/s, m/s)."""
-    ways = zip(pairwise(places), pairwise(times), strict=True)
-    return max(abs(there - here) / (later - at) for (here, there), (at, later) in ways)
 
 
 # -- several axes ------------------------------------------------------------------------------------------------------
@@ -199,17 +162,23 @@ def park(
 
 
 def replay(
-    body: Body, trajectory: Course, *, speed: float = 1.0, rate: float | None = None
+    body: Body,
+    trajectory: Course,
+    *,
+    speed: float = 1.0,
+    rate: float | None = None,
+    interpolation: Interpolation = "spline",
 ) -> Abreast[Moved]:
     """Go along a trajectory: first to its beginning in one movement, then as it says. Its goals leave at `rate` (Hz).
 
-    `speed` (above 0) is how much faster it goes: 0.5 takes twice the time. A route is sampled first. What comes back is
-    of the trajectory, without the way to its beginning.
+    `speed` (above 0) is how much faster it goes: 0.5 takes twice the time. Samples of a `Trajectory` are joined by
+    `interpolation`, see `interpolated`; a route says itself what is between. What comes back is of the trajectory,
+    without the way to its beginning.
 
     Raises RequestError for an axis that cannot be led: a device that moves by a profile of its own goes from point to
-    point only. Raises LimitExceeded for the first sample that goes beyond a limit; else as `move`.
+    point only. Raises LimitExceeded for the first goal that would go beyond a limit; else as `move`.
     """
-    plan, first = _replayed(body, trajectory, speed)
+    plan, first = _replayed(body, trajectory, speed, rate, interpolation)
     axes, way, origins = _moving(body, first, None, "trapezoid", min(speed, 1.0))
     approach = Journey(axes, Approach(way, plan), origins, rate)
     journey = Journey(plan.axes, plan, body.origins, rate)
@@ -249,13 +218,19 @@ def _moving(
     )
 
 
-def _replayed(body: Body, course: Course, speed: float) -> tuple[Along, dict[str, float]]:
+def _replayed(
+    body: Body, course: Course, speed: float, rate: float | None, kind: Interpolation
+) -> tuple[Along, Mapping[str, float]]:
     """What a replay is made of, and where it begins."""
     limits.check_number("speed", speed)
     if not (isfinite(speed) and speed > 0):
         raise RequestError(f"speed is {speed}", expected="a finite number above 0", advice=NOTHING)
-    trajectory = course if isinstance(course, Trajectory) else sampled(course, USUAL)
-    axes = {name: body.axis(name) for name in trajectory.axes}
+    if rate is not None:
+        limits.check_number("rate", rate)
+    check_kind(kind)
+    way = course.joined(kind) if isinstance(course, Trajectory) else course
+    first = way.positions(0.0)
+    axes = {name: body.axis(name) for name in first}
     for name, axis in axes.items():
         if "train" not in axis.able:
             raise RequestError(
@@ -263,9 +238,9 @@ def _replayed(body: Body, course: Course, speed: float) -> tuple[Along, dict[str
                 expected="axes that can be led",
                 advice=f"leave it out, and move it from point to point; {NOTHING}",
             )
-    plan = Along(axes, trajectory if speed == 1.0 else trajectory.scaled(1 / speed))
-    limits.check_course(plan.trajectory, {name: axis.spec for name, axis in axes.items()})
-    return plan, {name: places[0] for name, places in trajectory.axes.items()}
+    plan = Along(axes, Paced(way, speed))
+    plan.led(USUAL if rate is None else rate, axes)  # what is wrong for sure is told without asking anybody
+    return plan, first
 
 
 # -- one axis ----------------------------------------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 Velocity is judged over each stretch between two samples, acceleration from one stretch to the next, and from rest and
 to rest at its ends. Of a smooth movement these are never above the true ones. So sample a route at the rate of the loop
-before it is judged; a corner between two samples is then as hard as the loop would make it.
+before it is judged; a corner between two samples is then as hard as the loop would make it. Rows of a file are no such
+samples, unless they are as fine: a replay joins them, and has the goals judged that it makes of them (`moving.along`).
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
 """A movement as samples: what was taught, what stands in a file, what a loop will send. A value, never a recorder.
 
-Between two samples every axis goes straight. What makes another one of it gives a new trajectory back.
+Between two samples every axis goes straight, unless they are joined by something else. What makes another one of it
+gives a new trajectory back.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, isfinite
@@ -19,7 +20,7 @@ from motorbus.motion.machine.model import FARTHEST
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.trajectory import columns
 from motorbus.motion.trajectory.smoothing import smooth
-from motorbus.motion.trajectory.waypoints import Interpolation, Waypoint, interpolated
+from motorbus.motion.trajectory.waypoints import Interpolation, check_kind, joined
 
 if TYPE_CHECKING:
     from motorbus.motion.machine import AxisSpec
@@ -126,15 +127,12 @@ class Trajectory:
 
     def resampled(self, rate: float, kind: Interpolation = "linear") -> Trajectory:
         """The same with a sample for each round of a loop of `rate` (Hz), see `sampled`; `cubic` rounds the corners."""
-        if kind == "linear":
-            return sampled(self, rate)
-        rows = zip(self.times, *self.axes.values(), strict=True)
-        return sampled(
-            interpolated(
-                [Waypoint(dict(zip(self.axes, row[1:], strict=True)), row[0]) for row in rows], kind
-            ),
-            rate,
-        )
+        return sampled(self.joined(kind), rate)
+
+    def joined(self, kind: Interpolation = "spline") -> Course:
+        """What goes through its samples, see `interpolated`. Raises RequestError for a kind that is none."""
+        check_kind(kind)
+        return self if kind == "linear" else joined(self.times, self.axes, kind)
 
     def smoothed(self, cutoff: float) -> Trajectory:
         """Without what is quicker than `cutoff` (Hz, above 0): tremor of a hand, steps of a sensor.
@@ -182,17 +180,26 @@ def sampled(course: Course, rate: float) -> Trajectory:
 
     Raises RequestError for a rate that is none, for a course of no duration, and for more samples than fit.
     """
-    _above_nothing(rate=rate)
-    if not 0 < course.duration <= LONGEST or rate > FASTEST or course.duration * rate > MOST - 2:
-        raise _refused(
-            f"{course.duration:.6g} s at {rate:.6g} Hz cannot be sampled",
-            f"above 0 s, at most {FASTEST:.0f} Hz and {MOST} samples",
-        )
+    check_sampled(course.duration, rate)
     rounds = max(1, ceil(course.duration * rate * (1 - 1e-12)))
-    times = [number / rate for number in range(rounds + 1)]
+    return taken(course, [number / rate for number in range(rounds + 1)])
+
+
+def taken(course: Course, times: Sequence[float], names: Iterable[str] | None = None) -> Trajectory:
+    """Samples of a course at these times (s), the last one where it ends; of all axes or of those named."""
     rows = [course.positions(at) for at in times[:-1]]
     rows.append(course.positions(course.duration))
-    return Trajectory(times, {name: [row[name] for row in rows] for name in rows[0]})
+    return Trajectory(times, {name: [row[name] for row in rows] for name in names or rows[0]})
+
+
+def check_sampled(duration: float, rate: float) -> None:
+    """Raise RequestError for a rate (Hz) that is none, for no duration (s), and for more samples than fit."""
+    _above_nothing(rate=rate)
+    if not 0 < duration <= LONGEST or rate > FASTEST or duration * rate > MOST - 2:
+        raise _refused(
+            f"{duration:.6g} s at {rate:.6g} Hz cannot be sampled",
+            f"above 0 s, at most {FASTEST:.0f} Hz and {MOST} samples",
+        )
 
 
 def _source(path: str | PathLike[str]) -> str:

@@ -1,24 +1,25 @@
 """Through waypoints, one after the other: when it is at each, and what it does in between.
 
-Each stretch between two waypoints is a profile of its own. None of the three kinds ever leaves the range of the two
-waypoints it is between, so waypoints within the limits of an axis make a route within them.
+Each stretch between two waypoints is a profile of its own. All kinds but `spline` never leave the range of the two
+waypoints a stretch is between, so waypoints within the limits of an axis make a route within them. A `spline` is for
+samples of a movement: it turns back beyond the outermost one, as the movement did.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, isfinite
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine.model import FARTHEST
 from motorbus.motion.machine.refusal import listed
 from motorbus.motion.profile.shapes import NOTHING, Profile, cubic, line, minimum_jerk
 
-Interpolation: TypeAlias = Literal["linear", "cubic", "minimum_jerk"]
+Interpolation: TypeAlias = Literal["linear", "cubic", "spline", "minimum_jerk"]
 
 
 class Waypoint(NamedTuple):
@@ -33,12 +34,22 @@ class Waypoint(NamedTuple):
     speed: float | None = None
 
 
+class Stretches(Protocol):
+    """The profiles of an axis, one from each waypoint to the next."""
+
+    def __getitem__(self, place: int, /) -> Profile:
+        """That of a stretch, counted from 0."""
+
+    def __iter__(self) -> Iterator[Profile]:
+        """Each, one after the other."""
+
+
 @dataclass(frozen=True, slots=True)
 class Route:
     """A movement through waypoints. Made by `interpolated`; `times` (s) are those of the waypoints."""
 
     times: tuple[float, ...]
-    profiles: Mapping[str, tuple[Profile, ...]]
+    profiles: Mapping[str, Stretches]
 
     @property
     def duration(self) -> float:
@@ -68,10 +79,10 @@ def interpolated(waypoints: Sequence[Waypoint], kind: Interpolation = "cubic") -
 
     `linear` goes at one velocity to each and jumps to the next one there: for what is slow, or finely sampled. `cubic`
     has a continuous velocity, begins and ends at rest, and rests where an axis turns back (Fritsch and Butland, 1984).
+    `spline` does not rest there, and goes a little beyond the waypoint instead: for samples of what has really moved.
     `minimum_jerk` rests at each waypoint. Raises RequestError, naming the waypoint, counted from 0.
     """
-    if kind not in MADE:
-        raise RequestError(f"{kind!r} is no kind of route", expected=listed(MADE), advice=NOTHING)
+    check_kind(kind)
     if len(waypoints) < 2:
         raise RequestError(f"{len(waypoints)} waypoints are no way", expected="two or more", advice=NOTHING)
     names = list(waypoints[0].positions)
@@ -82,25 +93,79 @@ def interpolated(waypoints: Sequence[Waypoint], kind: Interpolation = "cubic") -
     return Route(times, {name: MADE[kind](times, column) for name, column in columns.items()})
 
 
+def joined(
+    times: Sequence[float], axes: Mapping[str, Sequence[float]], kind: Interpolation = "spline"
+) -> Route:
+    """The route through the samples of a trajectory. Raises RequestError for a kind that is none."""
+    check_kind(kind)
+    return Route(tuple(times), {name: MADE[kind](times, places) for name, places in axes.items()})
+
+
+def check_kind(kind: str) -> None:
+    """Raise RequestError for a kind of interpolation that is none."""
+    if kind not in MADE:
+        raise RequestError(f"{kind!r} is no kind of route", expected=listed(MADE), advice=NOTHING)
+
+
 # -- what it does in between -----------------------------------------------------------------------------------------
 
 
-def _linear(times: Sequence[float], places: Sequence[float]) -> tuple[Profile, ...]:
+@dataclass(frozen=True, slots=True)
+class Cubics:
+    """Cubics with these velocities (rad/s, m/s) at the waypoints. Made when asked for: a recording has very many."""
+
+    times: Sequence[float]
+    places: Sequence[float]
+    velocities: Sequence[float]
+
+    def __getitem__(self, place: int) -> Profile:
+        """See `Stretches`."""
+        (begin, end), (start, goal), (first, last) = (
+            row[place : place + 2] for row in (self.times, self.places, self.velocities)
+        )
+        return cubic(start, goal, duration=end - begin, first=first, last=last)
+
+    def __iter__(self) -> Iterator[Profile]:
+        """See `Stretches`."""
+        return (self[place] for place in range(len(self.times) - 1))
+
+
+def _linear(times: Sequence[float], places: Sequence[float]) -> Stretches:
     return tuple(line(*ends, duration=lasts) for lasts, ends in _stretches(times, places))
 
 
-def _minimum_jerk(times: Sequence[float], places: Sequence[float]) -> tuple[Profile, ...]:
+def _minimum_jerk(times: Sequence[float], places: Sequence[float]) -> Stretches:
     return tuple(minimum_jerk(*ends, duration=lasts) for lasts, ends in _stretches(times, places))
 
 
-def _cubic(times: Sequence[float], places: Sequence[float]) -> tuple[Profile, ...]:
-    stretches = _stretches(times, places)
-    means = [(lasts, (goal - start) / lasts) for lasts, (start, goal) in stretches]
-    through = [0.0, *(_passing(*before, *after) for before, after in pairwise(means)), 0.0]
-    return tuple(
-        cubic(*ends, duration=lasts, first=first, last=last)
-        for (lasts, ends), (first, last) in zip(stretches, pairwise(through), strict=True)
-    )
+def _cubic(times: Sequence[float], places: Sequence[float]) -> Stretches:
+    means = _means(times, places)
+    inner = (_passing(*before, *after) for before, after in pairwise(means))
+    return Cubics(times, places, [0.0, *inner, 0.0])
+
+
+def _spline(times: Sequence[float], places: Sequence[float]) -> Stretches:
+    """Through samples of a movement: constant acceleration is met exactly, and a jump of it nearly.
+
+    The velocity at a sample is that of a parabola through three neighbours. Of the three parabolas that there are the
+    one in the middle counts, so none counts that goes across a jump. At its ends it rests: as if mirrored there.
+    """
+    means = _means(times, places)
+    (first, slow), (last, fast) = means[0], means[-1]
+    around = pairwise([(first, -slow), *means, (last, -fast)])
+    bends = [(fast - slow) / (before + after) for (before, slow), (after, fast) in around]
+    inner = [
+        sorted(
+            (slow + bends[place] * before, slow + bends[place + 1] * before, fast - bends[place + 2] * after)
+        )[1]
+        for place, ((before, slow), (after, fast)) in enumerate(pairwise(means))
+    ]
+    return Cubics(times, places, [0.0, *inner, 0.0])
+
+
+def _means(times: Sequence[float], places: Sequence[float]) -> list[tuple[float, float]]:
+    """How long each stretch lasts, and its mean velocity."""
+    return [(lasts, (goal - start) / lasts) for lasts, (start, goal) in _stretches(times, places)]
 
 
 def _passing(before: float, slow: float, after: float, fast: float) -> float:
@@ -118,9 +183,10 @@ def _stretches(times: Sequence[float], places: Sequence[float]) -> list[tuple[fl
     return [(end - begin, ends) for (begin, end), ends in zip(pairwise(times), pairwise(places), strict=True)]
 
 
-MADE: Final[Mapping[str, Callable[[Sequence[float], Sequence[float]], tuple[Profile, ...]]]] = {
+MADE: Final[Mapping[str, Callable[[Sequence[float], Sequence[float]], Stretches]]] = {
     "linear": _linear,
     "cubic": _cubic,
+    "spline": _spline,
     "minimum_jerk": _minimum_jerk,
 }
 
