@@ -94,3 +94,4 @@ def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:
         "several hosts",
     }
     assert given["one gate"] is Given.YES
+    assert given["velocity"] is given["acceleration"] is Given.PARTLY
