@@ -42,7 +42,7 @@ def flock(*guards: Guard) -> Flock:
 
 
 def where(exchange: Exchange[Any], answer: Answer) -> Any:
-    assert exchange.tells_position is not None
+    assert not isinstance(exchange.tells_position, bool)
     return exchange.tells_position(answer)
 
 
