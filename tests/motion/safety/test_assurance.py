@@ -45,6 +45,14 @@ def test_how_far_a_led_axis_goes_on_is_one_cycle_of_its_bus(period: float) -> No
     assert axis.left == spec.show(radians(90) * period)
 
 
+@pytest.mark.parametrize("cycles", [None, {}, {"can": 0.05}])
+def test_on_a_bus_of_which_no_cycle_is_told_it_is_the_usual_one(cycles: dict[str, float] | None) -> None:
+    with machine(arm="1") as (made, _):
+        (axis,) = assured(made, families(made), cycles).axes
+        spec = made.axes["a1"]
+    assert axis.left == spec.show(radians(90) / USUAL) != spec.show(0.0)
+
+
 def test_a_cycle_is_as_long_as_axes_are_led() -> None:
     assert cycle(1000.0) == 1 / USUAL
     assert cycle(40.0) == pytest.approx(1 / (SHARE * 40))

@@ -129,3 +129,23 @@ def test_as_many_aims_are_kept_in_mind_as_said() -> None:
     aims = [aim(1) for _ in range(FLOCKS)]
     laid = [flocks.of(one, guards) for one in aims]
     assert all(flocks.of(one, guards) is its for one, its in zip(aims, laid, strict=True))
+
+
+@pytest.mark.parametrize("way", [TREMBLING / 2, 2 * TREMBLING])
+def test_a_reading_that_can_be_ends_a_doubt_and_is_where_it_is_now(way: float) -> None:
+    its = guard(at=NOW - 0.1)
+    assert its.track is not None
+    its.track.suspect = Sample(9.0, NOW - 0.05)
+    heard = {1: (Exchange[None](b"?", tells_position=lambda _: {1: 0.5 + way}), Answer((), (1,), NOW))}
+    assert flock(its).are_fine((FINE,), heard, where, NOW)
+    assert its.track.suspect is None
+    assert its.track.sample == Sample(0.5 + way, NOW)
+
+
+def test_one_that_is_laid_out_anew_takes_the_place_of_its_own_old_one() -> None:
+    flocks, guards = Flocks(), {1: guard(), 2: guard()}
+    aims = [aim(2), *(aim(1) for _ in range(FLOCKS - 1))]
+    laid = [flocks.of(one, guards) for one in aims]
+    guards[2] = guard()
+    assert flocks.of(aims[0], guards) is not laid[0]
+    assert all(flocks.of(one, guards) is its for one, its in zip(aims[1:], laid[1:], strict=True))
