@@ -174,6 +174,13 @@ def test_what_survives_needs_a_reason_and_a_reason_something_that_survives() -> 
     assert list(record.complaints(ABORT._replace(reasons={"b": "x"}), {**told, "noticed": 3})) == []
 
 
+def test_the_page_says_what_was_tried_by_an_older_script() -> None:
+    told = record.outcome([Verdict("a", "test_x")], 1)
+    assert record.OLDER not in record.page({"abort": ABORT}, {"abort": told})
+    del told["rules"]
+    assert f"{record.OLDER}`abort`.\n" in record.page({"abort": ABORT}, {"abort": told})
+
+
 def test_the_page_is_made_of_what_is_kept() -> None:
     known, told = subjects(), record.kept()
     assert record.PAGE.read_text(encoding="utf-8") == record.page(known, told)
