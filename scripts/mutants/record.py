@@ -36,8 +36,8 @@ fault takes a new process; "tried" says how many of all it were. Every fault in 
 one module and prints what lives.
 """
 OLDER: Final = (
-    "Tried by an older script, which took a test that was slow to begin for one that had noticed, and statements at the top\n"
-    "of a function for tables:\n"
+    "Tried by an older script, which took a test that was slow to begin for one that had noticed, and statements\n"
+    "at the top of a function for tables:\n"
 )
 
 
