@@ -103,3 +103,9 @@ def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:
     }
     assert given["one gate"] is Given.YES
     assert given["velocity"] is given["acceleration"] is Given.PARTLY
+
+
+def test_a_guard_is_on_where_a_device_tells_its_strain_and_nobody_switched_it_off() -> None:
+    with machine(arm="1-2", lift=True, axes={"a2": {"guard": False}}) as (made, _):
+        found = {one.name: one.guard for one in assured(made, families(made)).axes}
+    assert found == {"a1": "on", "a2": "none", "lift": "none"}
