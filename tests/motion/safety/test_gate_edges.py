@@ -397,16 +397,3 @@ def test_everyone_is_ordered_what_is_said_first() -> None:
 def test_far_it_goes_at_once_only_with_a_speed_and_no_time_of_its_own(more: list[Goal], fine: bool) -> None:
     line = known(bounds=Bounds(speed=1.0))
     assert line.reason(place(3.0), *more) == ("" if fine else "velocity")
-
-
-@pytest.mark.parametrize(("beyond", "passes"), [(0.9e-9, True), (1.1e-9, False)])
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_what_rounding_adds_to_a_limit_passes_and_no_more(beyond: float, passes: bool, way: float) -> None:
-    order = Exchange[None](
-        b"!", effect=Effect.MOTION, goals=(Goal(1, "position", way * (1.0 + beyond), -1.0, 1.0),)
-    )
-    if passes:
-        Gate()(order)
-        return
-    with pytest.raises(LimitExceeded, match="lies outside"):
-        Gate()(order)

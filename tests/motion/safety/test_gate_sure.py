@@ -1,4 +1,7 @@
-"""The quick way of a gate, case by case: who is told, when what was heard is fetched, and what it is not for."""
+"""The quick way of a gate, case by case: who is told, when what was heard is fetched, and what it is not for.
+
+And what rounding adds to a limit, which the quick way leaves to the close look.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import pytest
 
 from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.operation import Answer, Effect, Exchange, Goal
+from motorbus.errors import LimitExceeded
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
 
@@ -106,3 +110,16 @@ def test_without_guards_all_that_is_sure_passes_but_where_somebody_must_attend(a
     gate = Gate()
     gate.attended = attended
     assert gate.passes(made_for_once(*GOALS)) is not attended
+
+
+@pytest.mark.parametrize(("beyond", "passes"), [(0.9e-9, True), (1.1e-9, False)])
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_what_rounding_adds_to_a_limit_passes_and_no_more(beyond: float, passes: bool, way: float) -> None:
+    order = Exchange[None](
+        b"!", effect=Effect.MOTION, goals=(Goal(1, "position", way * (1.0 + beyond), -1.0, 1.0),)
+    )
+    if passes:
+        Gate()(order)
+        return
+    with pytest.raises(LimitExceeded, match="lies outside"):
+        Gate()(order)
