@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import ast
 import os
+from time import process_time
+from typing import Any
 
 import pytest
 
-from scripts.mutants import forks, record
+from scripts.mutants import forks, inside, record
 from scripts.mutants.changes import mutants
-from scripts.mutants.subjects import Subject, Verdict, Wish, faults, subjects
+from scripts.mutants.subjects import ROOT, Subject, Verdict, Wish, faults, subjects
 from scripts.mutants.trial import trial
 
 ABORT = Subject(
@@ -89,6 +91,24 @@ def test_a_name_outlives_the_lines_around_it() -> None:
     assert one.lines != other.lines
 
 
+@pytest.mark.parametrize(
+    ("source", "inside"),
+    [
+        ("def f(a):\n return a", True),
+        ("def f(a):\n a.b = c", True),
+        ("class C:\n def f(self, a):\n  return a", True),
+        ("a.b = c", False),
+        ("class C:\n a: int = 1", False),
+        ("def f(a=1):\n pass", False),
+    ],
+)
+def test_what_is_in_the_body_of_a_function_takes_no_new_import(source: str, inside: bool) -> None:
+    """Else a share of tables would be a share of the statements of functions, too."""
+    found = mutants(ast.parse(f"{source}\n"))
+    assert found
+    assert {one.swapped for one in found} == {inside}
+
+
 # --- processes ----------------------------------------------------------------------------------------------------
 
 
@@ -103,6 +123,28 @@ def test_a_child_that_comes_to_no_end_is_ended(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(forks, "START", 0.05)
     unread, _ = os.pipe()
     assert list(forks.each(["never"], lambda _: os.read(unread, 1), 0.0)) == [("never", None)]
+
+
+class Slow:
+    """In place of a test that is the first to need what others have found imported."""
+
+    nodeid = "slow"
+
+    def __init__(self) -> None:
+        self.config = self.hook = self
+
+    def pytest_runtest_protocol(self, **_: object) -> None:
+        begun = process_time()
+        while process_time() < begun + 1.0:
+            pass
+
+
+def test_a_test_that_is_slow_because_it_is_the_first_has_not_noticed_anything() -> None:
+    def work(item: Any) -> str:
+        return inside._Tests().run([item], {"slow": 0.001})
+
+    ((_, by),) = forks.each([Slow()], work, 20.0)
+    assert by == ""
 
 
 def test_a_trial_says_which_test_noticed_and_which_fault_none() -> None:
@@ -132,16 +174,46 @@ def test_what_survives_needs_a_reason_and_a_reason_something_that_survives() -> 
     assert list(record.complaints(ABORT._replace(reasons={"b": "x"}), {**told, "noticed": 3})) == []
 
 
+def test_the_page_says_what_was_tried_by_an_older_script() -> None:
+    told = record.outcome([Verdict("a", "test_x")], 1)
+    assert record.OLDER not in record.page({"abort": ABORT}, {"abort": told})
+    del told["rules"]
+    assert f"{record.OLDER}`abort`.\n" in record.page({"abort": ABORT}, {"abort": told})
+
+
 def test_the_page_is_made_of_what_is_kept() -> None:
     known, told = subjects(), record.kept()
     assert record.PAGE.read_text(encoding="utf-8") == record.page(known, told)
     assert set(told) <= set(known)
 
 
-def test_every_reason_is_of_a_fault_that_there_is() -> None:
+@pytest.fixture(scope="module")
+def there_are() -> dict[str, list[str]]:
+    """The names of all faults today, by subject."""
+    return {name: [one.name for one in faults(subject, Wish())] for name, subject in subjects().items()}
+
+
+def test_every_reason_is_of_a_fault_that_there_is(there_are: dict[str, list[str]]) -> None:
     """Else the line was changed since, and what was said of it is of nothing."""
-    for subject in subjects().values():
-        assert subject.reasons.keys() <= {one.name for one in faults(subject, Wish())}
+    for name, subject in subjects().items():
+        assert subject.reasons.keys() <= set(there_are[name])
+
+
+CHANGED_SINCE = {"kst-wire", "safety-known", "stop", "turns"}
+"""Subjects that have more or fewer faults today than when they were tried; none is to be added."""
+
+
+def test_what_is_kept_is_of_the_files_as_they_are(there_are: dict[str, list[str]]) -> None:
+    """Else a module was changed since, and what is new in it has had no trial: `--keep` with its name tries it."""
+    kept = {name: told["there are"] for name, told in record.kept().items()}
+    assert {name for name, names in there_are.items() if len(names) != kept[name]} == CHANGED_SINCE
+
+
+def test_whatever_keeps_motion_safe_is_tried() -> None:
+    """But for the package itself, which only says what is in it."""
+    safety = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("src/motorbus/motion/safety/**/*.py")}
+    tried = {file for subject in subjects().values() for file in subject.files}
+    assert safety - tried == {"src/motorbus/motion/safety/__init__.py"}
 
 
 def test_every_survivor_has_its_reason() -> None:

@@ -135,17 +135,17 @@ class _Walk:
         self.above.pop()
 
     def _child(self, child: ast.AST, node: ast.AST, field: str, index: int | None) -> Iterator[Mutant]:
+        body = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and field == "body"
+        self.inside += body
         for new in changes(child, node, field):
             yield self._mutant(child, node, field, index, new)
         named = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-        body = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and field == "body"
         if named:
             self.names.append(child.name)  # type: ignore[attr-defined]
-        self.inside += body
         yield from self.through(child)
-        self.inside -= body
         if named:
             self.names.pop()
+        self.inside -= body
 
     def _mutant(self, child: ast.AST, node: ast.AST, field: str, index: int | None, new: object) -> Mutant:
         shown = self._shown(child)

@@ -25,11 +25,14 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from scripts.mutants.forks import each
+from scripts.mutants.forks import LATE, each
 from scripts.mutants.subjects import ROOT, Fault, Subject, Verdict, Wish
 
 PATIENCE = 300.0
 """s of processor time in which all tests of a subject must have run once."""
+COLD = 5.0
+"""s of processor time that a test may last besides: the first one that needs something pays for its import, and what
+ends it for that would count as having noticed a fault."""
 Line = tuple[str, int]
 
 
@@ -61,7 +64,7 @@ class Order:
     @property
     def limit(self) -> float:
         """How long a child may last (s)."""
-        return 1 + 3 * sum(self.lasted.values())
+        return 2 * COLD + 3 * sum(self.lasted.values())
 
     def noticed(self, file: str, by: str) -> None:
         """A fault of this file was noticed by that test."""
@@ -104,8 +107,8 @@ class _Tests:
     def run(self, items: Sequence[pytest.Item], lasted: Mapping[str, float]) -> str:
         """The name of the first that failed, "" when all passed. One that lasts much too long ends this process."""
         for item, following in zip(items, [*items[1:], None], strict=True):
-            signal.setitimer(signal.ITIMER_PROF, 0.5 + 5 * lasted.get(item.nodeid, 1.0))
-            signal.setitimer(signal.ITIMER_REAL, 5 + 10 * lasted.get(item.nodeid, 1.0))
+            signal.setitimer(signal.ITIMER_PROF, COLD + 5 * lasted.get(item.nodeid, 1.0))
+            signal.setitimer(signal.ITIMER_REAL, LATE * COLD + 10 * lasted.get(item.nodeid, 1.0))
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
             if self.failed:
                 break

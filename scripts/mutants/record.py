@@ -17,6 +17,8 @@ KEPT: Final = ROOT / "docs" / "reference" / "mutants.json"
 WANTED: Final = 0.95
 """The share of faults that must be noticed."""
 
+RULES: Final = 2
+"""Of a trial by others, or of one that does not say, the page says what was amiss with it."""
 HEAD = """# Mutants
 
 A test that passes says little until it is known to fail. So small faults are put one at a time into the modules on
@@ -33,6 +35,10 @@ fault takes a new process; "tried" says how many of all it were. Every fault in 
 `python -m scripts.mutants --keep` runs all of them anew and makes this page; `python -m scripts.mutants kst-wire` tries
 one module and prints what lives.
 """
+OLDER: Final = (
+    "Tried by an older script, which took a test that was slow to begin for one that had noticed, and statements\n"
+    "at the top of a function for tables:\n"
+)
 
 
 def outcome(verdicts: Sequence[Verdict], there_are: int) -> dict[str, Any]:
@@ -40,6 +46,7 @@ def outcome(verdicts: Sequence[Verdict], there_are: int) -> dict[str, Any]:
     return {
         "date": datetime.now(UTC).date().isoformat(),
         "python": platform.python_version(),
+        "rules": RULES,
         "there are": there_are,
         "faults": len(verdicts),
         "noticed": sum(bool(one.by) for one in verdicts),
@@ -85,6 +92,8 @@ def page(subjects: dict[str, Subject], known: dict[str, Any]) -> str:
     lines = [HEAD, *listed(columns, (_row(*one) for one in both))]
     left = [f"`{name}`" for name in subjects if name not in known]
     lines += [f"Not tried to the end yet: {', '.join(left)}.\n"] if left else []
+    older = [f"`{one.name}`" for one, told in both if told.get("rules") != RULES]
+    lines += [f"{OLDER}{', '.join(older)}.\n"] if older else []
     for one in both:
         lines += _section(*one)
     return "\n".join(lines)

@@ -45,6 +45,14 @@ def test_how_far_a_led_axis_goes_on_is_one_cycle_of_its_bus(period: float) -> No
     assert axis.left == spec.show(radians(90) * period)
 
 
+@pytest.mark.parametrize("cycles", [None, {}, {"can": 0.05}])
+def test_on_a_bus_of_which_no_cycle_is_told_it_is_the_usual_one(cycles: dict[str, float] | None) -> None:
+    with machine(arm="1") as (made, _):
+        (axis,) = assured(made, families(made), cycles).axes
+        spec = made.axes["a1"]
+    assert axis.left == spec.show(radians(90) / USUAL) != spec.show(0.0)
+
+
 def test_a_cycle_is_as_long_as_axes_are_led() -> None:
     assert cycle(1000.0) == 1 / USUAL
     assert cycle(40.0) == pytest.approx(1 / (SHARE * 40))
@@ -94,3 +102,10 @@ def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:
         "several hosts",
     }
     assert given["one gate"] is Given.YES
+    assert given["velocity"] is given["acceleration"] is Given.PARTLY
+
+
+def test_a_guard_is_on_where_a_device_tells_its_strain_and_nobody_switched_it_off() -> None:
+    with machine(arm="1-2", lift=True, axes={"a2": {"guard": False}}) as (made, _):
+        found = {one.name: one.guard for one in assured(made, families(made)).axes}
+    assert found == {"a1": "on", "a2": "none", "lift": "none"}
