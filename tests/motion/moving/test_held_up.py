@@ -6,10 +6,12 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Progress
+from motorbus.core.operation import Data, Progress
 from motorbus.errors import Interrupted
+from motorbus.link.base import Delivery, Side
 from motorbus.motion.moving.stream import HELD_UP
 from motorbus.session.robot import Robot
+from tests.motion.loop.lines import Doubtful
 from tests.motion.machines import machine
 
 
@@ -51,6 +53,39 @@ def test_a_short_one_is_made_up_for() -> None:
             robot.move({"a1": 0.6, "c1": 0.6}, duration=6.0)
             assert robot["a1"].position() == pytest.approx(0.6, abs=0.01)
         assert held
+
+
+class SomeLost(Doubtful):
+    """As many answers as `left` says are lost, of those that are mute."""
+
+    left = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        found = super().carry(sender, data, at)
+        if sender is Side.DEVICE and not found:
+            self.left -= 1
+            self.mute = self.mute if self.left else set()
+        return found
+
+
+def test_who_was_not_asked_meanwhile_is_not_called_silent_for_one_answer_that_is_lost_then() -> None:
+    with machine(arm="1-2") as (made, sims):
+        machines: list[Any] = []
+        held: list[int] = []
+        sims["arm"].line = line = SomeLost()
+
+        def hear(event: object) -> None:
+            if isinstance(event, Progress) and event.done > 1500 and not held:
+                held.append(event.done)
+                line.mute, line.left = {1}, 2
+                machines[0].buses["arm"].link.advance(0.9 * HELD_UP)
+
+        with Robot.of(made, report=hear) as robot:
+            machines.append(robot)
+            robot.move({"a1": 0.6, "a2": 0.6}, duration=2.0)
+            assert robot["a1"].position() == pytest.approx(0.6, abs=0.01)
+        assert held
+        assert not line.mute
 
 
 def _place(sims: Any, axis: str) -> float:

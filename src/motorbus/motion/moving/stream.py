@@ -54,8 +54,8 @@ FAR: Final = 0.1
 FINEST: Final = 1e-5
 """rad of the device; no servo can be told less."""
 SILENCE: Final = 0.3
-"""s for which nothing may be heard of an axis, or five cycles, if those last longer: a bus that doubts a device leaves
-it alone for a while, and asks it twice more in this time."""
+"""s for which an axis may not answer, or five cycles, if those last longer: a bus that doubts a device leaves it alone
+for a while, and asks it twice more in this time."""
 SHOWN: Final = 0.25
 """s between two reports of progress."""
 
@@ -189,7 +189,7 @@ class Stream:
         }
         self._start = self._lead = self._first = self._reported = 0.0
         self._over = False
-        self._heard: dict[int, float] = {}
+        self._silent: dict[int, float] = {}
         self._places: dict[int, float] = {}
         self._cycles = self._skipped = self._lost = 0
 
@@ -206,7 +206,6 @@ class Stream:
         """
         self._start = start
         self._lead = lead
-        self._heard = dict.fromkeys(self._axes, start)
         yield from Together([self._ending(self._tell()), self._ending(self._look())])
         yield from self._settle()
         tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
@@ -286,7 +285,7 @@ class Stream:
         now = yield from Pause(0)
         for node in self._axes.keys() - heard:
             self._lost += 1
-            self._check_heard(node, now)
+            self._check_silent(node, now)
 
     def _ask(self) -> Operation[None]:
         """How one of them fares, when it is his turn and there is room before the next slot."""
@@ -307,7 +306,7 @@ class Stream:
                 strict=True,
             ):
                 row.append(value)
-            self._heard[node] = found.at
+            self._silent.pop(node, None)
         self._places.update(found.values)
         return set(found.values)
 
@@ -384,10 +383,11 @@ class Stream:
             alarms = {axis.name: self._watch.alarms(axis) for axis in short}
             raise not_there(short, goals, presents, near, self._patience, alarms)
 
-    def _check_heard(self, node: int, now: float) -> None:
-        """Raise NoReply for an axis that has been silent for too long."""
-        if now - self._heard[node] > max(SILENCE, 5 * self._grid.period):
-            raise silent(self._axes[node], now - self._heard[node])
+    def _check_silent(self, node: int, now: float) -> None:
+        """Raise NoReply for an axis that has not answered for too long; nobody asks while the host is held up."""
+        since = self._silent.setdefault(node, now)
+        if now - since > max(SILENCE, 5 * self._grid.period):
+            raise silent(self._axes[node], now - since)
 
 
 def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:
