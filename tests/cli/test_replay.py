@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from motorbus.cli import replay
 from motorbus.core.operation import Data
+from motorbus.motion.trajectory import Interpolation
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_follow import at
 
@@ -147,3 +150,8 @@ def test_a_speed_at_which_nothing_can_be_judged_is_refused_by_its_name(
     ran = run("replay", "w.csv", "--speed", speed)
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith(f"error: --speed {speed}: ")
+
+
+def test_the_shell_knows_each_kind_in_which_rows_are_joined() -> None:
+    """It says them itself, so that a page of help loads nothing that moves."""
+    assert get_args(replay.Interpolation) == get_args(Interpolation)

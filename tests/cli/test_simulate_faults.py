@@ -9,7 +9,8 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -64,14 +65,21 @@ def lost(servo: Any) -> bool:
     return False
 
 
-@pytest.mark.parametrize("way", ["link", "tcp"])
-def test_a_serial_line_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
-    ways: dict[str, Any] = {"link": tmp_path / "arm"} if way == "link" else {"tcp": "0"}
+@contextmanager
+def suffering(family: str, way: str, folder: Path) -> Iterator[tuple[Control, Any]]:
+    """A device whose first answer is split, on a pseudo-terminal or TCP, with its control socket."""
+    ways: dict[str, Any] = {"link": folder / family} if way == "link" else {"tcp": "0"}
     with (
         Control() as control,
-        Simulated("feetech", faults="exchange 1: split 0.001", control=control.path, **ways) as simulated,
+        Simulated(family, faults="exchange 1: split 0.001", control=control.path, **ways) as simulated,
         motorbus.open(simulated.bus) as bus,
     ):
+        yield control, bus
+
+
+@pytest.mark.parametrize("way", ["link", "tcp"])
+def test_a_serial_line_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
+    with suffering("feetech", way, tmp_path) as (control, bus):
         servo = motorbus.feetech.Servo(bus, 1)
         servo.position()
         assert control.fired() == ["exchange 1: split 0.001"]
@@ -255,12 +263,7 @@ def test_an_order_for_faults_is_refused_on_such_a_bus_and_it_goes_on(tmp_path: P
 
 @pytest.mark.parametrize("way", ["link", "tcp"])
 def test_a_stepper_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
-    ways: dict[str, Any] = {"link": tmp_path / "stepper"} if way == "link" else {"tcp": "0"}
-    with (
-        Control() as control,
-        Simulated("stepper", faults="exchange 1: split 0.001", control=control.path, **ways) as simulated,
-        motorbus.open(simulated.bus) as bus,
-    ):
+    with suffering("stepper", way, tmp_path) as (control, bus):
         stepper = motorbus.stepper.Controller(bus)
         assert stepper.read_input(1) is False
         assert control.fired() == ["exchange 1: split 0.001"]
