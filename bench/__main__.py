@@ -39,8 +39,6 @@ T = TypeVar("T")
 
 DOCUMENT = ROOT / "docs" / "performance.md"
 IMAGES = DOCUMENT.parent / "images"
-GROWN = 3
-"""Rounds for the growth of cost, which has many points."""
 CAN_COUNT = 3000
 """Readings of one measurement on CAN."""
 ERRORS = (
@@ -102,7 +100,7 @@ def measured(times: int) -> report.Results:
         rounds=times,
         rows=found,
         failures=failures,
-        growth=had("growth", lambda: growth.points(GROWN, say), failures, []),
+        growth=had("growth", lambda: growth.points(growth.TIMES, say), failures, []),
         wire=of_each("on a pseudo-terminal", samples.on_wire, times, failures),
         memory=of_each("in process", samples.in_process, times, failures),
         calls=had("system calls", lambda: samples.all_calls(say), failures, None),

@@ -12,7 +12,7 @@ from bench.reasons import reason
 from bench.row import Row, Say, met, noted, shown, verdict
 
 COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs", "notes")
-SHORT = 1e-3
+SHORT = 1e-2
 Measure = Callable[[int, Say], list[Row]]
 
 

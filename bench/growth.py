@@ -16,6 +16,8 @@ from bench.workloads import GROWTH, growing
 
 COUNT = 250
 """Exchanges of one sample."""
+TIMES = 3
+"""Rounds, for there are many points."""
 IN_PROCESS = (OURS, "feetech-servo-sdk", "feetech-cli")
 ON_WIRE = (OURS, "rustypot", "feetech-servo-sdk")
 MEMORY, WIRE = "in process", "on a pseudo-terminal"

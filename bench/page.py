@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench import can_report, estimates, estop, goals, robot_loop, stepper_line
+from bench import can_report, estimates, estop, goals, growth, robot_loop, stepper_line
 from bench.report import (
     OURS,
     Results,
@@ -24,8 +24,8 @@ from bench.report import (
 _PAGE = """# Performance
 
 This page is written by `make bench`, which runs every contender side by side on one machine, in processes of
-their own and in shuffled rounds, and checks every value that was read and every goal that arrived. The numbers are
-of one run, on {machine}.
+their own and in shuffled rounds, and checks every value that was read, and every goal where the other end keeps books
+of what arrived: on the pseudo-terminal, not in process. The numbers are of one run, on {machine}.
 
 {goals}## On a pseudo-terminal
 
@@ -41,9 +41,9 @@ by `strace`. Of the writes, which nobody answers, one in 32 (of thirty servos on
 waits for the responder; its time is not counted, its system calls are.
 
 *lerobot* is LeRobot's FEETECH bus, lerobot 0.4.4, the newest for Python 3.11. The package asks for torch, 539 MB alone,
-and for much besides before that bus can be imported, though the bus uses none of it; small modules stand in for what it
-imports and does not use. It has no call for 15 bytes or for six. servolab reads 15 bytes always, so it is measured with
-those.
+and for much besides before that bus can be imported, though the bus uses next to none of it; small modules stand in for
+what it imports. It has no call for 15 bytes or for six. servolab's states are 15 bytes of each servo, so its sync reads
+are measured with those.
 
 {verdict}
 {spoiled}
@@ -66,8 +66,9 @@ _GOALS = """## Goals
 
 {summary} A ratio is the median of those taken within each round, ours by theirs where it is to be at most so much,
 theirs by ours where it is to be at least so much. What is measured in one thread may miss its goal by 15 % and what
-takes two processes by 25 %, for the machine is shared; a share of the wire limit, a count, a time in ms and real time
-may not. Such a row of two processes that misses is measured once more, and the second time counts. The *best* other
+takes two processes by 25 %, for the machine is shared; a share of the wire limit, a cycle rate, a count, a time in ms
+and real time may not. Of the rows 4 to 7 and 12 one that misses is measured once more, and the second time counts. The
+*best* other
 library of a workload is the one in Python that needs least in the same run. A row that misses says why; one without a
 goal is told beside the one that is judged. *In one burst* and *in pieces* say how an adapter hands over the answers of
 several servos: all at once when the last byte has passed, or each packet as it has.
@@ -80,7 +81,9 @@ several servos: all at once when the last byte has passed, or each packet as it 
 
 _GROWTH = """## Growth with the number of servos
 
-Positions by SYNC READ. Above 240 servos it takes two packets.
+Positions by SYNC READ, the middle of {grown} rounds. Above 240 servos it takes two packets. So long a train of answers
+is asked for on purpose here, by `air=`; unless told so, motorbus reads more than about fifty servos by several
+requests, so that a stop need not wait for one that long.
 
 ![Processor time against the number of servos](images/performance-growth.png)
 
@@ -129,7 +132,9 @@ def _goals(results: Results) -> str:
 
 
 def _growth(results: Results) -> str:
-    return _GROWTH.format(table=as_markdown(growth_table(results.growth))) if results.growth else ""
+    if not results.growth:
+        return ""
+    return _GROWTH.format(grown=growth.TIMES, table=as_markdown(growth_table(results.growth)))
 
 
 def _estimated(results: Results) -> str:

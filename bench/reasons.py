@@ -50,19 +50,22 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "what the bare loop of the same round lacks too. The rest is ours, between the last piece of an answer and "
         "the next request, and each piece is looked at by itself",
         "cycle rate": "between the last byte of one cycle and the first of the next the answer is checked and "
-        "the goals are judged; what that costs is in row 1, and rustypot's is compiled and judges nothing",
+        "the goals are judged, after a wait, with cold caches, so it takes longer than in row 1; rustypot's is "
+        "compiled and judges nothing",
     },
     "7": {
-        "in one burst: processor time per cycle, rustypot": "both sleep until the answer is there; waking up is "
-        "most of it, and what is ours besides is in row 1",
+        "in one burst: processor time per cycle, rustypot": "both sleep until the answer is there, and both wake "
+        "up with cold caches, which an interpreter needs more of than compiled code: without the waiting the same "
+        "cycle is in row 4",
         "in pieces: processor time per cycle, rustypot": "each packet may wake whoever waits, and every waking "
         "and every look at what has come so far takes longer in an interpreter than in compiled code",
         "feetech-servo-sdk": "the SDK waits in a busy loop, so its figure is about the length of a cycle; ours "
-        "is what waking up costs on this machine, and what is in row 1",
+        "is what waking up costs on this machine, and what is done after it with cold caches",
     },
     "8": {
-        "streaming": "every byte is tried as the beginning of a packet; the vendor's SDK gives up what follows a "
-        "damaged length, and is as quick as it is incomplete",
+        "streaming": "each piece costs a call and a result of its own, about as much as it takes to find its "
+        "packets, while the SDK has the whole capture at hand; where both read large blocks, as of a file, it is the "
+        "row beside this one",
     },
     "9": {
         "bulk": "numpy finds the packets and cuts them out, but the bytes of each are an object of their own, and "

@@ -40,7 +40,8 @@ LOOKS = 3
 """How often a look at a motor may be sent until it is answered."""
 STEP = math.tau / COUNTS
 WHY = (
-    "A loop that misses spends what is missing between an answer and the next write, after a wait, with cold caches: "
+    "Part of what is missing even a loop of bare system calls lacks, as in row 6. The rest a loop that misses spends "
+    "between an answer and the next write, after a wait, with cold caches: "
     "one that is ahead takes the answer apart and sees whether everybody may still be ordered; any other tells what "
     "it brought first, the program that leads sets its goals, and the gate judges them.\n"
 )

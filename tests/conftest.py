@@ -19,6 +19,8 @@ from scripts import soaked
 HERE = Path(__file__).parent
 USUAL_ROUNDS = 10_000
 QUICK_ROUNDS = 100
+LONG_RUN = 3_600
+"""s that a long run may last that does not say otherwise; it ends a hang, and a slow machine is none."""
 # What decides whether another interpreter is supported: the floors that every byte passes through.
 QUICK_FOLDERS = ("core", "bus", "families", "conformance")
 
@@ -40,7 +42,10 @@ def _profile(config: pytest.Config) -> str:
     return "quick" if config.getoption("--quick") else "test"
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
+    if _profile(config) == "soak" and config.option.timeout is None:
+        config.option.timeout = LONG_RUN
     settings.load_profile("quick" if config.getoption("--faults-off") else _profile(config))
     if config.getoption("--faults-off"):
         from tests.faults.off import switch_off

@@ -42,7 +42,8 @@ def test_a_row_shows_figure_verdict_seconds_and_notes(monkeypatch: pytest.Monkey
         "on a busy machine; for this reason",
     )
     assert goals.cells(MET._replace(number="10"))[-1] == ""
-    assert goals.cells(MET._replace(ours=2e-3))[8] == "2.0 / 0.0 ms"
+    assert goals.cells(MET._replace(ours=2e-3))[8] == "2000.0 / 17.0 µs"
+    assert goals.cells(MET._replace(ours=2e-2))[8] == "20.0 / 0.0 ms"
     assert len(goals.cells(MET)) == len(goals.COLUMNS)
 
 

@@ -186,6 +186,55 @@ def test_python_can_reads_on_behind_a_damaged_line(tmp_path: Path) -> None:
     assert [one.at for one in found if not one.line] == pytest.approx([1678881600.001, 1678881600.003])
 
 
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "   0.002000 1  625             R~   d 8 22 03 60 00 93 FF 00 00",
+        "   0.002000 1  6~5             Rx   d 8 22 03 60 00 93 FF 00 00",
+        "   0.0020?0 1  625             Rx   d 8 22 03 60 00 93 FF 00 00",
+        "   0.002000 1  625             R",
+        "   0.002000 1  62",
+        "   0.002000 1",
+        "   0.002000",
+    ],
+)
+def test_what_python_can_passes_over_in_asc_and_looks_like_a_frame_is_told(
+    line: str, place: int, tmp_path: Path
+) -> None:
+    *head, frame = ASC.splitlines()[:4]
+    rows = [frame, frame]
+    rows.insert(place, line)
+    (tmp_path / "trace.asc").write_text("\n".join([*head, *rows]))
+    found = list(read_log(tmp_path / "trace.asc"))
+    assert [one.line for one in found] == [4 + place if at == place else 0 for at in range(3)]
+    assert [one.frame for one in found if not one.line] == [FRAMES[0]] * 2
+
+
+@pytest.mark.parametrize("line", ["     2)         2.0  R~  0625  8  22 03", "     2)   2.0", "     2)"])
+def test_what_python_can_passes_over_in_trc_and_looks_like_a_frame_is_told(line: str, tmp_path: Path) -> None:
+    *head, frame = TRC.splitlines()[:3]
+    (tmp_path / "trace.trc").write_text("\n".join([*head, frame, line, frame]))
+    assert [one.line for one in read_log(tmp_path / "trace.trc")] == [0, 4, 0]
+
+
+def test_lines_about_other_things_are_not_told(tmp_path: Path) -> None:
+    about = (
+        "// a comment",
+        "   0.000000 Start of measurement",
+        "   0.015991 CAN 1 Status:chip status error active",
+        "   1.003000 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%",
+        "   0.016000 1  3FEE26x J1939TP FEE3p 6 0 0 - Rx d 2 0A FF",
+        "   0.017000 L1 23              Rx     3 4A 01 02",
+        "End TriggerBlock",
+    )
+    (tmp_path / "trace.asc").write_text("\n".join([*ASC.splitlines()[:4], *about]))
+    assert [one.frame for one in read_log(tmp_path / "trace.asc")] == [FRAMES[0]]
+    status = "     2)         2.0  Warng      FFFFFFFF  4  00 00 00 08 BUSHEAVY"
+    (tmp_path / "trace.trc").write_text("\n".join([*TRC.splitlines()[:3], status, ";   a comment"]))
+    assert [one.frame for one in read_log(tmp_path / "trace.trc")] == [FRAMES[0]]
+
+
 def test_bytes_in_hexadecimal_are_no_can_text() -> None:
     assert not looks_like_can("FF FF 01 04 02 38 02 BE")
     assert not looks_like_can("")

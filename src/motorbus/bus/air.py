@@ -162,7 +162,8 @@ class Air:
     def _let_settle(self, size: int, now: float) -> None:
         """A reply that came in pieces gets the time of one more byte: behind a shifted one, one byte is left over.
 
-        One that came whole needs none, unless it may be the beginning of an echo, of which the rest may follow.
+        One that came whole needs none, unless it may be the beginning of an echo, of which the rest may follow. It has
+        that time even where the reply came at its very deadline; nobody waits for that whose call is over.
         """
         for flight in self.flying.values():
             last = flight.last
@@ -172,7 +173,7 @@ class Air:
                 flight.settling = True
                 byte = byte_time(flight.exchange, self.family, self.rate)
                 pause = (ECHO_SETTLE if echo else SETTLE) * byte + echo * self.latency
-                flight.deadline = min(flight.deadline, now + pause)
+                flight.deadline = min(flight.deadline, now + pause) if flight.abandoned else now + pause
 
     def _take(self, event: Reply | Notice | Noise, now: float) -> None:
         if isinstance(event, Reply):

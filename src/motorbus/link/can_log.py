@@ -1,7 +1,8 @@
 """CAN traffic that somebody has recorded: candump text read here, ASC, BLF and TRC by python-can's readers.
 
 Text needs nothing installed, so a line of candump can be explained anywhere; the other formats need python-can. What
-is no classic CAN frame is told as such, never dropped, and so is a line that is damaged or cut off.
+is no classic CAN frame is told as such, never dropped, and so is a line that is damaged or cut off. In ASC and TRC
+there are lines about other things as well, and what these readers pass over is told if it still looks like a frame.
 """
 
 from __future__ import annotations
@@ -23,6 +24,14 @@ zeros). What goes on for longer has no lines, and would be read until the memory
 _SHOWN: Final = 60
 _GAPS: Final = {".asc": "\n", ".trc": ";\n"}
 """By ending: what stands in for the header where python-can's reader is begun anew behind a damaged line."""
+_LIKE_A_FRAME: Final = {
+    ".asc": re.compile(
+        r"(?!.*J1939TP)(\d+\.\d+(\s+\d+(\s+[0-9A-F]+x?(\s|$)|$)|$)|\S+\s+\d+\s+\S+\s+(Rx|Tx)\b)", re.I
+    ),
+    ".trc": re.compile(r"(?!.*\s(Warng|Error|FFFFFFFF|ST|EC|ER|EV)\s)\d+(\)$|\)?\s+\d)"),
+}
+"""By ending: what begins as a frame does, by a time, a channel and an identifier or so much of that as there is, or by
+a number and a time, without the word of a status; or has a direction in its place."""
 _BY_PYTHON_CAN: Final = (".asc", ".blf", ".trc")
 _TEXT: Final = (".log", ".txt", ".candump", "")
 _HIGHEST: Final = {3: 0x7FF, 8: 0x1FFFFFFF}
@@ -160,7 +169,7 @@ def _by_python_can(path: Path) -> Iterator[Logged]:
             yield from _until_broken(path, binary, reader)
     else:
         with path.open(encoding="utf-8-sig", errors="replace") as text:
-            yield from _line_by_line(path, _Lines(text, _GAPS[path.suffix.lower()]), reader)
+            yield from _line_by_line(path, _Lines(text, path.suffix.lower()), reader)
 
 
 def _until_broken(path: Path, file: Any, reader: Any) -> Iterator[Logged]:
@@ -179,6 +188,7 @@ def _line_by_line(path: Path, lines: _Lines, reader: Any) -> Iterator[Logged]:
     while True:
         try:
             for message in messages:
+                yield from lines.passed_over(but_last=True)
                 found = _from_message(message)
                 short = found.frame is not None and _is_short(message)
                 yield (
@@ -186,12 +196,14 @@ def _line_by_line(path: Path, lines: _Lines, reader: Any) -> Iterator[Logged]:
                     if short
                     else found
                 )
+            yield from lines.passed_over(but_last=False)
             return
         except (OSError, RequestError):
             raise
         except Exception as error:  # as above
             if lines.number == begun:  # it is not the line that it cannot read
                 raise _unreadable(path, error) from error
+            yield from lines.passed_over(but_last=True)
             yield _damaged(
                 lines.last, lines.number, f"{lines.last.strip()[:_SHOWN]!r} cannot be read: {error}"
             )
@@ -212,16 +224,18 @@ class _Lines:
     """A text file as python-can's readers take one: they ask for its lines, and close it.
 
     `last` is the line that was read last, and `number` says which. After `again` a reader is begun anew in the midst:
-    what looks for a header first gets `gap`, behind which its messages begin.
+    what looks for a header first gets what stands in for one, behind which its messages begin.
     """
 
-    def __init__(self, file: TextIO, gap: str) -> None:
+    def __init__(self, file: TextIO, suffix: str) -> None:
         self.close: Final = file.close
         self.last = ""
         self.number = 0
         self._lines: Final = lines_of(file)
-        self._gap: Final = gap
+        self._gap: Final = _GAPS[suffix]
+        self._frame: Final = _LIKE_A_FRAME[suffix]
         self._begun_anew = False
+        self._like: list[Logged] = []
 
     def __iter__(self) -> Iterator[str]:
         return self
@@ -233,7 +247,16 @@ class _Lines:
         self.last = next(self._lines)
         self.number += 1
         _bound(self.last, self.number)
+        if self._frame.match(self.last.strip()):
+            self._like.append(
+                _damaged(self.last, self.number, "it looks like a frame and cannot be read as one")
+            )
         return self.last
+
+    def passed_over(self, *, but_last: bool) -> list[Logged]:
+        """What was read since this was asked last, looks like a frame and gave none; not the last line if that did."""
+        like, self._like = self._like, []
+        return [one for one in like if not (but_last and one.line == self.number)]
 
     def again(self) -> None:
         """A reader begins anew."""

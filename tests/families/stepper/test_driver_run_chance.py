@@ -112,6 +112,7 @@ def carried_out(there: Running, project: Project, what: list[Meddling], **option
         return None
 
 
+@pytest.mark.timeout(600)
 @settings(max_examples=300, deadline=None)
 @given(
     project=short_projects(),
@@ -138,6 +139,7 @@ def test_it_is_never_falsely_completed(
             assert there.owed or there.device.memory.stops
 
 
+@pytest.mark.timeout(600)
 @settings(max_examples=300, deadline=None)
 @given(
     project=short_projects(),

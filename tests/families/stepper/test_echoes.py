@@ -25,7 +25,7 @@ class Echoing(Mischief):
     """Echoes as `mode` says, in pieces of so many bytes, at the moments at which a wire of 9600 baud has them.
 
     While `deaf` nothing reaches the controller. `pace` is whether the link takes its time and says so; else this line
-    does, and the bus cannot know it.
+    does, and the bus cannot know it. A late echo comes by `lateness` later, in s, or by lot.
     """
 
     asks_by_itself = False
@@ -37,6 +37,7 @@ class Echoing(Mischief):
         self.piece = piece
         self.pace = pace
         self.deaf = deaf
+        self.lateness: float | None = None
         self.echoes = 0
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
@@ -52,7 +53,7 @@ class Echoing(Mischief):
         back = {OFF: b"", SIX: data[: wire.REPLY_LENGTH]}.get(self.mode, data)
         begin = at - len(data) * BYTE if self.pace else at
         if self.mode == LATE:
-            begin += self.random.uniform(0.01, 0.3)
+            begin += self.random.uniform(0.01, 0.3) if self.lateness is None else self.lateness
         pieces = range(0, len(back), self.piece)
         ends = [min(start + self.piece, len(back)) for start in pieces]
         return [
@@ -115,6 +116,18 @@ def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learn
         assert rig.dump()
         assert ask(rig, "stop_motor"), "learned"
         assert rig.bus.turns.echo.present is (line.mode == FULL)
+
+
+@pytest.mark.parametrize("pace", [True, False])
+@pytest.mark.parametrize("name", ["stop_motor", "start_project", "set_output"])
+def test_six_bytes_of_an_echo_at_the_very_deadline_wait_for_the_rest_of_it(name: str, pace: bool) -> None:
+    """The deadline is somewhere in this sweep, which goes by thirds of a byte."""
+    for step in range(160, 250):
+        line = Echoing(LATE, pace=pace, deaf=True)
+        line.lateness = 0.15 + step * BYTE / 3
+        rig = rig_on(line, opened=False)
+        assert not ask(rig, name), f"{name} was acknowledged by an echo {line.lateness:.4f} s late"
+        assert line.echoes
 
 
 @pytest.mark.timeout(600)
