@@ -121,6 +121,48 @@ def test_a_place_to_park_beyond_the_device_is_refused_before_anything_moves(
         assert robot.axes
 
 
+@pytest.mark.parametrize(
+    ("model", "registers", "why", "expected"),
+    [
+        (
+            "sm60-360m",
+            {"min_position_limit": 0, "max_position_limit": 0},
+            "both position limits of node 1 are 0, and nobody has published what that means on smcl",
+            "a greatest position above the least",
+        ),
+        (
+            "sts3215",
+            {"firmware_major": 99},
+            "node 1 is STS3215 with firmware 99.10, whose register map is not described",
+            "a servo with one of the maps",
+        ),
+    ],
+)
+def test_who_cannot_tell_his_limits_cannot_be_parked_and_that_is_told_at_its_key(
+    model: str, registers: dict[str, int], why: str, expected: str, tmp_path: Path
+) -> None:
+    file, keys = tmp_path / "motorbus.toml", {"exit": "park", "park": "0 deg"}
+    with machine(arm="1-2", options={"arm": {"model": model}}, axes={"a1": keys}) as (made, sims):
+        for name, raw in registers.items():
+            sims["arm"][1].memory[name] = raw
+        file.write_text(made.text(), encoding="utf-8")
+        listened(sims)
+        with pytest.raises(RequestError) as caught:
+            Robot.load(file)
+        error = caught.value
+        assert error.summary.startswith(
+            f"{file}: axis.a1.exit: arm#1 ({model.upper()}) cannot be parked: {why}"
+        )
+        assert error.expected.startswith(expected)
+        assert error.expected.endswith(', or exit = "leave"')
+        assert error.advice == 'write exit = "leave"; nothing was sent but questions'
+        assert all(_reads(title) for title in said(sims))
+        file.write_text(made.text().replace('"park"', '"leave"'), encoding="utf-8")
+        with Robot.load(file) as robot:
+            assert list(robot.axes) == ["a1", "a2"]
+        assert robot.warnings == ()
+
+
 @pytest.mark.parametrize("exit_", ["hold", "leave"])
 def test_a_place_to_park_where_nobody_parks_is_not_judged(exit_: str) -> None:
     keys = {"exit": exit_, "park": "200 deg", "low": None, "high": None}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import RequestError
-from motorbus.session.opening import lock_name, prepare
+from motorbus.session.opening import lock_name, prepare, simulated
 
 
 def test_options_of_the_address_and_of_the_call_are_one() -> None:
@@ -141,3 +141,12 @@ def test_a_port_that_is_lost_is_looked_for_unless_told_otherwise(
 def test_whether_it_is_looked_for_is_yes_or_no() -> None:
     with pytest.raises(RequestError, match="reconnect=maybe: neither yes nor no"):
         prepare("feetech:/dev/ttyACM0,reconnect=maybe", {})
+
+
+def test_simulated_devices_are_made_as_often_as_they_are_wanted() -> None:
+    found = prepare("feetech:sim,ids=2-3,model=scs15,faults=exchange 1: drop,baud=500000", {})
+    one, other = simulated(found), simulated(found)
+    assert (one.rate, list(one.simulator.nodes)) == (500_000, [2, 3])
+    assert str(one.line) == "exchange 1: drop"
+    assert one.simulator is not other.simulator
+    assert found.options == {"ids": "2-3", "model": "scs15", "faults": "exchange 1: drop"}

@@ -45,6 +45,13 @@ def test_an_address_that_cannot_be_is_refused_naming_its_bus() -> None:
         Plan.of(made_of("feetech:sim,ids=1", "kst:sim,colour=red"))
 
 
+def test_simulated_devices_that_cannot_be_are_refused_before_any_port_is_touched() -> None:
+    found = made_of("feetech:/dev/ttyNOTHING", "kst:sim,ids=200")
+    with pytest.raises(RequestError, match="^bus.can: node id 200 is not possible"):
+        Plan.of(found)
+    assert Plan.of(found, "a1").buses == ("arm",)
+
+
 def test_two_buses_on_one_port_are_refused(tmp_path: Path) -> None:
     one, other = "feetech:/dev/ttyACM0", "feetech:/dev/ttyACM0,baud=500000"
     text = f'format = 1\n[bus.a]\naddress = "{one}"\n[bus.b]\naddress = "{other}"\n'

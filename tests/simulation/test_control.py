@@ -16,7 +16,7 @@ import pytest
 from motorbus.errors import LinkError, PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.stepper import simulator as stepper
-from motorbus.simulation.control import LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
+from motorbus.simulation.control import HELP, LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
 from motorbus.simulation.faulted import Faulted
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener
@@ -183,11 +183,11 @@ def test_ids_may_be_hexadecimal() -> None:
 
 
 def pumped(control: ControlSocket) -> None:
-    """Attend to everything that is readable, until nothing is."""
+    """Attend to everything that is readable or has room, until nothing is."""
     import select
 
-    while ready := select.select(control.descriptors(), (), (), 0.0)[0]:
-        for descriptor in ready:
+    while any(ready := select.select(control.descriptors(), control.stuck(), (), 0.0)):
+        for descriptor in (*ready[0], *ready[1]):
             control.attend(descriptor)
 
 
@@ -238,14 +238,56 @@ def test_a_client_that_leaves_is_forgotten(path: Path) -> None:
         assert len(control.descriptors()) == 1
 
 
-def test_a_client_that_does_not_read_is_hung_up_on(path: Path) -> None:
+def test_an_answer_longer_than_a_socket_takes_at_once_arrives_whole(path: Path) -> None:
+    bus = simulate((1,))
+    world = World(bus)
+    script = "; ".join(f"exchange {number}: drop" for number in range(20_000))
+    with (
+        closing(ControlSocket(path, bus)) as control,
+        closing(TcpListener()) as listener,
+    ):
+        mount = Mount(world, listener, attendants=[control])
+        control.faults = Faulted(mount, world)
+        control.faults.set(script)
+        with served(mount):
+            answer = order(path, "faults")
+            assert len(answer) > 1 << 18, "more than the system keeps for a reader"
+            assert json.loads(answer)["script"] == script
+            assert order(path, "unplug 1") == "ok"
+
+
+def test_who_does_not_read_waits_and_holds_nobody_up(path: Path) -> None:
     with (
         closing(ControlSocket(path, simulate(tuple(range(100))))) as control,
-        closing(connected(path)) as client,
+        closing(connected(path)) as lazy,
+        closing(connected(path)) as other,
     ):
+        lazy.sendall(b"status\n" * 99 + b"help\n" + b"unplug 7\nunplug")
+        lazy.shutdown(socket.SHUT_WR)
+        pumped(control)
+        assert len(control.stuck()) == 1
+        other.sendall(b"plug 1\n")
+        pumped(control)
+        assert other.recv(100) == b"ok\n"
+        said = b""
+        while part := lazy.recv(1 << 20):
+            said += part
+            pumped(control)
+        *stati, last, end, nothing = said.decode().split("\n")
+        assert [json.loads(one)["schema"] for one in stati] == ["motorbus.simulator/1"] * 99
+        assert (last, end, nothing) == (HELP, "ok", "")
+        assert (len(control.descriptors()), control.stuck()) == (2, [])
+
+
+def test_who_leaves_with_an_answer_on_its_way_is_forgotten(path: Path) -> None:
+    with closing(ControlSocket(path, simulate(tuple(range(100))))) as control:
+        client = connected(path)
         client.sendall(b"status\n" * 100)
         pumped(control)
-        assert len(control.descriptors()) == 1
+        assert (len(control.descriptors()), len(control.stuck())) == (1, 1)
+        client.close()
+        pumped(control)
+        assert (len(control.descriptors()), control.stuck()) == (1, [])
 
 
 def test_too_many_clients_are_sent_away(path: Path) -> None:

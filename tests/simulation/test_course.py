@@ -243,7 +243,25 @@ def test_an_echo_on_a_shared_bus_is_of_what_is_for_these_devices_only() -> None:
     assert Counter(told(course, 1.0)) == Counter(
         [(1.0, OTHERS, "me"), (1.0, CALL, "me"), (1.0, FRAME, "me"), (1.0, FRAME, None)]
     )
-    assert line.exchange == 2
+    assert (line.exchange, line.count) == (2, 1), "what nobody hears has not happened"
+
+
+def test_an_echo_that_nobody_hears_is_still_to_come() -> None:
+    _, course, line = shared("exchange 1: echo; at 0 s: echo; exchange 1 to device: duplicate")
+    course.hear(CALL, 1.0, "me")
+    assert told(course, 1.0) == [(1.0, CALL, "me")]
+    assert [str(fault) for fault in line.pending] == ["exchange 1: echo", "at 0 s: echo"]
+    course.hear(FRAME, 1.0, "me")
+    assert Counter(told(course, 1.0)) == Counter([(1.0, FRAME, "me"), (1.0, FRAME, None)])
+    assert [one.fault for one in line.fired] == ["exchange 1 to device: duplicate", "exchange 2: echo"]
+
+
+def test_an_echo_of_what_is_for_everyone_is_heard_where_nobody_else_is() -> None:
+    line = FaultyLine("exchange 1: echo")
+    course = Course(Parrots(thinks=1.0), line=line)
+    course.hear(CALL, 1.0, "me")
+    assert Counter(told(course, 1.0)) == Counter([(1.0, CALL, "me"), (1.0, CALL, None)])
+    assert line.count == 1
 
 
 @pytest.mark.parametrize(("harm", "heard"), [("drop", 0), ("duplicate", 2), ("corrupt", 0)])

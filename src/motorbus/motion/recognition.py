@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import LimitExceeded, MotorbusError, NoReply, RequestError
+from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
@@ -42,10 +42,10 @@ def recognise(body: Body) -> Abreast[None]:
 
 
 class Asked(NamedTuple):
-    """What a device is, and its own limits where it has to be known whether it can be parked."""
+    """What a device is, and its own limits, or why it has none, where it has to be known whether it can be parked."""
 
     identity: Identity
-    limits: Device = None
+    limits: Device | MotorbusError = None
 
 
 def _asked(axis: AxisVerbs) -> Operation[Asked]:
@@ -54,7 +54,10 @@ def _asked(axis: AxisVerbs) -> Operation[Asked]:
     able = axis.bus.family.axis(identity.model)
     if axis.spec.exit != "park" or "limits" not in able:
         return Asked(identity)
-    limits: Device = yield from able["limits"](axis.device)
+    try:
+        limits: Device = yield from able["limits"](axis.device)
+    except (RequestError, DeviceError) as error:
+        return Asked(identity, error)
     return Asked(identity, limits)
 
 
@@ -109,11 +112,14 @@ def _lacking(axis: AxisVerbs) -> RequestError | None:
     return None
 
 
-def _unreachable(axis: AxisVerbs, device: Device) -> RequestError | None:
-    """The error for a place to park beyond the limits of the device (rad of it): it would be found out at the end."""
+def _unreachable(axis: AxisVerbs, device: Device | MotorbusError) -> RequestError | None:
+    """The error for a place to park beyond the limits of the device (rad of it), or where it has none that can be told:
+    it would be found out at the end."""
     spec = axis.spec
     if spec.exit != "park" or spec.park is None:
         return None
+    if isinstance(device, MotorbusError):
+        return _unlimited(axis, device)
     try:
         check_goal(axis.name, spec, spec.park, device=device)
     except LimitExceeded as error:
@@ -124,3 +130,20 @@ def _unreachable(axis: AxisVerbs, device: Device) -> RequestError | None:
             node=spec.node,
         )
     return None
+
+
+def _unlimited(axis: AxisVerbs, why: MotorbusError) -> RequestError:
+    """The error for a device that is to park, and of which nobody knows how far it goes. To leave it alone is always
+    possible, and lets no arm sag; to hold, such a servo would have to be told where it is, within its limits."""
+    instead = 'exit = "leave"'
+    found = RequestError(
+        f"axis.{axis.name}.exit: {axis.spec.device} ({axis.model}) cannot be parked: {why.summary}",
+        sent=why.sent,
+        received=why.received,
+        expected=f"{why.expected or 'a device that tells its limits'}, or {instead}",
+        cause=why.cause,
+        advice=f"write {instead}; {ASKED}",
+        node=axis.spec.node,
+    )
+    found.__cause__ = why
+    return found

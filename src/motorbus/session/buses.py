@@ -18,14 +18,12 @@ from motorbus.errors import MotorbusError
 from motorbus.journal import BusJournal
 from motorbus.link.base import Link
 from motorbus.link.lock import socket_path
-from motorbus.link.memory import MemoryLink
 from motorbus.link.reconnect import Reconnecting, reconnecting
 from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
 from motorbus.session.address import parse_address, parse_ids
 from motorbus.session.keeping import kept_for
-from motorbus.session.opening import FAULTS, Opening, prepare
-from motorbus.simulation.faults import strike
+from motorbus.session.opening import Opening, prepare, simulated
 from motorbus.simulation.named import Faults, Simulation, find
 
 if TYPE_CHECKING:
@@ -110,18 +108,11 @@ def simulate(
 
 
 def _link(opening: Opening) -> Link:
-    family, rate = opening.family, opening.rate or opening.family.link.rate
+    family = opening.family
     if opening.port == "sim":
-        ids = parse_ids(str(opening.options.pop("ids", "1")))
-        model = str(opening.options.pop("model", ""))
-        faults = opening.options.pop(FAULTS, "")
-        simulator = family.simulator(ids, model, **opening.options)
-        memory = MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
-        if faults:
-            strike(memory, str(faults))
-        return memory
+        return simulated(opening)
     if opening.port.startswith("sim:"):
-        return find(opening.port.removeprefix("sim:"), family.name).link(rate)
+        return find(opening.port.removeprefix("sim:"), family.name).link(opening.rate or family.link.rate)
     said: Any = {
         "rate": opening.rate,
         "usual": family.link.rate,

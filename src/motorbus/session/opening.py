@@ -9,7 +9,9 @@ from motorbus import families
 from motorbus.core import units
 from motorbus.core.family import Family
 from motorbus.errors import RequestError
-from motorbus.session.address import parse_address
+from motorbus.link.memory import MemoryLink
+from motorbus.session.address import parse_address, parse_ids
+from motorbus.simulation.faults import strike
 
 LATEST = 1.0  # s
 FAULTS = "faults"
@@ -61,6 +63,22 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
         usual = [name for name in ("ids", "model", FAULTS) if name in known]
         raise _unknown(address, unknown[0], [word, *usual, *here, *sorted(more), RECONNECT, *sorted(known)])
     return Opening(family.configured(**settings), spot.port, rate, {**rest, **timing}, reconnect)
+
+
+def simulated(opening: Opening) -> MemoryLink:
+    """New simulated devices on a bus in memory, as an address with the port `sim` wants them.
+
+    Raises RequestError for what they cannot be: ids, a model, the value of an option, faults.
+    """
+    family, options = opening.family, dict(opening.options)
+    ids = parse_ids(str(options.pop("ids", "1")))
+    model, faults = str(options.pop("model", "")), options.pop(FAULTS, "")
+    simulator = family.simulator(ids, model, **options)
+    rate = opening.rate or family.link.rate
+    memory = MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
+    if faults:
+        strike(memory, str(faults))
+    return memory
 
 
 def _unknown(address: str, option: str, known: Iterable[str]) -> RequestError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
 from os import PathLike
 from typing import NamedTuple, Self
 
@@ -20,7 +21,7 @@ from motorbus.motion.machine.refusal import of_file, path, refused
 from motorbus.motion.several import named
 from motorbus.session.address import parse_address
 from motorbus.session.buses import AnyBus, open, open_async
-from motorbus.session.opening import lock_name
+from motorbus.session.opening import lock_name, prepare, simulated
 
 
 class Plan(NamedTuple):
@@ -91,11 +92,25 @@ class Plan(NamedTuple):
 
 def loaded(file: str | PathLike[str]) -> Machine:
     """The machine of a file, with every address, port and id in it checked. Raises RequestError as `Machine.load`."""
-    machine = Machine.load(file, check_address=_can_be_judged)
+    machine = Machine.load(file, check_address=_check_address)
     with of_file(machine.file):
         _check_ports(machine, [name for name, bus in machine.buses.items() if _can_be_judged(bus.address)])
         _check_devices(machine, machine.buses)
     return machine
+
+
+def _check_address(address: str) -> None:
+    """Raise RequestError for an address that cannot be, as far as that can be judged."""
+    if _can_be_judged(address):
+        _try(address)
+
+
+@lru_cache(maxsize=64)  # of devices that could be made: a file is judged more than once on its way to a bus
+def _try(address: str) -> None:
+    """Make the simulated devices of an address, and throw them away. Raises RequestError where they cannot be."""
+    opening = prepare(address, {})
+    if opening.port == "sim":
+        simulated(opening)
 
 
 def _can_be_judged(address: str) -> bool:
@@ -173,6 +188,7 @@ def _check_ports(machine: Machine, buses: Iterable[str]) -> None:
     for name in buses:
         try:
             port = lock_name(machine.buses[name].address, {})
+            _try(machine.buses[name].address)
         except MotorbusError as error:
             raise named(f"bus.{name}", error) from error
         if port in taken and port not in ("", "sim"):

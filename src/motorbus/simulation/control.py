@@ -35,8 +35,21 @@ HELP = (
 )
 
 
+class _Client:
+    """Who gives orders: what of them is still to be carried out, and what of the answers has had no room yet."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.connection = connection
+        self.orders = bytearray()
+        self.answers = bytearray()
+        self.ends = False  # hung up on as soon as it has its answers
+
+
 class ControlSocket:
-    """An open control socket. Nothing waits in here: whoever serves it selects on `descriptors` and calls `attend`.
+    """An open control socket. Nothing waits in here: whoever serves it selects on `descriptors`, and until there is
+    room on `stuck`, and calls `attend`.
+
+    Who does not read his answers is not listened to until he does, so that what is kept for him has bounds.
 
     `faults` is what the order `faults` changes and shows; None: there are none to be had.
 
@@ -48,25 +61,37 @@ class ControlSocket:
         self.path = Path(path)
         self.faults: Faulted | None = None
         self._simulator = simulator
-        self._clients: dict[int, tuple[socket.socket, bytearray]] = {}
+        self._clients: dict[int, _Client] = {}
         self._listener = _listen(self.path)
         self._made = self.path.stat().st_ino
 
     def descriptors(self) -> list[int]:
         """What to wait on until it turns readable."""
-        return [self._listener.fileno(), *self._clients]
+        return [
+            self._listener.fileno(),
+            *(one for one, client in self._clients.items() if not client.answers),
+        ]
+
+    def stuck(self) -> list[int]:
+        """What to wait on until it can be written to: of these an answer has had no room yet."""
+        return [one for one, client in self._clients.items() if client.answers]
 
     def attend(self, descriptor: int) -> None:
-        """This descriptor has turned readable: take in a client, or carry out its orders. Never raises."""
+        """This descriptor is ready: take in a client, carry out its orders, or go on with an answer. Never raises."""
         if descriptor == self._listener.fileno():
             self._accept()
-        elif descriptor in self._clients:
-            self._read(descriptor)
+        elif (client := self._clients.get(descriptor)) is not None:
+            if not client.answers:
+                self._read(client)
+            if not self._answered(client):
+                del self._clients[descriptor]
+                client.connection.close()
 
     def close(self) -> None:
         """Hang up and take the socket away; calling it again does nothing."""
-        for descriptor in list(self._clients):
-            self._drop(descriptor)
+        for client in self._clients.values():
+            client.connection.close()
+        self._clients.clear()
         if self._listener.fileno() >= 0:
             self._listener.close()
             with contextlib.suppress(OSError):
@@ -75,47 +100,52 @@ class ControlSocket:
 
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
-            client, _ = self._listener.accept()
+            connection, _ = self._listener.accept()
             if len(self._clients) >= MOST_CLIENTS:
-                client.close()
+                connection.close()
                 return
-            client.setblocking(False)
-            self._clients[client.fileno()] = client, bytearray()
+            connection.setblocking(False)
+            self._clients[connection.fileno()] = _Client(connection)
 
-    def _read(self, descriptor: int) -> None:
-        client, waiting = self._clients[descriptor]
+    def _read(self, client: _Client) -> None:
+        """Take in what it has said."""
         try:
-            data = client.recv(LONGEST_LINE)
+            data = client.connection.recv(LONGEST_LINE)
         except BlockingIOError:
             return
         except OSError:
             data = b""
-        waiting += data
-        if len(waiting) > LONGEST_LINE and b"\n" not in waiting:
-            self._answer(descriptor, client, f"error: an order has at most {LONGEST_LINE} bytes")
-            data = b""
-        if not data:
-            self._drop(descriptor)
-            return
-        while b"\n" in waiting:
-            line, _, rest = bytes(waiting).partition(b"\n")
-            waiting[:] = rest
-            text = obey(self._simulator, line.decode(errors="replace"), self.faults)
-            self._answer(descriptor, client, text)
+        client.orders += data
+        client.ends = not data
+        if len(client.orders) > LONGEST_LINE and b"\n" not in client.orders:
+            client.answers += f"error: an order has at most {LONGEST_LINE} bytes\n".encode()
+            client.ends = True
 
-    def _answer(self, descriptor: int, client: socket.socket, text: str) -> None:
-        answer = text.encode() + b"\n"
+    def _answered(self, client: _Client) -> bool:
+        """Send as much as there is room for, and carry out its orders until there is none; False: it is to go."""
+        while self._sent(client):
+            if client.answers:
+                return True
+            end = client.orders.find(b"\n")
+            if end < 0:
+                return not client.ends
+            line = client.orders[:end].decode(errors="replace")
+            del client.orders[: end + 1]
+            text = obey(self._simulator, line, self.faults)
+            client.answers += text.encode() + b"\n"
+        return False
+
+    @staticmethod
+    def _sent(client: _Client) -> bool:
+        """Send of its answers what has room; False when it has left."""
         try:
-            sent = client.send(answer)
+            while client.answers:
+                del client.answers[: client.connection.send(client.answers)]
+        except BlockingIOError:
+            return True
         except OSError:
-            sent = 0
-        if sent < len(answer):  # it does not read: it need not be served
-            self._drop(descriptor)
-
-    def _drop(self, descriptor: int) -> None:
-        client = self._clients.pop(descriptor, None)
-        if client is not None:
-            client[0].close()
+            return False
+        return True
 
 
 def obey(simulator: Simulator, line: str, faults: Faulted | None = None) -> str:

@@ -102,12 +102,17 @@ class Course:
         alone = audience is Audience.EVERYONE
         if alone:
             self._push(Delivery(at, Side.HOST, data), sender)
-        for delivery in self.line.carry(Side.HOST, data, at):
+        for delivery in self._carried(data, at, alone):
             if delivery.to is Side.DEVICE:
                 for piece in self._pieces(delivery):
                     self._push(piece, sender, rate, alone)
             elif not alone:  # the client hears an echo as others do
                 self._push(delivery)
+
+    def _carried(self, data: Data, at: float, alone: bool) -> list[Delivery]:
+        """What becomes of it; a line that keeps books is told that nobody would hear an echo of it."""
+        unechoed: Callable[[Data, float], list[Delivery]] | None = getattr(self.line, "carry_unechoed", None)
+        return unechoed(data, at) if alone and unechoed else self.line.carry(Side.HOST, data, at)
 
     def _audience(self, data: Data) -> Audience:
         """Whom this is for. Where nobody else is, all of it is for these devices."""

@@ -35,8 +35,11 @@ class Attendant(Protocol):
     def descriptors(self) -> list[int]:
         """What to wait on until it turns readable."""
 
+    def stuck(self) -> list[int]:
+        """What to wait on until it can be written to."""
+
     def attend(self, descriptor: int) -> None:
-        """This one has turned readable."""
+        """This one is ready."""
 
 
 class Mount:
@@ -154,7 +157,8 @@ class Mount:
                 wait = 0.0
         waiting = [*readers, *attended, *doors, *(() if stop is None else (stop,))]
         stuck = [one for client, one in everyone.items() if one is not None and client.is_stuck()]
-        ready, _, _ = select(waiting, stuck, (), wait)
+        behind = {one: attendant for attendant in self.attendants for one in attendant.stuck()}
+        ready, room, _ = select(waiting, [*stuck, *behind], (), wait)
         self._happen(self._clock())
         for descriptor in ready:
             if self._back_at is not None and descriptor not in attended:
@@ -165,7 +169,9 @@ class Mount:
                 doors[descriptor].admit()
             elif descriptor in attended:
                 attended[descriptor].attend(descriptor)
-        if ready:
+        for descriptor in behind.keys() & set(room):
+            behind[descriptor].attend(descriptor)
+        if ready or room:
             self._happen(self._clock())
         self._sweep()
         return stop in ready

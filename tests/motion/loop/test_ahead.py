@@ -213,6 +213,8 @@ def test_who_is_stopped_when_goals_are_ready_does_not_get_them() -> None:
             return landed(*given)
 
         rounds._landed = stopped
+        assert next(loop).missing == frozenset()
+        assert not goals(sims["arm"].line)
         with pytest.raises(Interrupted, match="a1: stopped from elsewhere"):
             next(loop)
         assert not goals(sims["arm"].line)

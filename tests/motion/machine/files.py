@@ -176,6 +176,18 @@ UNOPENABLE = (
     Broken("baud=1000000", "sleep=1", "bus.arm.address: sleep=1: neither yes nor no", "yes or no"),
     Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
     Broken("bitrate=500000", "window=0", "bus.gimbal.address: window=0: not a number", "1 to 127"),
+    # values that simulated devices cannot have
+    Broken(FEETECH, "feetech:sim,model=zzz", "bus.arm.address: there is no simulated FEETECH model 'zzz'", "lists"),
+    Broken(FEETECH, "feetech:sim,model=sts3216", "bus.arm.address: there is no simulated FEETECH", "perhaps sts3215"),
+    Broken(FEETECH, "feetech:sim,ids=abc", "bus.arm.address: ids 'abc': 'abc' is not a number", "1-6"),
+    Broken(FEETECH, "feetech:sim,ids=250-254", "bus.arm.address: id 254 is not possible", "0 to 253"),
+    Broken(FEETECH, "feetech:sim,position=1_0", "bus.arm.address: option position: '1_0' is not", "0 to 4095"),
+    Broken(FEETECH, "feetech:sim,startup_time=abc", "bus.arm.address: option startup_time: 'abc'", "a number, 0"),
+    Broken(FEETECH, "feetech:sim,faults=at 1 s: power-cycle 9", "bus.arm.address: fault at 1 s: power", "one of 1"),
+    Broken(KST, "kst:sim,model=zzz", "bus.gimbal.address: there is no simulated KST profile 'zzz'", "one of kst, "),
+    Broken(KST, "kst:sim,reports_ms=0.01", "bus.gimbal.address: option reports_ms: 0.01 is", "0, or 0.1 and more"),
+    Broken(KST, "stepper:sim,ids=2", "bus.gimbal.address: a stepper line has one controller, not 2", "a line for each"),
+    # families, ports and channels
     Broken("feetech:/dev", "fetech:/dev", "bus.arm.address: there is no family 'fetech'", "one of feetech, kst"),
     Broken("slcan/dev", "slcn/dev", "bus.gimbal.address: 'can://slcn/dev/ttyACM1'", "did you mean slcan?"),
     Broken(KST, "kst:/dev/ttyACM0", "bus.gimbal.address: /dev/ttyACM0 is the port of bus.arm too", "one bus"),

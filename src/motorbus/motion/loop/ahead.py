@@ -6,21 +6,25 @@
 So a goal that is set when a reading is seen leaves with the cycle after the one that is on the wire by then. Whatever
 does not come every day, as torque for who has got his first goal, waits until nothing is in the air, and is done as in
 any other loop. Goals that were made ready for somebody who was not heard then, or cannot be believed, do not leave.
+
+A reading that is in is told, whatever keeps the next cycle from leaving: that is raised by the next round.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from motorbus.bus.loosed import Behind, Loosed
 from motorbus.core.family import Positions
 from motorbus.core.operation import Exchange
-from motorbus.errors import Interrupted, MotorbusError
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
 from motorbus.motion.abreast import Abreast
+from motorbus.motion.command import Command
 from motorbus.motion.loop.braking import Works
 from motorbus.motion.loop.grid import Grid
+from motorbus.motion.loop.place import Place
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
 from motorbus.motion.moving.forgiving import LOST
@@ -34,27 +38,36 @@ class Air(NamedTuple):
     volley: Loosed
 
 
+class Owed(NamedTuple):
+    """An error that is still to be raised, and who is led no more for it: what they are told meanwhile does not count,
+    for whoever tells them something knows nothing of it yet."""
+
+    error: MotorbusError
+    lost: list[Place]
+
+
 class RoundsAhead(Rounds):
     """`Rounds` on the only bus there is, where nothing is abreast."""
 
     lag = 1
     _air: Air | None = None
     _missing: list[str] | None = None
+    _owed: Owed | None = None
 
     def round(self) -> Generator[Abreast[Any], Any, LoopState]:
-        """One cycle leaves, and it is told what the one before it brought. Raises as `Rounds.round`.
+        """One cycle leaves, and it is told what the one before it brought. Raises as `Rounds.round`, and before
+        anything else what has kept a cycle from leaving when the last one was told.
 
         At first, for torque, and after an error it is one cycle that leaves and is told, and another one that leaves.
         """
+        if self._owed is not None:
+            self._pay(self._owed)
         air, grid = self._air, self._grid
         if air is None or grid is None or self._fresh:
             if (down := self._come_down()) is not None:
                 self._state(*down)
             state = yield from super().round()
-            self._judge(1)
-            orders = self._orders(1)
-            self._stepped += 1
-            self._leave(self._believed(orders))
+            self._get_ahead()
             return state
         now = self.now
         slot = grid.upcoming(now)
@@ -78,6 +91,32 @@ class RoundsAhead(Rounds):
                 self._come_down()
         finally:
             yield from super().leaving()
+        if (owed := self._owed) is not None and not isinstance(owed.error, Interrupted | LimitExceeded):
+            self._pay(owed)
+
+    def _pay(self, owed: Owed) -> NoReturn:
+        self._owed = None
+        for place in owed.lost:
+            place.release()
+        raise owed.error
+
+    def _owe(self, error: MotorbusError, led: Iterable[Command]) -> None:
+        """Raise this later; until now there was this command over those who are led."""
+        axes = [axis for command in led for axis in command.axes]
+        lost = [place for place in self._all if place.axis in axes and not place.begun]
+        self._owed = Owed(error, lost)
+
+    def _get_ahead(self) -> None:
+        """The next cycle leaves behind one that is to be told; what is against it is owed."""
+        led = [part.command for part in self.parts.values()]
+        try:
+            self._judge(1)
+            orders = self._orders(1)
+        except MotorbusError as error:
+            self._owe(error, led)
+        else:
+            self._stepped += 1
+            self._leave(orders)
 
     def _relayed(
         self, air: Air, grid: Grid, orders: dict[str, Sequence[Exchange[Any]]]
@@ -92,7 +131,7 @@ class RoundsAhead(Rounds):
         self._count(air.moment)
         missing = self._heard(told) if self._missing is None else self._missing
         if behind is None or behind.at is None:
-            self._leave(self._believed(orders), None if part.unsure else behind, air)
+            self._leave(orders, None if part.unsure else behind, air)
         else:
             part.began = behind.at - part.origin
             moment = grid.take(part.began)
@@ -137,23 +176,31 @@ class RoundsAhead(Rounds):
         return orders[bus]
 
     def _leave(
-        self, orders: Sequence[Exchange[Any]], behind: Behind | None = None, air: Air | None = None
+        self,
+        orders: dict[str, Sequence[Exchange[Any]]],
+        behind: Behind | None = None,
+        air: Air | None = None,
     ) -> None:
         """The next cycle leaves at its time, as it is ready `behind` the last one where that still holds.
 
-        Raises what went wrong; nothing is in the air then.
+        What goes wrong is owed; nothing is in the air then.
         """
         ((bus, part),) = self.parts.items()
+        led = part.command
         assert self._grid is not None
         assert self.only is not None
         moment = self._grid.take(self.now)
         try:
+            believed = self._believed(orders)
             part.await_slot(self.only, moment)
             if behind is not None and air is not None and air.volley.leave(behind):
                 volley = air.volley
             else:
-                volley = Loosed(self.only, (*orders, *part.reads), LOST)
+                volley = Loosed(self.only, (*believed, *part.reads), LOST)
         except MotorbusError as failure:
-            self._fail({bus: failure})
-            raise
+            try:
+                self._fail({bus: failure})
+            except MotorbusError as error:
+                self._owe(error, [led])
+            return
         self._air = Air(self._grid.number, moment, volley)

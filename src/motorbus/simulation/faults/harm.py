@@ -1,17 +1,22 @@
-"""What the faults at the bytes of one packet make of it: pieces, each with how much later it comes."""
+"""What faults make of one packet, at its bytes or of all of it: pieces, each with how much later it comes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from itertools import groupby
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
+from motorbus.core.operation import CanFrame, Data
 from motorbus.simulation.faults.fault import Fault
 
 INSTANT: Final = 1e-6
 """s between what comes before something that happens to the bus, that, and what comes after it."""
 GAP: Final = 0.001
 """s between the pieces of a packet that is split, where nobody says how much."""
+
+
+Piece: TypeAlias = tuple[float, Data]
+"""A part of a packet, and how much later than the packet it comes (s)."""
 
 
 class Strike(NamedTuple):
@@ -91,3 +96,27 @@ def _swapped(rest: bytearray, place: int, byte: bytes) -> bytes:
         return byte
     rest[place + 1] = byte[0]
     return after
+
+
+def whole(fault: Fault, pieces: list[Piece]) -> list[Piece]:
+    """The pieces of a packet after a fault that strikes all of it."""
+    if fault.action == "drop":
+        return []
+    if fault.action == "duplicate":
+        return pieces + pieces
+    if fault.action == "delay":
+        return [(shift + fault.seconds, piece) for shift, piece in pieces]
+    if fault.action == "split":
+        return _split(pieces, fault.seconds or GAP)
+    return pieces
+
+
+def _split(pieces: list[Piece], gap: float) -> list[Piece]:
+    """Every byte by itself."""
+    found: list[Piece] = []
+    for shift, piece in pieces:
+        if isinstance(piece, CanFrame):
+            return pieces
+        for place in range(len(piece)):
+            found.append((shift + len(found) * gap, piece[place : place + 1]))
+    return found

@@ -17,7 +17,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.link.memory import Fired
 from motorbus.simulation.faults.fault import SOMEWHERE, Fault
-from motorbus.simulation.faults.harm import GAP, INSTANT, Strike, harmed
+from motorbus.simulation.faults.harm import INSTANT, Piece, Strike, harmed, whole
 from motorbus.simulation.faults.luck import Luck, chance
 from motorbus.simulation.faults.script import Script, as_script
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 BROKEN: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """What an adapter tells of a frame that broke on the wire: protocol violation and bus error, as SocketCAN classes."""
 _LONGEST: Final = 8
-
-_Piece = tuple[float, Data]
 
 
 class _Way:
@@ -86,6 +84,7 @@ class FaultyLine:
         self._record: list[Fault] = []
         self._most = most
         self._world = world
+        self._echoes = True
         self._ways = {Side.HOST: _Way(), Side.DEVICE: _Way()}
         self._waiting: dict[int, list[tuple[int, Fault]]] = {}
         self._timed: set[int] = set()
@@ -141,6 +140,14 @@ class FaultyLine:
         if calm and not strikes:
             return [Delivery(at, to, data)]
         return self._harmed(to, way, data, at, strikes)
+
+    def carry_unechoed(self, data: Data, at: float) -> list[Delivery]:
+        """As `carry`, of what the host sends where no echo of it could be heard: so there is none."""
+        self._echoes = False
+        try:
+            return self.carry(Side.HOST, data, at)
+        finally:
+            self._echoes = True
 
     # -- which faults strike ------------------------------------------------------------------------------------------
 
@@ -225,6 +232,8 @@ class FaultyLine:
         if fault.word.world:
             # its id may be another one by now
             return fault.node is not None and self._world is not None and fault.node not in self._world.nodes
+        if fault.action == "echo" and not self._echoes:
+            return True
         if fault.action == "split" and fault.byte is None and not fault.per_byte:
             return isinstance(data, CanFrame) or len(data) < 2
         return way.lost and fault.action not in ("echo", "stall")
@@ -258,7 +267,7 @@ class FaultyLine:
 
     def _at_bytes(
         self, way: _Way, data: Data, body: bytes, at: float, strikes: list[Strike]
-    ) -> tuple[list[_Piece], float]:
+    ) -> tuple[list[Piece], float]:
         if not strikes and (way.lost or isinstance(data, CanFrame)):
             return ([] if way.lost else [(way.later, data)]), 0.0
         found = harmed(
@@ -277,7 +286,7 @@ class FaultyLine:
         way: _Way,
         data: Data,
         at: float,
-        pieces: list[_Piece],
+        pieces: list[Piece],
         stalled: float,
         faults: list[Fault],
     ) -> list[Delivery]:
@@ -303,7 +312,7 @@ class FaultyLine:
                 pieces = []
                 sent += self._delivered(Side.HOST, at, [(0.0, BROKEN)])
             else:
-                pieces = _whole(fault, pieces)
+                pieces = whole(fault, pieces)
         if held is not None:
             held += [piece for _, piece in pieces]
         elif freely:
@@ -319,7 +328,7 @@ class FaultyLine:
         heard = data if isinstance(data, CanFrame) or not count else data[:count]
         return self._delivered(Side.HOST, at, [(0.0, heard)])
 
-    def _with_held(self, way: _Way, pieces: list[_Piece]) -> list[_Piece]:
+    def _with_held(self, way: _Way, pieces: list[Piece]) -> list[Piece]:
         """What has waited for this packet: what merges with it comes first, and bytes in one piece with it."""
         front, behind = way.front, way.behind
         if front or behind:
@@ -333,7 +342,7 @@ class FaultyLine:
             pieces += [(pieces[-1][0], piece) for piece in behind]
         return pieces
 
-    def _delivered(self, to: Side, at: float, pieces: list[_Piece]) -> list[Delivery]:
+    def _delivered(self, to: Side, at: float, pieces: list[Piece]) -> list[Delivery]:
         """Whoever was sent first arrives first."""
         way, sent = self._ways[to], []
         for shift, piece in pieces:
@@ -365,27 +374,3 @@ class FaultyLine:
 def _is_behind(fault: Fault, place: int, passed: int) -> bool:
     """Whether this byte would, by its place, stand behind the packet before it: chance leaves that out."""
     return fault.action == "insert" and place == 0 and passed > 0
-
-
-def _whole(fault: Fault, pieces: list[_Piece]) -> list[_Piece]:
-    """The pieces of a packet after a fault that strikes all of it."""
-    if fault.action == "drop":
-        return []
-    if fault.action == "duplicate":
-        return pieces + pieces
-    if fault.action == "delay":
-        return [(shift + fault.seconds, piece) for shift, piece in pieces]
-    if fault.action == "split":
-        return _split(pieces, fault.seconds or GAP)
-    return pieces
-
-
-def _split(pieces: list[_Piece], gap: float) -> list[_Piece]:
-    """Every byte by itself."""
-    found: list[_Piece] = []
-    for shift, piece in pieces:
-        if isinstance(piece, CanFrame):
-            return pieces
-        for place in range(len(piece)):
-            found.append((shift + len(found) * gap, piece[place : place + 1]))
-    return found

@@ -50,7 +50,7 @@ def _position(position: object) -> int | Mapping[int, int] | None:
     if position is None or isinstance(position, Mapping):
         return position
     try:
-        return int(str(position))
+        return units.whole(str(position))
     except ValueError:
         raise RequestError(
             f"option position: {position!r} is not a raw position", expected="0 to 4095"

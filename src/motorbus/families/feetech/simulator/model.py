@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Final
 
@@ -103,8 +104,11 @@ def model(name: str, firmware: str = "") -> Model:
     """
     known = _VARIANTS.get(name.lower() or _USUAL)
     if known is None:
+        near = get_close_matches(name.lower(), MODELS, n=3)
         raise RequestError(
-            f"there is no simulated FEETECH model {name!r}", expected=f"one of {', '.join(MODELS)}"
+            f"there is no simulated FEETECH model {name!r}",
+            expected=f"perhaps {', '.join(near)}" if near else f"one of {len(MODELS)}, as {_USUAL}",
+            advice="`motorbus feetech models` lists them",
         )
     if not firmware:
         return known[0]
