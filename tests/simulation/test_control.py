@@ -223,11 +223,30 @@ def test_bytes_that_are_no_text(path: Path) -> None:
         assert client.recv(200).startswith(b"error: ")
 
 
-def test_an_endless_line_is_hung_up_on(path: Path) -> None:
+@pytest.mark.parametrize("size", [LONGEST_LINE + 1, 3 * LONGEST_LINE])
+def test_an_order_that_is_too_long_is_refused_once_and_the_next_one_carried_out(
+    size: int, path: Path
+) -> None:
+    """Whoever is hung up on while he still writes never sees the answer."""
     with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
-        client.sendall(b"x" * (LONGEST_LINE + 1))
+        for _ in range(size // 8192):
+            client.sendall(b"x" * 8192)
+            pumped(control)
+        client.sendall(b"x" * (size % 8192) + b"\nunplug 1\n")
         pumped(control)
-        assert client.recv(200) == b"error: an order has at most 65536 bytes\n"
+        assert client.recv(200) == b"error: an order has at most 65536 bytes; nothing has changed\nok\n"
+
+
+def test_an_order_that_is_too_long_and_comes_in_one_piece_is_not_carried_out(path: Path) -> None:
+    simulator = simulate((1,))
+    with closing(ControlSocket(path, simulator)) as control, closing(connected(path)) as client:
+        client.sendall(b"unplug 1" + b" " * LONGEST_LINE + b"\n")
+        pumped(control)
+        assert client.recv(200).startswith(b"error: an order has at most")
+        client.sendall(b"y" * (LONGEST_LINE + 1))
+        client.shutdown(socket.SHUT_WR)
+        pumped(control)
+        assert client.recv(200).startswith(b"error: an order has at most")
         assert len(control.descriptors()) == 1
 
 

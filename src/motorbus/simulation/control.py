@@ -22,6 +22,7 @@ from motorbus.simulation.faulted import Faulted, read_order
 from motorbus.simulation.told import told
 
 LONGEST_LINE = 1 << 16
+TOO_LONG = f"error: an order has at most {LONGEST_LINE} bytes; nothing has changed\n".encode()
 """Bytes of an order; a long script is the longest."""
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
@@ -42,6 +43,7 @@ class _Client:
         self.connection = connection
         self.orders = bytearray()
         self.answers = bytearray()
+        self.skips = False  # it is in the midst of an order that is too long
         self.ends = False  # hung up on as soon as it has its answers
 
 
@@ -115,11 +117,15 @@ class ControlSocket:
             return
         except OSError:
             data = b""
-        client.orders += data
         client.ends = not data
+        if client.skips:
+            _, end, data = data.partition(b"\n")
+            client.skips = not end
+        client.orders += data
         if len(client.orders) > LONGEST_LINE and b"\n" not in client.orders:
-            client.answers += f"error: an order has at most {LONGEST_LINE} bytes\n".encode()
-            client.ends = True
+            client.orders.clear()
+            client.skips = True
+            client.answers += TOO_LONG
 
     def _answered(self, client: _Client) -> bool:
         """Send as much as there is room for, and carry out its orders until there is none; False: it is to go."""
@@ -131,6 +137,9 @@ class ControlSocket:
                 return not client.ends
             line = client.orders[:end].decode(errors="replace")
             del client.orders[: end + 1]
+            if end > LONGEST_LINE:
+                client.answers += TOO_LONG
+                continue
             text = obey(self._simulator, line, self.faults)
             client.answers += text.encode() + b"\n"
         return False
