@@ -13,7 +13,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import Interrupted, LimitExceeded, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
-from motorbus.motion.loop.readings import patience
+from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState
 from motorbus.session.robot import Robot
 from tests.motion.machines import Heard, machine
 
@@ -166,15 +166,29 @@ def test_a_missing_reading_is_told_with_the_last_one_and_its_age() -> None:
 
 def test_who_is_silent_too_long_ends_it_by_name() -> None:
     with looping(arm="1-3") as (_, loop, sims):
-        cycles(loop, 2)
+        before = cycles(loop, 2)
         sims["arm"][2].unplug()
-        cycles(loop, patience(RATE))
-        with pytest.raises(NoReply, match=f"a2: no reading in {patience(RATE) + 1} cycles"):
-            next(loop)
+        states: list[LoopState] = []
+        with pytest.raises(NoReply, match="a2: no reading in "):
+            states.extend(next(loop) for _ in range(100))
+        assert len(states) >= PATIENCE
+        assert states[-1].at - before.at == pytest.approx(SILENCE, abs=3 / RATE)
+        slots = states[-1].number - before.number
+        assert slots > len(states)  # to wait in vain takes longer than a cycle, so time counts
         sims["arm"][2].plug()
         with suppress(NoReply):  # who was silent for long is left alone by the bus for as long
             cycles(loop, 80)
         assert not cycles(loop, 20).missing  # it can go on
+
+
+def test_six_cycles_of_silence_are_needed_however_long_they_last() -> None:
+    with looping(rate=5.0, arm="1-3") as (_, loop, sims):
+        before = cycles(loop, 2)
+        sims["arm"][2].unplug()
+        late = cycles(loop, PATIENCE)
+        assert late.at - before.at > 3 * SILENCE
+        with pytest.raises(NoReply, match=f"a2: no reading in {PATIENCE + 1} cycles"):
+            next(loop)
 
 
 def test_who_is_silent_from_the_beginning_is_refused() -> None:

@@ -14,7 +14,7 @@ from motorbus.core.operation import CanFrame
 from motorbus.errors import NoReply
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.place import STALE
-from motorbus.motion.loop.readings import PATIENCE, patience
+from motorbus.motion.loop.readings import PATIENCE
 from motorbus.session.robot import Robot
 from tests.motion.loop.lines import Doubtful
 from tests.motion.loop.test_rounds import RATE, cycles, looping
@@ -95,8 +95,8 @@ def test_the_limit_after_which_it_is_an_error_stays_and_comes_again() -> None:
         loop.goal.update(dict.fromkeys(loop.axes, 1.0))
         cycles(loop, 20)
         line.mute = {2}
-        for silent in (patience(SLOW) + 1, 2 * (patience(SLOW) + 1)):
-            cycles(loop, patience(SLOW))
+        for silent in (PATIENCE + 1, 2 * (PATIENCE + 1)):
+            cycles(loop, PATIENCE)
             with pytest.raises(NoReply, match=f"a2: no reading in {silent} cycles"):
                 next(loop)
         line.sent.clear()

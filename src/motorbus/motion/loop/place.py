@@ -25,6 +25,7 @@ from motorbus.motion.safety.track import FRESH
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
     from motorbus.motion.command import Command
+    from motorbus.motion.loop.readings import Silence
 
 CATCH_UP: Final = 3
 """Periods that a movement may have lost and make good by one longer step. After more the axis stands at its last goal
@@ -38,12 +39,13 @@ class Place:
     """An axis of a loop. Positions are in rad (m), `node` is the id of its device.
 
     `position` is where it was heard to be last, `heard` when that was (s of robot time), `silent` how many cycles in a
-    row it has not been heard, or not so that it can be believed. `angle` is what its device told last (rad); it is no
-    number where the next reading must be looked at closely, and `doubted` while the last one cannot be believed.
-    `asked` is the goal that was set and `sent` the position that was ordered last; None: none. `begun` is true once it
-    has got torque here, and until then `claim` is the command over it from when its goal was set. `endures` is in how
-    many cycles in a row it may be silent and is ordered all the same, `left` in how many it was not ordered. What is
-    brought within its limits is put into `clamps`. With a `lag` a goal is made by a reading so many cycles older.
+    row it has not been heard, or not so that it can be believed, `silence` since when. `angle` is what its device told
+    last (rad); it is no number where the next reading must be looked at closely, and `doubted` while the last one
+    cannot be believed. `asked` is the goal that was set and `sent` the position that was ordered last; None: none.
+    `begun` is true once it has got torque here, and until then `claim` is the command over it from when its goal was
+    set. `endures` is in how many cycles in a row it may be silent and is ordered all the same, `left` in how many it
+    was not ordered. What is brought within its limits is put into `clamps`. With a `lag` a goal is made by a reading
+    so many cycles older.
     """
 
     __slots__ = (
@@ -74,6 +76,7 @@ class Place:
         "position",
         "ratio",
         "sent",
+        "silence",
         "silent",
         "zero",
     )
@@ -112,6 +115,7 @@ class Place:
         self.position = 0.0
         self.heard = -inf
         self.silent = 0
+        self.silence: Silence | None = None
         self.asked: float | None = None
         self.sent: float | None = None
         self.begun = False

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from math import ceil
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.core.family import Quality
 from motorbus.motion.loop.errors import silence
@@ -18,18 +17,37 @@ if TYPE_CHECKING:
     from motorbus.motion.loop.place import Place
 
 PATIENCE: Final = 5
-"""Cycles in a row in which an axis may be silent at least, or tell what cannot be believed, before it is an error."""
+"""Cycles in a row in which an axis may be silent, or tell what cannot be believed, before it is an error."""
 SILENCE: Final = 0.3
-"""s for which it may be silent at least, as while axes are led: a servo that has missed a reply is left alone for a
+"""s for which it may be silent besides, as while axes are led: a servo that has missed a reply is left alone for a
 while, and a computer that is busy answers late. It is not ordered meanwhile."""
 NOBODY: Final[frozenset[str]] = frozenset()
 NOWHERE: Final[Mapping[str, float]] = MappingProxyType({})
 SURE: Final[Mapping[str, Quality]] = MappingProxyType({})
 
 
-def patience(rate: float) -> int:
-    """Cycles in a row in which an axis may be silent, at so many in a second; in the next one it is an error."""
-    return max(PATIENCE, ceil(SILENCE * rate) - 1)
+class Silence(NamedTuple):
+    """Since when (s of robot time) an axis is silent that was heard then last, or was told to be, and how many silent
+    cycles there were before that."""
+
+    heard: float
+    since: float
+    cycles: int
+
+
+def is_overdue(place: Place, at: float, least: float) -> bool:
+    """Whether it has been silent for more than `PATIENCE` cycles and `least` s by now; then again as long after that.
+
+    A cycle that waits in vain lasts longer than others, and where the computer is held up there are none: so both
+    count. To be asked in each cycle in which it is silent.
+    """
+    before = place.silence
+    if before is None or before.heard != place.heard or place.silent < before.cycles:
+        before = place.silence = Silence(place.heard, at - place.period, 0)
+    if place.silent - before.cycles <= PATIENCE or at - before.since <= least - place.period / 2:
+        return False
+    place.silence = Silence(place.heard, at, place.silent)
+    return True
 
 
 class LoopState:
@@ -109,9 +127,9 @@ def state_of(
     for name, quality in doubts.items():
         statistics.suspect[name] += quality is Quality.SUSPECT
     unheard = {place.name: place for place in places if place.silent}
-    lasting = patience(statistics.rate) + 1
-    limits = {name: PATIENCE + 1 if name in doubts else lasting for name in unheard}
-    silent = [name for name, place in unheard.items() if place.silent % limits[name] == 0]
+    silent = [
+        name for name, place in unheard.items() if is_overdue(place, at, 0.0 if name in doubts else SILENCE)
+    ]
     if silent:
         raise silence(silent, unheard[silent[0]].silent, unheard, at)
     heard = {name: place.heard for name, place in unheard.items()}
