@@ -28,6 +28,9 @@ FEW = 1_600
 MORE = 4
 MOST = 4.5
 """So many times the work, at most, for so many times the garbage."""
+CHANCE = 0.01
+"""Lines for each byte, below which it is chance how many there are: what is looked through at once by one call costs
+lines only where noise looks like a packet, some hundred in 400 000 bytes."""
 Garbage = Callable[[Random], list[Data]]
 READERS: dict[str, tuple[Callable[[], Any], dict[str, Garbage]]] = {
     "feetech": (feetech.FAMILY.receiver, SERVO),
@@ -111,7 +114,7 @@ def test_l9_four_times_the_garbage_is_four_times_the_work(
     assert heard >= MORE * size
     once, more = work(make(), few, cut), work(make(), many, cut)
     assert once
-    assert more / heard <= MOST / MORE * once / sum(map(len, few))
+    assert more / heard <= max(MOST / MORE * once / sum(map(len, few)), CHANCE)
     figures(
         f"L9 work on {MORE} times the garbage, {kind}, {cut.__name__.replace('_', ' ')}",
         family=line, promise=6, bytes=heard, most_work_per_byte=round(more / heard, 2),

@@ -31,6 +31,14 @@ def test_what_is_no_segment_has_no_toggle_and_a_segment_no_object() -> None:
     assert Key("segment", toggle=1).multiplexer == (0, 0)
 
 
+def test_an_abort_is_that_of_its_own_object_from_either_side() -> None:
+    request, refusal, other = Key("upload", 0x6002, 1), Key("abort", 0x6002, 1), Key("abort", 0x6003, 1)
+    assert request == refusal
+    assert refusal == request
+    assert request != other
+    assert other != request
+
+
 def test_a_key_leaves_it_to_others_whether_they_equal_it() -> None:
     class Anything:
         def __eq__(self, other: object) -> bool:
