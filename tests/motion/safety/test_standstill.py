@@ -16,6 +16,7 @@ from motorbus import families
 from motorbus.core.family import Quality
 from motorbus.core.operation import Data, Operation
 from motorbus.errors import MotorbusError
+from motorbus.families.feetech.table import SCS_COUNT
 from motorbus.link.base import Delivery, Side
 from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
 from motorbus.motion.safety.track import Sample
@@ -51,6 +52,12 @@ def test_one_elsewhere_begins_anew() -> None:
     assert judged(*fresh(1.0, 1.0, 1.1)).rest is Rest.MOVING
     assert judged(*fresh(1.0, 1.0, 1.1, 1.1)).rest is Rest.MOVING
     assert judged(*fresh(1.0, 1.0, 1.1, 1.1, 1.1)).rest is Rest.STOPPED
+
+
+def test_a_count_of_the_coarsest_servo_is_rest_and_a_creep_is_not() -> None:
+    assert judged(*fresh(1.0, 1.0 + SCS_COUNT, 1.0)).rest is Rest.STOPPED
+    creep = 0.075 * SPAN  # rad; what is faster than 0.06 rad/s is seen
+    assert judged(*fresh(1.0, 1.0 + creep / 2, 1.0 + creep)).rest is Rest.MOVING
 
 
 @pytest.mark.parametrize("quality", [Quality.SUSPECT, Quality.REPEATED])

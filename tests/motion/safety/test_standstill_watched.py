@@ -17,7 +17,7 @@ SILENT = NoReply("silent")
 BEGUN = 4.0
 
 
-def looked(told: Iterable[float | MotorbusError], patience: float) -> tuple[Rest, float | None, int, float]:
+def looked(told: Iterable[float | MotorbusError], *patience: float) -> tuple[Rest, float | None, int, float]:
     """What came of it, where it was last, how often it was asked, and how long that took (s)."""
     answers, asked = iter(told), [0]
 
@@ -29,7 +29,7 @@ def looked(told: Iterable[float | MotorbusError], patience: float) -> tuple[Rest
         return answer
         yield
 
-    work: Any = watched(ask, patience)
+    work: Any = watched(ask, *patience)
     now = BEGUN
     step = next(work)
     while True:
@@ -60,6 +60,12 @@ def test_it_is_asked_until_the_patience_is_over_and_no_longer() -> None:
     _, _, asked, took = looked(moving, 0.21)
     assert took == pytest.approx(0.22)
     assert asked == 12
+
+
+def test_when_nobody_says_how_long_it_is_asked_for_a_second() -> None:
+    rest, _, _, took = looked(number * 0.02 for number in range(200))
+    assert rest is Rest.MOVING
+    assert took == pytest.approx(1.0, abs=0.2)
 
 
 def test_patience_that_is_over_at_this_very_moment_is_over() -> None:

@@ -51,6 +51,33 @@ def test_what_arrives_or_pushes_less_or_has_no_goal_is_easy(
     assert after(State(0.0, **sample), State(9.0, **sample), goal=goal) is Verdict.EASY
 
 
+@pytest.mark.parametrize(
+    ("easy", "hard"),
+    [
+        ({"load": 0.7}, {"load": 0.9}),
+        ({"current": 2.1}, {"current": 2.9}),  # a servo protects itself above 3.25 A, and drops its load then
+        ({"load": 0.95, "position": 0.92}, {"load": 0.95, "position": 0.88}),
+        ({"current": 2.9, "position": 1.08}, {"current": 2.9, "position": 1.12}),
+        ({"load": 0.95, "velocity": 0.6}, {"load": 0.95, "velocity": 0.4}),
+        ({"load": 0.95, "velocity": -0.6}, {"load": 0.95, "velocity": -0.4}),
+    ],
+)
+def test_how_much_is_too_much_when_nobody_says_it(easy: dict[str, Any], hard: dict[str, Any]) -> None:
+    mild, harsh = ({"position": 0.0, **sample} for sample in (easy, hard))
+    assert after(*(State(at, **mild) for at in (0.0, 9.0))) is Verdict.EASY
+    assert after(*(State(at, **harsh) for at in (0.0, 0.8))) is Verdict.STRAINED
+    assert after(*(State(at, **harsh) for at in (0.0, 1.2))) is Verdict.OVERLOADED
+
+
+def test_the_last_sample_is_kept_whatever_it_says() -> None:
+    strain, easy, hard = Strain(), State(0.0, load=0.1, position=0.0), State(1.0, **HARD)
+    kept = [strain.sample]
+    for sample, goal in ((easy, 1.0), (hard, 1.0), (easy, None)):
+        strain.take(sample, goal)
+        kept.append(strain.sample)
+    assert kept == [None, easy, hard, easy]
+
+
 def test_one_easy_sample_in_between_begins_anew() -> None:
     easy = State(0.5, load=0.1, position=0.0)
     assert after(State(0.0, **HARD), easy, State(1.0, **HARD), State(1.9, **HARD)) is Verdict.STRAINED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf, nan
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -73,6 +74,38 @@ def test_what_is_no_number_is_suspect_and_confirms_nothing(value: float) -> None
     assert track.take(value, 0.1).quality is Quality.SUSPECT
     assert track.sample is None
     assert track.take(1.0, 0.2).quality is Quality.FRESH
+
+
+USUAL: dict[str, Any] = {}
+TEN: dict[str, Any] = {"speed": 10.0}
+
+
+@pytest.mark.parametrize(
+    ("told", "seconds", "comes", "cannot"),
+    [
+        (USUAL, 0.05, 1.3, 1.75),  # no servo is said to do more than 60 degrees, 1.05 rad, in that time
+        (TEN, 0.05, 0.65, 0.87),  # it does 0.5 rad, and half as much again is let through
+        (TEN, 0.3, 0.78, 1.05),  # its speed counts for 0.06 s only
+        (USUAL, 0.4, 1.6, 2.1),
+        (USUAL, 0.0, 0.008, 0.012),  # what trembles; a count of the coarsest servo is 0.0051 rad
+        (USUAL, 0.6, 0.08, 0.12),  # nobody has looked for more than half a second: only whoever has stayed
+        (USUAL, 1e5, 0.08, 0.12),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_how_far_a_motor_comes(
+    told: dict[str, Any], seconds: float, comes: float, cannot: float, sign: int
+) -> None:
+    for way, quality in ((comes, Quality.FRESH), (cannot, Quality.SUSPECT)):
+        track = Track(**told)
+        track.take(3.0, 0.0)
+        assert track.take(3.0 + sign * way, seconds).quality is quality
+
+
+def test_what_was_read_less_than_half_a_second_ago_needs_no_second_look() -> None:
+    track = Track()
+    track.take(1.0, 1.0)
+    assert (track.why_not(1.4), track.why_not(1.6)) == ("", "stale")
 
 
 def test_an_older_reading_changes_nothing() -> None:

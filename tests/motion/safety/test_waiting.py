@@ -73,6 +73,15 @@ def test_the_same_mark_may_be_used_again() -> None:
         assert goals(waiting, 1) is None
 
 
+def test_what_has_begun_waits_no_more_when_the_same_mark_begins_once_more() -> None:
+    waiting, again = Waiting(), Later(1, begins=True)
+    handed(waiting, ONE)
+    waiting.begin(again)
+    again.done = True
+    waiting.begin(again)
+    assert goals(waiting, 1) is None
+
+
 def test_a_copy_knows_what_is_known_by_then_and_tells_nobody() -> None:
     waiting = Waiting()
     handed(waiting, ONE)
