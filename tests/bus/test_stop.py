@@ -55,7 +55,7 @@ def test_a_node_that_does_not_acknowledge_is_asked_five_times_and_named() -> Non
     outcome = bus.estop()
     assert outcome.acknowledged == (1,)
     assert outcome.silent == (2,)
-    assert torque_offs(responder).count(2) == ROUNDS
+    assert torque_offs(responder).count(2) == 5
     assert torque_offs(responder).count(1) == 1
 
 
