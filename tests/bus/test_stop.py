@@ -139,12 +139,16 @@ def test_a_stop_survives_a_closed_event_loop() -> None:
     bus, responder = async_bus(virtual=False)
     loop = asyncio.new_event_loop()
 
+    begun: list[bool] = []
+
     def endless() -> Operation[None]:
         yield from write(1, TORQUE, 1, Effect.TORQUE)
+        begun.append(True)
         yield from Pause(1000.0)
 
     task = loop.create_task(bus.run(endless()))
-    loop.run_until_complete(asyncio.sleep(0.1))
+    while not begun:
+        loop.run_until_complete(asyncio.sleep(0.001))
     loop._ready.clear()  # type: ignore[attr-defined]  # it dies as it stands, with the task pending
     task._log_destroy_pending = False  # type: ignore[attr-defined]
     loop.close()

@@ -69,6 +69,17 @@ def test_where_a_port_stays_full_whoever_stops_is_told_soon() -> None:
     assert told == []
 
 
+def test_a_stop_waits_for_the_end_of_a_long_frame_through_more_than_one_round() -> None:
+    bus, responder = memory_bus(pace=True)
+    bus.run(position(1))
+    free = bus.turns.free_at = bus.link.now() + 0.6
+    outcome = bus.estop()
+    assert outcome.acknowledged == (1,)
+    assert outcome.rounds == 3
+    assert [packet.id for packet in responder.heard[-2:]] == [254, 1]
+    assert free < bus.link.now() < free + 0.01
+
+
 @pytest.mark.parametrize(("cuts", "through"), [(1, True), (2, True), (3, False)])
 def test_a_stop_goes_through_although_it_is_cut_short_twice_and_gives_up_after_the_third_time(
     cuts: int, through: bool

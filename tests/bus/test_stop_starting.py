@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any
@@ -102,6 +103,21 @@ def test_once_it_is_there_a_stop_waits_for_nobody_who_is_still_starting_it(real:
     assert not waits
     assert real.stopper.outcome is not None
     assert real.stopper.outcome.acknowledged == (1,)
+
+
+def test_a_process_that_ends_lets_a_stop_that_has_begun_come_to_its_end_first(
+    real: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_exit: list[Callable[[], None]] = []
+    monkeypatch.setattr(atexit, "register", at_exit.append)
+    monkeypatch.setattr(atexit, "unregister", lambda call: at_exit.remove(call) if call in at_exit else None)
+    real.stopper.start()
+    real.trigger_estop()
+    for call in list(at_exit):
+        call()
+    assert real.stopper.outcome is not None
+    assert real.stopper.outcome.acknowledged == (1,)
+    assert at_exit == [], "of what is closed nothing is left to do"
 
 
 # --- there is none --------------------------------------------------------------------------------------------------
