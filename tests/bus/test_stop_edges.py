@@ -181,7 +181,14 @@ def test_a_node_that_has_not_said_where_it_is_is_not_asked_in_the_same_round() -
     failed = Flight(read(1))
     failed.error = NoReply("silent")
     assert bus.stopper._following(failed) == []
+
+
+def test_for_a_question_that_nobody_in_particular_answers_no_frames_are_made() -> None:
+    bus, _ = can_bus(pace=True)
+    bus.run(read(1))
+    made = len(bus.turns.family.stops)  # type: ignore[attr-defined]
     assert bus.stopper._following(Flight(Exchange(read(1).request, ANY))) == []
+    assert len(bus.turns.family.stops) == made  # type: ignore[attr-defined]
 
 
 def test_a_node_whose_position_has_grown_old_meanwhile_is_not_asked_in_the_same_round() -> None:
