@@ -20,7 +20,7 @@ from tests.conftest import Figures, Rounds
 from tests.faults.off import are_off
 from tests.faults.single import tried_again
 from tests.faults.straight import GROUP, KEPT, StraightRig
-from tests.faults.test_lines import Doubled
+from tests.faults.test_lines import Belated, Doubled
 
 NAMES = list(KEPT)
 RATE = 1_000_000
@@ -37,22 +37,6 @@ def try_(name: str, rig: StraightRig) -> bool:
     except MotorbusError:
         return False
     return True
-
-
-class Belated(PerfectLine):
-    """Hands each answer over so long (s) after its question has left."""
-
-    def __init__(self, after: float) -> None:
-        self.after = after
-        self.asked = 0.0
-        self.fired = 0
-
-    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
-        if sender is Side.HOST:
-            self.asked = at
-            return super().carry(sender, data, at)
-        self.fired += 1
-        return super().carry(sender, data, self.asked + self.after)
 
 
 @pytest.mark.parametrize("name", NAMES)
