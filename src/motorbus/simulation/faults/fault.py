@@ -121,7 +121,8 @@ def _check_place(fault: Fault) -> None:
         raise RequestError(f"fault {fault}: exchanges and packets count from 1 and bytes from 0")
     if max(fault.exchange or 0, fault.byte or 0, fault.packet) > FARTHEST:
         raise RequestError(
-            f"fault {fault}: no run comes that far", expected=f"exchanges, packets and bytes up to {FARTHEST:,}"
+            f"fault {fault}: no run comes that far",
+            expected=f"exchanges, packets and bytes up to {FARTHEST:,}",
         )
     if fault.byte is not None and (fault.exchange is None or fault.packet != 1):
         raise RequestError(f"fault {fault}: a byte is counted within an exchange")

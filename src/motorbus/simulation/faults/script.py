@@ -171,7 +171,8 @@ def _arguments(action: str, said: list[str], *, loose: bool) -> dict[str, Any]:
         return {"value": ANY}
     if side := _SIDE.search(" ".join(said)):
         raise RequestError(
-            f"`{side[0]}` stands before the colon", expected=f"the place first, as `exchange 17 {side[0]}: drop`"
+            f"`{side[0]}` stands before the colon",
+            expected=f"the place first, as `exchange 17 {side[0]}: drop`",
         )
     if len(said) > most or (not said and not optional):
         raise RequestError(f"{action} takes {takes.value or 'nothing more'}")
