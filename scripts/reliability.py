@@ -8,7 +8,6 @@ takes it all the same. `--check` sees that the page is the one that its figures 
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from textwrap import fill
@@ -202,10 +201,14 @@ def together(runs: Iterable[dict[str, Any]], cases: dict[str, list[str]]) -> lis
     for run in runs:
         kind = _kind(run["what"]), run["family"], run["test"].partition("[")[0], *run["figures"]
         groups.setdefault(kind, []).append(run)
-    rows = Counter(_where(group[0]) for group in groups.values())
+    measured: dict[str, set[str]] = {}
+    for group in groups.values():
+        for run in group:
+            measured.setdefault(_where(run), set()).add(run["test"])
     found: list[dict[str, Any]] = []
     for group in groups.values():
-        share = _share(group, cases) if rows[_where(group[0])] == 1 else ""
+        whole = {run["test"] for run in group} == measured[_where(group[0])]
+        share = _share(group, cases) if whole else ""
         found += [_summed(group, share)] if len(group) >= MANY else group
     return found
 
