@@ -53,9 +53,10 @@ have something wrong below.
 
 In the tables *faults* is how many happened, and *wrong* how often something false was told. *Expected* is what
 arithmetic says that chance brings. *Untouched* are calls that no fault met, *untouched again* those of them that had to
-ask twice. *Kinds* is how many runs are added up in one row. *Cuts* is how often the power or the program went, *states*
-in how many different states that left a device, *lost* how often the end was not as promised. *Descriptors*, *threads*,
-*blocks* (of Python's memory) and *kib* are what was left over. Times are those of the simulation, in s.
+ask twice. *Kinds* is how many runs are added up in one row; *4 of 16*: there are more, [not measured
+yet](#not-measured-at-length-yet). *Cuts* is how often the power or the program went, *states* in how many different
+states that left a device, *lost* how often the end was not as promised. *Descriptors*, *threads*, *blocks* (of Python's
+memory) and *kib* are what was left over. Times are those of the simulation, in s.
 """
 
 PROMISES: Final = {
@@ -91,47 +92,83 @@ PROMISES: Final = {
 }
 
 
-def page(runs: Iterable[dict[str, Any]]) -> str:
-    """The whole page."""
-    told = list(runs)
-    parts = _promises(told), _others(told), _missing(told), _exempt(), _rows()
+def page(runs: Iterable[dict[str, Any]], cases: Iterable[str]) -> str:
+    """The whole page. `cases` are all that long runs measure, as pytest names them."""
+    told, by_test = list(runs), _by_test(cases)
+    parts = _promises(told, by_test), _others(told, by_test), _missing(told, by_test), _exempt(), _rows()
     return "\n".join([HEAD, *(line for part in parts for line in part)]).rstrip() + "\n"
 
 
-def _promises(runs: list[dict[str, Any]]) -> Iterator[str]:
+def _by_test(cases: Iterable[str]) -> dict[str, list[str]]:
+    """The cases of each test."""
+    found: dict[str, list[str]] = {}
+    for case in cases:
+        found.setdefault(case.partition("[")[0], []).append(case)
+    return found
+
+
+def _promises(runs: list[dict[str, Any]], cases: dict[str, list[str]]) -> Iterator[str]:
     for number, says in PROMISES.items():
-        text = says.replace("{neither}", _neither(runs))
+        text = says.replace("{neither}", _neither(runs, cases))
         yield f"## Promise {number}\n\n{fill(text, 118, break_on_hyphens=False)}\n"
-        yield from _table(run for run in runs if run["promise"] == number)
+        yield from _table((run for run in runs if run["promise"] == number), cases)
 
 
-def _neither(runs: Iterable[dict[str, Any]]) -> str:
-    """How often a cut has left a project neither old nor new, by the runs that count it."""
-    counts: dict[str, list[int]] = {}
+def _neither(runs: Iterable[dict[str, Any]], cases: dict[str, list[str]]) -> str:
+    """How often a cut has left a project neither old nor new, by the runs that count it, and whether those are all."""
+    groups: dict[str, list[dict[str, Any]]] = {}
     for run in runs:
         if NEITHER in run["figures"]:
-            both = counts.setdefault(_kind(run["what"]), [0, 0])
-            both[0] += run["figures"][NEITHER]
-            both[1] += run["figures"]["cuts"]
-    said = [f"{_shown(some)} of {_shown(cuts)} cuts" for some, cuts in counts.values()]
+            groups.setdefault(_kind(run["what"]), []).append(run)
+    said = []
+    for group in groups.values():
+        some, cuts = (sum(run["figures"][name] for run in group) for name in (NEITHER, "cuts"))
+        share = _share(group, cases)
+        said.append(f"{_shown(some)} of {_shown(cuts)} cuts{f' ({share} kinds)' if share else ''}")
     return " and after ".join(said) or "some"
 
 
-def _others(runs: list[dict[str, Any]]) -> Iterator[str]:
+def _share(group: list[dict[str, Any]], cases: dict[str, list[str]]) -> str:
+    """`4 of 16` where a test has more cases than these runs of it have measured; "" for all, and where nobody knows.
+
+    Where one case has told several runs, it is not known how many those would be.
+    """
+    measured = {run["test"] for run in group}
+    every = {case for run in group for case in cases.get(_where(run), ())}
+    if len(measured) < len(group) or measured >= every:
+        return ""
+    return f"{len(measured & every)} of {len(every)}"
+
+
+def _others(runs: list[dict[str, Any]], cases: dict[str, list[str]]) -> Iterator[str]:
     yield "## Other long runs\n"
-    yield from _table(run for run in runs if run["promise"] not in PROMISES)
+    yield from _table((run for run in runs if run["promise"] not in PROMISES), cases)
 
 
-def _missing(runs: list[dict[str, Any]]) -> Iterator[str]:
-    """Long runs that the table has no figures of: they are seen to be absent."""
-    measured = {_where(run) for run in runs}
-    absent = [[f"`{name}`"] for name, _ in tests_told.telling() if name not in measured]
+def _missing(runs: list[dict[str, Any]], cases: dict[str, list[str]]) -> Iterator[str]:
+    """Cases of long runs that the table has no figures of: they are seen to be absent."""
+    measured = {run["test"] for run in runs}
+    absent = {test: [case for case in some if case not in measured] for test, some in cases.items()}
     yield "## Not measured at length yet\n"
-    if absent:
-        yield f"Of these {len(absent)} long runs there are no figures here; `make soak` measures them.\n"
-        yield from listed(("test",), absent)
+    count, every = sum(map(len, absent.values())), sum(map(len, cases.values()))
+    if count:
+        yield f"{count} of the {every} cases of long runs have no figures here; `make soak` measures them.\n"
+        yield from listed(
+            ("test", "cases", "which"),
+            [
+                [f"`{test}`", f"{len(some)} of {len(cases[test])}", _which(some, cases[test])]
+                for test, some in absent.items()
+                if some
+            ],
+        )
     else:
-        yield "None: every long run has figures here.\n"
+        yield "None: every case of every long run has figures here.\n"
+
+
+def _which(some: list[str], every: list[str]) -> str:
+    """Those that are not all, by their parameters."""
+    parameters = [case.partition("[")[2].removesuffix("]").replace("|", "\\|") for case in some]
+    return "<br>".join(f"`{one}`" for one in parameters) if len(some) < len(every) else ""
 
 
 def _exempt() -> Iterator[str]:
@@ -144,25 +181,36 @@ def _exempt() -> Iterator[str]:
     )
 
 
-def _table(runs: Iterable[dict[str, Any]]) -> Iterator[str]:
-    rows = [[run["what"], run["family"], _figures(run["figures"]), _run(run)] for run in together(runs)]
+def _table(runs: Iterable[dict[str, Any]], cases: dict[str, list[str]]) -> Iterator[str]:
+    rows = [
+        [run["what"], run["family"], _figures(run["figures"]), _run(run)] for run in together(runs, cases)
+    ]
     if rows:
         yield from listed(("what", "family", "figures", "run"), rows)
     else:
         yield "Not measured yet.\n"
 
 
-def together(runs: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+def together(runs: Iterable[dict[str, Any]], cases: dict[str, list[str]]) -> list[dict[str, Any]]:
     """One row for many of a kind: those of one test that strike toward one side and begin alike up to a comma.
 
     Counts are added up, and of what begins with `longest` or `most` the largest is kept. Each by itself stands in the
-    file of figures.
+    file of figures. Where they are all that was measured of their test, and that has more `cases`, it is told.
     """
     groups: dict[object, list[dict[str, Any]]] = {}
     for run in runs:
         kind = _kind(run["what"]), run["family"], run["test"].partition("[")[0], *run["figures"]
         groups.setdefault(kind, []).append(run)
-    return [row for group in groups.values() for row in (_summed(group) if len(group) >= MANY else group)]
+    measured: dict[str, set[str]] = {}
+    for group in groups.values():
+        for run in group:
+            measured.setdefault(_where(run), set()).add(run["test"])
+    found: list[dict[str, Any]] = []
+    for group in groups.values():
+        whole = {run["test"] for run in group} == measured[_where(group[0])]
+        share = _share(group, cases) if whole else ""
+        found += [_summed(group, share)] if len(group) >= MANY else group
+    return found
 
 
 def _kind(what: str) -> str:
@@ -171,16 +219,17 @@ def _kind(what: str) -> str:
     return ", ".join([first, *(other for other in others if other.startswith("toward "))])
 
 
-def _summed(group: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _summed(group: list[dict[str, Any]], share: str) -> dict[str, Any]:
+    """One row of these. `share`: which part of all kinds they are, "" for all."""
     last = max(group, key=lambda run: str(run["date"]))
-    figures = {"kinds": len(group)}
+    figures: dict[str, Any] = {"kinds": share or len(group)}
     for name in group[0]["figures"]:
         values = [run["figures"][name] for run in group]
         if any(isinstance(value, str) for value in values) or name == "seed":
             continue
         figures[name] = max(values) if name.startswith(("longest", "most")) else sum(values)
     what, test = _kind(last["what"]), last["test"].partition("[")[0]
-    return [{**last, "what": what, "test": test, "figures": figures}]
+    return {**last, "what": what, "test": test, "figures": figures}
 
 
 def _figures(figures: dict[str, Any]) -> str:
@@ -232,7 +281,7 @@ def main() -> int:
         print(_refusal(dirty, new), file=sys.stderr)
         return REFUSED
     runs = soaked.merged(soaked.kept(), new)
-    wanted: dict[Path, str] = {PAGE: page(runs)}
+    wanted: dict[Path, str] = {PAGE: page(runs, tests_told.cases())}
     return kept({soaked.KEPT: soaked.text(runs), **wanted})
 
 

@@ -1,12 +1,14 @@
 """What the tests say of themselves in their source, for docs/reliability.md: rows, figures, and why no fault is needed.
 
-Nothing is run for it: names, marks and parameters are read.
+Nothing is run for it: names, marks and parameters are read; which cases a test has, pytest says, which collects them.
 """
 
 from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -51,6 +53,26 @@ def telling() -> Iterator[tuple[str, Function]]:
             yield from (
                 (f"{_named(file)}::{one.name}", one) for one in _tests(text) if "figures" in taken(one)
             )
+
+
+def cases() -> list[str]:
+    """Every case of the tests that tell figures, as long runs have them. Raises RuntimeError where pytest cannot say.
+
+    Collecting them takes some seconds; whoever tells figures in no long run has no case here.
+    """
+    names = list(dict.fromkeys(name for name, _ in telling()))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "--collect-only", "-q", "--soak", "-p", "no:cacheprovider", *names],
+        cwd=soaked.ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(
+            f"pytest cannot say which cases there are:\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        )
+    return [line for line in done.stdout.splitlines() if line.partition("[")[0] in names]
 
 
 def taken(function: Function) -> set[str]:

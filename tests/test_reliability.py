@@ -6,6 +6,7 @@ import ast
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,7 @@ from scripts import reliability, soaked, tests_told
 from scripts.fault_rows import ROWS
 
 COMMIT = soaked.commit
+CROWDS = ("threads-virtual", "threads-pseudo-terminal", "tasks-virtual", "tasks-pseudo-terminal")
 
 
 @pytest.fixture
@@ -22,6 +24,7 @@ def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(soaked, "KEPT", tmp_path / "reliability.json")
     monkeypatch.setattr(soaked, "commit", lambda: "0123456789")
     monkeypatch.setattr(reliability, "PAGE", tmp_path / "reliability.md")
+    monkeypatch.setattr(tests_told, "cases", lambda: [name for name, _ in tests_told.telling()])
     return tmp_path
 
 
@@ -213,11 +216,65 @@ def test_a_long_run_without_figures_is_seen_to_be_absent(
     soaked.record("A", test="tests/test_0.py::test_a[1]", wrong=0)
     page = written(monkeypatch, "--take")
     part = page[page.index("## Not measured at length yet") : page.index("## What may pass")]
-    assert "Of these 1 long runs" in part
-    assert "| `tests/test_0.py::test_b` |" in part
-    assert "test_a" not in part
+    assert "| `tests/test_0.py::test_b` | 1 of 1 |  |" in part
+    soaked.record("A", test="tests/test_0.py::test_a", wrong=0)
     soaked.record("B", test="tests/test_0.py::test_b", wrong=0)
-    assert "None: every long run has figures" in written(monkeypatch, "--take")
+    assert "None: every case of every long run has figures" in written(monkeypatch, "--take")
+
+
+def parametrized(monkeypatch: pytest.MonkeyPatch, **count: int) -> None:
+    """These tests have so many cases for once."""
+    names = [f"t.py::{test}[{number}|]" for test, many in count.items() for number in range(many)]
+    monkeypatch.setattr(tests_told, "cases", lambda: names)
+
+
+def test_a_case_of_a_long_run_without_figures_is_seen_to_be_absent(
+    apart: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parametrized(monkeypatch, a=3, b=2, c=1)
+    for case in ("a[0|]", "c[0|]"):
+        soaked.record(f"L1 {case}", test=f"t.py::{case}", wrong=0)
+    part = written(monkeypatch, "--take").partition("## Not measured at length yet")[2]
+    assert "4 of the 6 cases of long runs" in part
+    assert "| `t.py::a` | 2 of 3 | `1\\|`<br>`2\\|` |" in part
+    assert "| `t.py::b` | 2 of 2 |  |" in part
+    assert "t.py::c" not in part
+
+
+def test_a_sum_of_some_kinds_says_of_how_many(apart: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parametrized(monkeypatch, some=16, all=4, parted=9)
+    for number in range(4):
+        figures: dict[str, Any] = {"cuts": 10, "neither_but_told": 1}
+        for test in ("some", "all"):
+            what = f"D10 {test}, {number}"
+            soaked.record(what, promise=4, test=f"t.py::{test}[{number}|]", **figures)
+        for half in (0, 4):
+            soaked.record(f"D10 {half}, {number}", test=f"t.py::parted[{half + number}|]", cuts=2)
+            soaked.record(f"D10 both {half}, {number}", test="t.py::parted[0|]", cuts=3)
+    page = " ".join(written(monkeypatch, "--take").split())
+    assert "| D10 some | | kinds 4 of 16, cuts 40, " in page
+    assert "| D10 all | | kinds 4, cuts 40, " in page
+    assert "| D10 0 | | kinds 4, cuts 8 |" in page, "of how many is not known where a test has several rows"
+    assert "| D10 both 0 | | kinds 4, cuts 12 |" in page, "nor where one case tells several runs"
+    assert "after 4 of 40 cuts and after 4 of 40 cuts (4 of 16 kinds).**" in page
+
+
+def test_the_cases_of_a_test_are_those_that_long_runs_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = dict(tests_told.telling())
+    names = [name for name in told if "/test_switched_off.py" in name or "/test_crowd.py" in name]
+    monkeypatch.setattr(tests_told, "telling", lambda: iter([(name, told[name]) for name in names]))
+    crowd = "tests/faults/test_crowd.py::test_l16_a_crowd_"
+    assert sorted(tests_told.cases()) == [
+        *(f"{crowd}on_one_bus[{kind}]" for kind in sorted(CROWDS)),
+        f"{crowd}where_several_fly_at_once",
+        "tests/faults/test_switched_off.py::test_no_test_of_a_fault_passes_without_its_fault[all]",
+    ]
+
+
+def test_cases_that_cannot_be_collected_are_no_empty_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.executable", "false")
+    with pytest.raises(RuntimeError, match="cannot say which cases there are"):
+        tests_told.cases()
 
 
 def test_whoever_needs_no_fault_is_on_the_page_with_the_reason(

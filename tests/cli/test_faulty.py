@@ -37,9 +37,11 @@ def test_a_script_a_file_or_nothing(tmp_path: Path) -> None:
         with pytest.raises(RequestError, match="there is no fault in it") as caught:
             from_option(str(file))
         assert str(file) in caught.value.summary
-    file.write_text("seed 3\nexchange 1: explode\n")
-    with pytest.raises(RequestError, match="^line 2: "):
+    file.write_text("seed 3\nexchange 1: drp\n")
+    with pytest.raises(RequestError) as caught:
         from_option(str(file))
+    assert caught.value.summary.startswith(f"--faults {file}: line 2: 'exchange 1: drp' is not a fault")
+    assert caught.value.expected == "perhaps drop"
     file.write_bytes(b"\xef\xbb\xbfexchange 1: drop\r\n")  # as some editors write it
     assert from_option(str(file)) == parse("exchange 1: drop")
     long = "; ".join(f"exchange {number}: drop" for number in range(1000))

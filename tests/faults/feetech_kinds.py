@@ -6,13 +6,14 @@ value or the new one, and never a third. What does not name a servo leaves it as
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 from motorbus.core.operation import Answer, Due, Exchange, Operation, Timeout
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
+    PRESENT,
     Block,
     acknowledged,
     read_block,
@@ -20,7 +21,10 @@ from motorbus.families.feetech.driver.exchanges import (
     verified,
     write_block,
 )
-from tests.faults.rig import FEEDBACK, Rig, ping
+from motorbus.families.feetech.driver.holding import COUNT, _order, ask, resting
+from motorbus.families.feetech.driver.line import stop
+from motorbus.families.feetech.driver.sharing import _twice
+from tests.faults.rig import FEEDBACK, IDS, Rig, ping
 from tests.faults.single import Overheard
 
 GOAL_TIME = 44  # on HLS the goal torque; a word of RAM that moves nothing while a servo is limp
@@ -174,6 +178,74 @@ def clear_turns(rig: Rig) -> None:
     _written(rig, exchange, lambda: servo.raw_position, servo.raw_position % 4096)
 
 
+TORQUE = 40
+
+
+def _let_be(rig: Rig) -> None:
+    """What is late has come by then. Neither a stop waits for that, nor who listens for more than one answer."""
+    rig.link.advance(0.1)
+
+
+def _stiff(rig: Rig) -> None:
+    """Everyone has torque, so that it shows who was let go."""
+    _let_be(rig)
+    for servo in rig.servos.values():
+        servo.memory.live[TORQUE] = 1
+
+
+def _switches(rig: Rig) -> dict[int, int]:
+    return {id: servo.memory.live[TORQUE] for id, servo in rig.servos.items()}
+
+
+def limp(rig: Rig) -> None:
+    """What an emergency stop says to each by its name."""
+    memory = rig.servos[1].memory
+    exchange = stop({1: None}).exchanges[1]
+    _written(rig, exchange, lambda: memory.live[TORQUE], 0)
+
+
+def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
+    """What it says to many at once: nobody answers, so they are all let go, or have not heard it."""
+    exchange = (stop({}) if len(whom) == len(IDS) else stop(dict.fromkeys(whom), hold=(4,))).exchanges[number]
+    assert isinstance(exchange.request, bytes)
+
+    def act(rig: Rig) -> None:
+        before = _switches(rig)
+        rig.bus.run(exchange)
+        rig.link.advance(0.1)
+        after = {id: 0 if id in whom else torque for id, torque in before.items()}
+        assert _switches(rig) in (before, after), "somebody else has obeyed, or only some"
+
+    return Kind(act, len(exchange.request), 0, _stiff)
+
+
+def ask_to_hold(rig: Rig) -> None:
+    """READ of all that decides what holds a servo."""
+    raw = rig.stir()
+    answer: Answer = rig.bus.run(ask(1))
+    assert [reply.data[5:-1] for reply in answer.replies] == [_image(rig, raw)]
+
+
+def _image(rig: Rig, raw: int) -> bytes:
+    return rig.servos[1].memory.read(0, PRESENT) + rig.code(raw)
+
+
+def hold(rig: Rig) -> None:
+    """What it is told then: to be where it is. Success means that this is its goal."""
+    raw, memory = rig.stir(), rig.servos[1].memory
+    block = resting(1, _image(rig, raw))
+    exchange = _order(1, block)
+    assert block.data == rig.code(raw)
+    _written(rig, exchange, lambda: memory.read(block.address, 2), block.data)
+
+
+def listened_twice(rig: Rig) -> None:
+    """READ with the line kept open for a second servo of the same id. There is none, and none may be heard."""
+    raw, memory = rig.stir(), rig.servos[1].memory
+    told = rig.bus.run(_twice(Servo(rig.bus, 1), PRESENT, FEEDBACK))
+    assert told == (rig.code(raw) + memory.read(58, FEEDBACK - 2),)
+
+
 _COMMON = {
     "ping": Kind(ping, 6, 6),
     "read 1 byte": reading(1),
@@ -187,12 +259,18 @@ _COMMON = {
     "action": Kind(action, 6, 6, reg_write, sure=False),
     "sync write": Kind(sync_write, 8 + 3 * len(GROUP), 0),
     "restore": Kind(restore, 6, 6, _set_apart, sure=False),
+    "stop: one is let go": Kind(limp, 8, 6, _stiff, sure=False),  # a stop says it again in its next round
+    "stop: all are let go": limp_unanswered(0, IDS),
+    "stop: some are let go": limp_unanswered(0, GROUP),
+    "read that two may answer": Kind(listened_twice, 8, 6 + FEEDBACK, _let_be, sure=False),
 }
 KINDS: dict[str, dict[str, Kind]] = {
     "sts3215": {
         **_COMMON,
         "sync read 3 x 2 bytes": Kind(sync_read, 11, 24),
         "calibrate": calibration(None),
+        "stop: one is asked for what holds it": Kind(ask_to_hold, 8, 6 + COUNT, _stiff, sure=False),
+        "stop: one is held": Kind(hold, 9, 6, _stiff, sure=False),
     },
     "scs215": _COMMON,
     "hls3606": {

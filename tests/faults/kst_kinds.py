@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from motorbus.bus.pace import SHOWN
 from motorbus.bus.pump import Bus
 from motorbus.core.entry import changed
-from motorbus.core.operation import Runnable
+from motorbus.core.operation import Answer, Runnable
 from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
     FAMILY,
@@ -23,6 +23,7 @@ from motorbus.families.kst import (
     broadcast_save,
 )
 from motorbus.families.kst.driver.exchanges import download, order, upload_row
+from motorbus.families.kst.driver.line import stop
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.table import BIT_RATES
 from motorbus.link.base import Line
@@ -223,6 +224,15 @@ def broadcast_saving(rig: KstRig) -> None:
     rig.link.advance(0.5)
 
 
+def stopping(rig: KstRig) -> None:
+    """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
+    raw = rig.stir()
+    (ask,) = stop({NODE: None}, rig.dialect).exchanges
+    answer: Answer = rig.run(ask)
+    (hold,) = stop({NODE: answer}, rig.dialect).exchanges
+    _written(rig, lambda: rig.run(hold), "goal_position", raw)
+
+
 KINDS: dict[str, Kind] = {
     "ping": Kind(ping),
     "read 1 byte": Kind(read_1),
@@ -239,6 +249,7 @@ KINDS: dict[str, Kind] = {
     "save that is acknowledged": Kind(save, options={"save_reply": "ack"}),
     "start and stop of reports": Kind(start_reports),
     "start and move": Kind(write_2, profile="xqpower"),
+    "stop": Kind(stopping, sure=False),  # it is said again in the next round of a stop
     "broadcast read": Kind(broadcast_reading, alone=False),
     "broadcast write": Kind(broadcast_move, alone=False),
     "broadcast of a bit rate": Kind(broadcast_rate, alone=False),

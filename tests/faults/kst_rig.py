@@ -25,6 +25,8 @@ RATE = 500_000
 BIT = 1 / RATE
 PLACES = 1801
 INDEX, OTHER_INDEX = 0x6002, 0x6003
+OTHER_VALUE = 0x55
+"""What the lowest byte of a value of something else differs by from the true one: a place of another request."""
 NOT_THERE = 0x0602_0000
 SWAPPED = int.from_bytes(NOT_THERE.to_bytes(4, "little"), "big")
 
@@ -172,10 +174,11 @@ class Mischief:
 
     def _other(self, name: str, frame: CanFrame) -> CanFrame:
         data = frame.data
+        value = bytes((data[4] ^ OTHER_VALUE,)) + data[5:]  # with the true one, believing it would do no harm
         if name == "index":
-            return frame._replace(data=data[:1] + OTHER_INDEX.to_bytes(2, "little") + data[3:])
+            return frame._replace(data=data[:1] + OTHER_INDEX.to_bytes(2, "little") + data[3:4] + value)
         if name == "sub":
-            return frame._replace(data=data[:3] + bytes((self.random.randrange(1, 256),)) + data[4:])
+            return frame._replace(data=data[:3] + bytes((self.random.randrange(1, 256),)) + value)
         if name == "kind":
             return frame._replace(data=b"\x60" + data[1:4] + bytes(4))
         code = {"abort": NOT_THERE, "swapped": SWAPPED}[name]

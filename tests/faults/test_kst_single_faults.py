@@ -96,4 +96,8 @@ def test_a_request_that_can_doubles_is_the_known_limit(
         rig.stir()
         assert rig.servo.read_raw("present_position") == {"present_position": rig.here}
     assert rig.servos[NODE].raw_position == rig.here
-    figures("L7 reads behind a request that was doubled, answers one read old", family="kst", wrong=wrong)
+    figures(
+        f"L7 reads behind a request that was doubled, answers one read old, of a servo that thinks {thinks * 1e3:g} ms",
+        family="kst",
+        wrong=wrong,
+    )

@@ -166,6 +166,32 @@ def test_l6_delay_within_the_budget_is_no_fault() -> None:
     assert rig.bus.statistics.of(1).retries == 0
 
 
+class Belated(PerfectLine):
+    """Hands each answer over so long (s) after its question has left."""
+
+    def __init__(self, after: float) -> None:
+        self.after = after
+        self.asked = 0.0
+        self.fired = 0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            self.asked = at
+            return super().carry(sender, data, at)
+        self.fired += 1
+        return super().carry(sender, data, self.asked + self.after)
+
+
+def test_l6_an_answer_at_0_95_of_the_budget_is_no_fault() -> None:
+    """Which is 160 µs of wire, 1.508 ms that a servo may take, and 20 ms of margin."""
+    line = Belated(0.95 * (0.00016 + 0.001508 + 0.020))
+    rig = Rig(line)
+    for _ in range(500):
+        read_word(rig)
+    assert line.fired >= 500
+    assert rig.bus.statistics.of(1).retries == 0
+
+
 def test_lost_replies_are_asked_for_again_and_lost_writes_are_not_called_done() -> None:
     rig = Rig(NoisyLine(4, loss=0.1, toward=None))
     assert isinstance(rig.line, NoisyLine)

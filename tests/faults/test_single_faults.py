@@ -101,21 +101,20 @@ def test_l1_l2_the_same_where_bytes_come_one_by_one(name: str) -> None:
     suffered("sts3215", name, EDGES, Side.HOST, bytewise=True)
 
 
-def _both(models: Iterable[str]) -> Iterator[tuple[str, str, Side, bool]]:
-    for model in models:
-        for name, kind in KINDS[model].items():
-            yield model, name, Side.DEVICE, False
-            if kind.back:
-                yield from ((model, name, Side.HOST, bytewise) for bytewise in (False, True))
+def _both(kind: Kind) -> Iterator[tuple[Side, bool]]:
+    yield Side.DEVICE, False
+    if kind.back:
+        yield from ((Side.HOST, bytewise) for bytewise in (False, True))
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("model", KINDS)
-def test_l1_l2_every_fault_of_every_exchange(model: str, figures: Figures) -> None:
-    for one, name, to, bytewise in _both([model]):
-        tally = suffered(one, name, EVERY, to, bytewise=bytewise)
-        assert tally.faults == number_of(_length(KINDS[one][name], to))
+@pytest.mark.parametrize(("model", "name"), ALL)
+def test_l1_l2_every_fault_of_every_exchange(model: str, name: str, figures: Figures) -> None:
+    kind = KINDS[model][name]
+    for to, bytewise in _both(kind):
+        tally = suffered(model, name, EVERY, to, bytewise=bytewise)
+        assert tally.faults == number_of(_length(kind, to))
         how = f"toward the {to.value}{', byte by byte' if bytewise else ''}"
         figures(
             f"L1 L2 single byte faults, {model}, {name}, {how}",

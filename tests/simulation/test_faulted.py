@@ -360,6 +360,18 @@ def test_a_script_that_is_too_long_for_a_flag_is_told_once() -> None:
         assert hall.faulted.replay().endswith(f"; the same again: {IN_A_FILE}")
 
 
+def test_what_happens_at_one_moment_is_told_in_the_order_in_which_it_happened() -> None:
+    with closing(TcpListener()) as listener:
+        hall = Hall(listener)
+        happened = [f"exchange 1 byte {byte} to device: drop" for byte in (2, 9, 10)]
+        hall.faulted.set("; ".join(happened))
+        hall.mount.course.hear(bytes(12), hall.clock())
+        fired = hall.faulted.facts()["fired"]
+        assert [one["fault"] for one in fired] == happened
+        assert len({one["at"] for one in fired}) == 1
+        assert [line.partition("fault: ")[2] for line in hall.faulted.remarks(0.0)] == happened
+
+
 def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     link = QueueLink(no_wire=False, name="can://socketcan/can0")
     hall = Hall(LinkClient(link), "kst")

@@ -69,7 +69,9 @@ def _of_file(file: Path) -> Script:
         made = parse(text)
     except RequestError as error:
         if "\0" not in text and "\N{REPLACEMENT CHARACTER}" not in text:
-            raise
+            raise RequestError(
+                f"--faults {file}: {error.summary}", expected=error.expected, cause=error.cause
+            ) from None
         raise RequestError(
             f"--faults {file}: this is no text: {error.summary}",
             expected="a script, one fault a line, in UTF-8",

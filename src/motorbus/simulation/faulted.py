@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 from collections import deque
+from operator import itemgetter
 from typing import Any, Final
 
 from motorbus.errors import RequestError
@@ -92,7 +93,7 @@ class Faulted:
 
     def facts(self) -> dict[str, Any]:
         """What is set, what has happened and what has not, as plain data; times in s from the beginning."""
-        fired = sorted((one.at, one.fault) for line in self._lines for one in line.fired)
+        fired = self._fired(TOLD)
         pending = [str(fault) for line in self._lines for fault in line.pending]
         never = [str(fault) for line in self._lines for fault in line.never]
         return {
@@ -102,7 +103,7 @@ class Faulted:
             "seed": self._script.seed,
             "exchange": self._lines[0].exchange if self._lines else 0,
             "count": self.count,
-            "fired": [{"at": round(at - self._began, 6), "fault": fault} for at, fault in fired[-TOLD:]],
+            "fired": [{"at": round(at - self._began, 6), "fault": fault} for at, fault in fired],
             "pending": pending[:TOLD],
             "pending_count": len(pending),
             "never": never[:TOLD],
@@ -125,14 +126,16 @@ class Faulted:
         fresh = self.count - self._seen
         if fresh:
             self._seen += fresh
-            fired = sorted((one.at, one.fault) for line in self._lines for one in line.fired[-fresh:])[
-                -fresh:
-            ]
-            shown = fired[: self._room]
+            shown = self._fired(fresh)[: self._room]
             found += [f"{at - self._began:9.3f} s  fault: {fault}" for at, fault in shown]
             self._room -= len(shown)
             self._left += fresh - len(shown)
         return found
+
+    def _fired(self, most: int) -> list[tuple[float, str]]:
+        """The latest so many, with their moments; those of one moment in the order in which they happened."""
+        latest = [(one.at, one.fault) for line in self._lines for one in line.fired[-most:]]
+        return sorted(latest, key=itemgetter(0))[-most:]
 
     def rest(self) -> list[str]:
         """How many have not been shown; nothing when none."""

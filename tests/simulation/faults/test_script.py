@@ -12,6 +12,7 @@ import motorbus
 from motorbus.errors import RequestError
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, Fault, Script, parse
+from motorbus.simulation.faults.fault import FARTHEST
 from motorbus.simulation.faults.script import as_script, is_meant, requested
 from tests.simulation.faults.scripts import scripts
 
@@ -128,6 +129,40 @@ def test_nonsense_is_refused_with_its_line(line: str) -> None:
 def test_what_is_near_is_said(line: str, near: str) -> None:
     with pytest.raises(RequestError, match=near):
         parse(line)
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("exchange -1: drop", "exchanges are counted from 1"),
+        ("at exchange +1: drop", "exchanges are counted from 1"),
+        ("exchange 1 packet -2: drop", "packets are counted from 1"),
+        ("exchange 1 byte -3: drop", "bytes are counted from 0"),
+        ("exchange 1 byte -3", "bytes are counted from 0"),
+        ("-5%: drop", "a chance is more than 0 and at most 100 %"),
+        ("-.5e1 % of bytes: corrupt", "a chance is more than 0 and at most 100 %"),
+        ("at -1 s: power-cycle 1", "a moment is counted from the beginning"),
+        ("exchange 1: drop on adapter", "`on adapter` stands before the colon"),
+        ("exchange 1: delay 0.1 to  device", "`to device` stands before the colon"),
+        (f"exchange {10**32}: drop", "no run comes that far"),
+        (f"exchange 1 byte {FARTHEST + 1}: drop", "no run comes that far"),
+        (f"exchange 1 packet {FARTHEST + 1}: drop", "no run comes that far"),
+    ],
+)
+def test_what_is_wrong_with_a_place_is_said(line: str, why: str) -> None:
+    with pytest.raises(RequestError, match=r"^line 1: .* is not a fault: ") as caught:
+        parse(line)
+    assert why in caught.value.summary
+
+
+def test_the_farthest_place_is_told_and_can_be_said() -> None:
+    assert len(parse(f"exchange {FARTHEST} byte {FARTHEST}: drop; exchange 1 packet {FARTHEST}: drop")) == 2
+    with pytest.raises(RequestError) as caught:
+        parse(f"exchange {FARTHEST + 1}: drop")
+    assert caught.value.expected == "exchanges, packets and bytes up to 1,000,000,000,000"
+    with pytest.raises(RequestError) as caught:
+        parse("exchange 3: drop on adapter")
+    assert caught.value.expected == "the place first, as `exchange 17 on adapter: drop`"
 
 
 @given(scripts)

@@ -12,7 +12,7 @@ from motorbus.errors import LinkLost, RequestError
 from motorbus.families.stepper.wire import encode
 from motorbus.link.base import Side
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.faults import FaultyLine, World
+from motorbus.simulation.faults import Fault, FaultyLine, World
 
 PING, PONG = bytes.fromhex("FFFF 01 02 01 FB"), bytes.fromhex("FFFF 01 02 00 FC")
 WRITE_ID = bytes.fromhex("FFFF 01 04 03 05 07 EB")
@@ -226,6 +226,15 @@ def test_what_cannot_happen_is_refused(family: str, fault: str, why: str) -> Non
     world = World(families.load(family).simulator((1,), ""), why="because")
     with pytest.raises(RequestError, match=f"(?s){why}"):
         FaultyLine(f"exchange 1: {fault}", world)
+
+
+def test_where_no_second_device_can_be_it_is_said_why_and_what_to_do() -> None:
+    world = World(families.load("stepper").simulator((1,), ""))
+    with pytest.raises(RequestError, match="no second device") as caught:
+        world.check(Fault(1, None, "duplicate-id", node=1))
+    assert "told apart by their ids" in caught.value.expected
+    assert "alone on its line" in caught.value.cause
+    assert "leave it out" in caught.value.advice
 
 
 def test_forgetting_leaves_what_would_give_the_supply_back() -> None:

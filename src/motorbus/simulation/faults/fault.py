@@ -26,6 +26,8 @@ _VALUES: Final[Mapping[Takes, range]] = MappingProxyType(
 )
 LONGEST: Final = 366 * 86_400.0
 """s that a fault may take or be away: a leap year. Longer ones are slips, and clocks lose their digits over them."""
+FARTHEST: Final = 10**12
+"""The last exchange, packet or byte that can be named: 30 000 exchanges a second for a year. Beyond it are slips."""
 _TIMED: Final = (Takes.SECONDS, Takes.SPAN, Takes.SECONDS_NODE)
 
 
@@ -117,6 +119,11 @@ def _check_place(fault: Fault) -> None:
         raise RequestError(f"fault {fault.action}: an exchange, a chance or a moment, and one of them only")
     if (fault.exchange or 0) < 0 or (fault.byte or 0) < 0 or fault.packet < 1:
         raise RequestError(f"fault {fault}: exchanges and packets count from 1 and bytes from 0")
+    if max(fault.exchange or 0, fault.byte or 0, fault.packet) > FARTHEST:
+        raise RequestError(
+            f"fault {fault}: no run comes that far",
+            expected=f"exchanges, packets and bytes up to {FARTHEST:,}",
+        )
     if fault.byte is not None and (fault.exchange is None or fault.packet != 1):
         raise RequestError(f"fault {fault}: a byte is counted within an exchange")
     if not (isfinite(fault.percent) and 0 <= fault.percent <= 100):

@@ -35,6 +35,18 @@ _WHERE: Final = re.compile(
     r"(?:\s+to\s+(?P<to>host|device))?(?P<adapter>\s+on\s+adapter)?",
     re.ASCII,
 )
+_SIDE: Final = re.compile(r"\b(?:on\s+adapter|to\s+(?:host|device))\b")
+_SIGNED: Final = (
+    (re.compile(r"\bexchange\s+[-+]"), "exchanges are counted from 1, without a sign"),
+    (re.compile(r"\bpacket\s+[-+]"), "packets are counted from 1, without a sign"),
+    (re.compile(r"\bbyte\s+[-+]"), "bytes are counted from 0, without a sign"),
+    (re.compile(r"(?<![\w.])[-+][\d.e]+\s*%"), "a chance is more than 0 and at most 100 %, without a sign"),
+    (
+        re.compile(r"(?<![\w.])[-+][\d.e]+\s*s\b"),
+        "a moment is counted from the beginning, without a sign",
+    ),
+)
+"""Numbers with a sign that stand where a place is said, and what is true of those numbers."""
 _SPAN: Final = re.compile(r"(?P<low>[\d.]+(?:e[+-]?\d+)?)-(?P<high>[\d.]+(?:e[+-]?\d+)?)", re.ASCII)
 _DECIMAL: Final = re.compile(r"\d+", re.ASCII)
 _ID: Final = re.compile(r"0+|[1-9]\d*", re.ASCII)
@@ -157,6 +169,11 @@ def _arguments(action: str, said: list[str], *, loose: bool) -> dict[str, Any]:
     optional = takes.name.startswith("PERHAPS") or takes is Takes.NOTHING
     if not said and loose and takes in (Takes.BITS, Takes.BIT, Takes.BYTE):
         return {"value": ANY}
+    if side := _SIDE.search(" ".join(said)):
+        raise RequestError(
+            f"`{side[0]}` stands before the colon",
+            expected=f"the place first, as `exchange 17 {side[0]}: drop`",
+        )
     if len(said) > most or (not said and not optional):
         raise RequestError(f"{action} takes {takes.value or 'nothing more'}")
     try:
@@ -251,9 +268,14 @@ def _incomplete(said: str, count: int) -> RequestError | None:
         return RequestError(
             f"line {count}: {short(said)!r} is no seed", expected="a whole number, as `seed 42`"
         )
-    if lack := _lack(said):
+    if lack := _sign(said.partition(":")[0]) or _lack(said):
         return RequestError(f"line {count}: {short(said)!r} is not a fault: {lack}", expected=EXAMPLES)
     return None
+
+
+def _sign(where: str) -> str:
+    """What is wrong with a number in this place that has a sign; "" when none has."""
+    return next((why for form, why in _SIGNED if form.search(where)), "")
 
 
 def _nonsense(said: str, count: int) -> RequestError:

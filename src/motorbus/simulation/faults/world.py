@@ -86,7 +86,12 @@ class World:
                 expected=f"one of {told(self.simulator, self.nodes)}",
             )
         if fault.action == "duplicate-id" and not hasattr(self.simulator, _TWINS):
-            raise RequestError(f"fault {fault}: there can be no second device on this line")
+            raise RequestError(
+                f"fault {fault}: there can be no second device on this line",
+                expected="a bus whose devices are told apart by their ids",
+                cause="a device of this kind is alone on its line, and is not addressed there",
+                advice="leave it out, or simulate devices that share a bus",
+            )
         if (
             fault.action == "torn-eeprom"
             and fault.node is not None
