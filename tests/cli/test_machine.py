@@ -11,7 +11,7 @@ import pytest
 from motorbus.cli import machine
 from motorbus.errors import RequestError
 from tests.cli.conftest import Bench, Run
-from tests.motion.machine.files import BROKEN, UNOPENABLE, Broken
+from tests.motion.machine.files import BROKEN, NO_TEXT, UNOPENABLE, Broken, NoText
 
 ARM = 'format = 1\n[bus.arm]\naddress = "feetech:sim,ids={}"\n[axis.shoulder]\ndevice = "arm#{}"\n'
 
@@ -235,14 +235,18 @@ def test_a_flag_goes_before_what_the_file_says(
 
 def judge(broken: Broken, command: list[str], file: Path, run: Run) -> None:
     """The buses in it do not exist: had one of them been opened, the exit code would be 3."""
-    file.write_text(broken.text, encoding="utf-8")
+    judge_content(broken.text.encode(), broken.says, broken.fix, command, file, run)
+
+
+def judge_content(content: bytes, says: str, fix: str, command: list[str], file: Path, run: Run) -> None:
+    file.write_bytes(content)
     ran = run(*command, "--machine", str(file), "--json")
     assert (ran.code, ran.out) == (2, "")
     (line,) = ran.err.splitlines()
     told = json.loads(line)
     assert told["exit"] == 2
-    assert told["summary"].startswith(f"{file}: {broken.says}")
-    assert broken.fix in f"{told['summary']} / {told['expected']} / {told['advice']}"
+    assert told["summary"].startswith(f"{file}: {says}")
+    assert fix in f"{told['summary']} / {told['expected']} / {told['advice']}"
     assert len(told["expected"]) < 400
     assert re.fullmatch(r".{6,}; nothing was opened", told["advice"])
     assert told["advice"].count("nothing was") == 1
@@ -254,6 +258,12 @@ def test_a_broken_file_ends_with_2_and_one_message(
     broken: Broken, command: list[str], tmp_path: Path, run: Run
 ) -> None:
     judge(broken, command, tmp_path / "bench.toml", run)
+
+
+@pytest.mark.parametrize("one", [pytest.param(one, id=name) for name, one in NO_TEXT.items()])
+def test_so_does_one_that_is_no_text(one: NoText, tmp_path: Path, run: Run) -> None:
+    says = f"it is no text: {one.says}"
+    judge_content(one.content, says, "save it as UTF-8", ["pose"], tmp_path / "bench.toml", run)
 
 
 @pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in UNOPENABLE])
