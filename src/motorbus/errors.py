@@ -82,7 +82,7 @@ class LinkError(MotorbusError, OSError):
 
 
 class PortNotFound(LinkError):
-    """There is no such port."""
+    """There is no such port, or what has its name is none."""
 
 
 class PortBusy(LinkError):
