@@ -189,3 +189,14 @@ def test_an_emergency_stop_that_a_device_does_not_have_is_refused(axis: str, est
         pytest.raises(RequestError, match=says),
     ):
         Plan.of(made)
+
+
+def test_a_port_that_does_not_exist_names_the_file_and_the_bus(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD.replace("/dev/ttyACM0", f"{tmp_path}/none"), encoding="utf-8")
+    plan = Plan.of(loaded(file), "left")
+    with pytest.raises(PortNotFound) as caught:
+        plan.open("arm", None)
+    assert caught.value.summary == f"{file}: bus.arm: {tmp_path}/none: there is no such port"
+    with pytest.raises(PortNotFound, match=f"^{file}: bus.arm: {tmp_path}/none: there is no such port"):
+        plan.open_async("arm", None)
