@@ -278,6 +278,26 @@ def test_there_are_fifty_broken_files_and_more() -> None:
     assert len(BROKEN) >= 50
 
 
+ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv", "safety")
+
+
+@pytest.mark.parametrize("command", ALL)
+def test_a_machine_without_an_axis_is_told_so(command: str, tmp_path: Path, run: Run) -> None:
+    file = tmp_path / "bench.toml"
+    judge_content(b"format = 1\n", "the machine has no axis", "[axis.NAME]", command.split(), file, run)
+
+
+ON_BUS = ("budget arm", "hold arm", "torque on arm", "jog arm=1 --seconds 1", "move arm=1", "follow arm arm")
+
+
+@pytest.mark.parametrize("command", ON_BUS)
+def test_so_is_a_bus_without_one(command: str, tmp_path: Path, run: Run) -> None:
+    file, content = tmp_path / "bench.toml", b'format = 1\n[bus.arm]\naddress = "feetech:sim"\n'
+    judge_content(content, "arm: no axis is on it", "[axis.NAME]", command.split(), file, run)
+    for safe in (["stop"], ["torque", "off", "arm"]):
+        assert run(*safe, "--machine", str(file)).code == 0
+
+
 def test_outside_of_a_command_the_usual_places_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RequestError, match="no machine file"):

@@ -18,7 +18,7 @@ from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
-from motorbus.motion.machine.refusal import of_file, path, refused
+from motorbus.motion.machine.refusal import no_axes, of_file, path, refused
 from motorbus.motion.several import named
 from motorbus.session.address import parse_address
 from motorbus.session.buses import AnyBus, open, open_async
@@ -47,9 +47,9 @@ class Plan(NamedTuple):
             )
         with of_file(machine.file):
             check(machine)
-        names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
-        if not names:
-            raise RequestError("the machine has no axis", expected="a file with [axis.NAME]")
+            names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
+            if not names:
+                raise no_axes(() if axes is None else named_in(axes))
         buses = tuple(dict.fromkeys(machine.axes[name].bus for name in names))
         with of_file(machine.file):
             _check_ports(machine, buses)

@@ -33,6 +33,17 @@ def to_do(advice: str, otherwise: str = "change it") -> str:
     return "; ".join(part for part in advice.split("; ") if part not in ("", *_NOTHING)) or otherwise
 
 
+def no_axes(names: Iterable[str] = ()) -> RequestError:
+    """The error for a machine that has no axis, or for these names of it, which stand for none."""
+    those = ", ".join(names)
+    return refused(
+        those,
+        "no axis is on it" if those else "the machine has no axis",
+        "a file with [axis.NAME]",
+        "add a table [axis.NAME] for each device; `motorbus init BUS` writes a file with those that answer",
+    )
+
+
 @contextmanager
 def of_file(file: str | PathLike[str]) -> Iterator[None]:
     """Within it, what a machine or its ports are refused for begins with the path of its file, if it has one."""
