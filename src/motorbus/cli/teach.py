@@ -107,16 +107,9 @@ def teach(
 def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: bool) -> None:
     """Say that torque goes off. Raises RequestError before, for who cannot be taught, and for too high a rate."""
     from motorbus.motion.budget import refuse_above
-    from motorbus.motion.follow import check_able
+    from motorbus.motion.teach import taught
 
-    if named:
-        check_able(hand.robot, axes, "train", "taught: nothing tells where it is in a loop")
-        if limp:
-            check_able(hand.robot, axes, "disable_torque", "taught by hand")
-    needed = {"train", "disable_torque"} if limp else {"train"}
-    taught = [name for name in axes if needed <= set(hand.robot[name].able)]
-    if taught:
-        refuse_above(hand.robot.budget(rate, taught))
+    refuse_above(hand.robot.budget(rate, taught(hand.robot, axes if named else None, limp=limp)))
     if limp:
         hand.output.note("the torque goes off now, and stays off: hold what could sag")
 
