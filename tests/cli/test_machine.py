@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -264,6 +265,14 @@ def test_a_broken_file_ends_with_2_and_one_message(
 def test_so_does_one_that_is_no_text(one: NoText, tmp_path: Path, run: Run) -> None:
     says = f"it is no text: {one.says}"
     judge_content(one.content, says, "save it as UTF-8", ["pose"], tmp_path / "bench.toml", run)
+
+
+@pytest.mark.parametrize("command", ["pose", "stop", "budget"])
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(command: str, tmp_path: Path, run: Run) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    ran = run(command, "--machine", str(tmp_path / "pipe"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "it cannot be read: it is a named pipe, and no file" in ran.err
 
 
 @pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in UNOPENABLE])

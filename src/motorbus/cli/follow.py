@@ -104,7 +104,11 @@ def _span(seconds: str) -> float | None:
     """How long (s), None without an end. Raises RequestError for no time above 0."""
     span = units.parse(seconds, "time") if seconds else None
     if span is not None and not span > 0:
-        raise RequestError("--seconds must be above 0", advice="nothing was sent")
+        raise RequestError(
+            "--seconds must be above 0",
+            expected="s, as 10 or 1500ms",
+            advice="leave it out to go on until Enter or Ctrl-C; nothing was sent",
+        )
     return span
 
 

@@ -84,7 +84,11 @@ def loop_stats(
     if rate is not None:
         check_rate(rate)
     if not span > 0:
-        raise RequestError("--seconds must be above 0", expected="s", advice="nothing was sent")
+        raise RequestError(
+            "--seconds must be above 0",
+            expected="s, as 10 or 1500ms",
+            advice="leave it out for 5 s; nothing was sent",
+        )
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",

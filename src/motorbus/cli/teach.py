@@ -117,7 +117,11 @@ def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: boo
 def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
     """Raise RequestError for what cannot be, before anything is let go."""
     if span is not None and not span > 0:
-        raise RequestError("--seconds must be above 0", advice="nothing was sent")
+        raise RequestError(
+            "--seconds must be above 0",
+            expected="s, as 10 or 1500ms",
+            advice="leave it out to go on until Enter or Ctrl-C; nothing was sent",
+        )
     check_rate(rate)
     check_smooth(smooth)
     check_writable(file)

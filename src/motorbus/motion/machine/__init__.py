@@ -111,8 +111,8 @@ def source(
     than one character above `longest` is read; `kind` and `expected` are words for what it should be.
     """
     try:
-        if kind_of_no_file := _kind_of_no_file(path):
-            raise OSError(f"it is {kind_of_no_file}, and no file")
+        if other := kind_of_no_file(path):
+            raise OSError(f"it is {other}, and no file")
         with Path(path).open(encoding="utf-8", newline="") as file:
             text = file.read(longest + 1)
     except UnicodeDecodeError as error:
@@ -129,10 +129,10 @@ def source(
     return text
 
 
-def _kind_of_no_file(path: str | PathLike[str]) -> str:
+def kind_of_no_file(path: str | PathLike[str]) -> str:
     """What a path leads to where reading might never end, for nobody writes there; "" for anything else.
 
-    Whatever is piped in by a descriptor of ours has somebody who writes it.
+    Whatever is piped in by a descriptor of ours has somebody who writes it. Raises OSError where there is nothing.
     """
     mode = os.stat(path).st_mode
     if os.path.abspath(path).startswith(PIPED):
@@ -158,6 +158,7 @@ __all__ = [
     "GroupSpec",
     "Machine",
     "edited",
+    "kind_of_no_file",
     "renamed",
     "schema",
     "source",
