@@ -1,4 +1,4 @@
-"""What `--rate` and `--smooth` say: every command that takes one refuses the same figures, in the same words."""
+"""What `--rate`, `--seconds` and `--smooth` say: every command that takes one refuses the same figures, in the same words."""
 
 from __future__ import annotations
 
@@ -13,6 +13,16 @@ def check_rate(rate: float) -> None:
             f"--rate {rate:g}: it cannot be done so often",
             expected=f"cycles per second: {LEAST_RATE:g} to {GREATEST_RATE:g}",
             advice="nothing was sent",
+        )
+
+
+def check_seconds(span: float | None, otherwise: str = "to go on until Enter or Ctrl-C") -> None:
+    """Raise RequestError for a time (s) that is none; left out it means what `otherwise` says. Nothing was sent."""
+    if span is not None and not span > 0:
+        raise RequestError(
+            "--seconds must be above 0",
+            expected="s, as 10 or 1500ms",
+            advice=f"leave it out {otherwise}; nothing was sent",
         )
 
 

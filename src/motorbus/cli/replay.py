@@ -95,30 +95,32 @@ def replay(
         Any option of the buses, as a flag.
     """
     share = _share(speed)
+    _check_repeat(repeat)
+    wanted = _read(file, smooth)
+    with _told_of(file, wanted, share):
+        course = _course(wanted, share, interpolation)
+    with robot(list(wanted.axes), options, output) as hand, _told_of(file, wanted, share):
+        _led(hand, wanted)
+        first = wanted.positions(0.0)
+        present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
+        if dry_run:
+            return _plan(hand, course, present)
+        consent_to_far(hand, present, first, yes=yes)
+        for number in range(repeat):
+            with hand.working(f"replaying {number + 1} of {repeat}" if repeat > 1 else "replaying"):
+                moved = hand.robot.replay(wanted, speed=share, interpolation=interpolation)
+        tell(hand, "replay", moved)
+        output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
+    return Exit.OK
+
+
+def _check_repeat(repeat: int) -> None:
     if repeat < 1:
         raise RequestError(
             f"--repeat {repeat}: not at least 1",
             expected="how many times, 1 or more",
             advice="leave it out for once; nothing was sent",
         )
-    wanted = _read(file, smooth)
-    with _told_of(file, wanted, share):
-        course = _course(wanted, share, interpolation)
-    with robot(list(wanted.axes), options, output) as hand:
-        _led(hand, wanted)
-        first = wanted.positions(0.0)
-        present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
-        if dry_run:
-            with _told_of(file, wanted, share):
-                return _plan(hand, course, present)
-        consent_to_far(hand, present, first, yes=yes)
-        for number in range(repeat):
-            doing = f"replaying {number + 1} of {repeat}" if repeat > 1 else "replaying"
-            with hand.working(doing), _told_of(file, wanted, share):
-                moved = hand.robot.replay(wanted, speed=share, interpolation=interpolation)
-        tell(hand, "replay", moved)
-        output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
-    return Exit.OK
 
 
 def _share(speed: str) -> float:

@@ -14,11 +14,11 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate, check_smooth
+from motorbus.cli.rates import check_rate, check_seconds, check_smooth
 from motorbus.cli.robot import place, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
-from motorbus.errors import MotorbusError, RequestError
+from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -116,12 +116,7 @@ def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: boo
 
 def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
     """Raise RequestError for what cannot be, before anything is let go."""
-    if span is not None and not span > 0:
-        raise RequestError(
-            "--seconds must be above 0",
-            expected="s, as 10 or 1500ms",
-            advice="leave it out to go on until Enter or Ctrl-C; nothing was sent",
-        )
+    check_seconds(span)
     check_rate(rate)
     check_smooth(smooth)
     check_writable(file)
