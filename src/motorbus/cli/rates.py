@@ -1,4 +1,4 @@
-"""What `--rate`, `--seconds` and `--smooth` say: every command that takes one refuses the same figures, in the same words."""
+"""What `--rate`, `--seconds` and `--smooth` say: every command with one refuses the same figures, in the same words."""
 
 from __future__ import annotations
 
