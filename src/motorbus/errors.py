@@ -82,7 +82,7 @@ class LinkError(MotorbusError, OSError):
 
 
 class PortNotFound(LinkError):
-    """There is no such port."""
+    """There is no such port, or what has its name is none."""
 
 
 class PortBusy(LinkError):
@@ -153,7 +153,12 @@ class Refused(MotionError):
 
 
 class LimitExceeded(Refused):
-    """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent."""
+    """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent.
+
+    `at` is when (s from the beginning) a trajectory goes beyond them first, where it is one that does.
+    """
+
+    at: float | None = None
 
     def __init__(self, summary: str, *, reason: str = "limits", **parts: object) -> None:
         super().__init__(summary, reason=reason, **parts)

@@ -168,6 +168,8 @@ def test_without_a_bus_it_shows_what_to_type(run: Run, monkeypatch: pytest.Monke
         ("feetech:sim --output nowhere/bench.toml", 2),
         ("feetech:sim --output .", 2),
         ("feetech:/dev/no-such-port", 3),
+        ("feetech:/dev/null", 3),
+        ("kst:can://slcan/dev/null", 3),
         ("feetech:sim#1 feetech:/dev/no-such-port", 3),
         ("feetech:sim --dry-run", 2),
     ],

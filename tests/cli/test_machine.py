@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from motorbus.cli import machine
 from motorbus.errors import RequestError
 from tests.cli.conftest import Bench, Run
-from tests.motion.machine.files import BROKEN, UNOPENABLE, Broken
+from tests.motion.machine.files import BROKEN, NO_TEXT, UNOPENABLE, Broken, NoText
 
 ARM = 'format = 1\n[bus.arm]\naddress = "feetech:sim,ids={}"\n[axis.shoulder]\ndevice = "arm#{}"\n'
 
@@ -235,14 +236,18 @@ def test_a_flag_goes_before_what_the_file_says(
 
 def judge(broken: Broken, command: list[str], file: Path, run: Run) -> None:
     """The buses in it do not exist: had one of them been opened, the exit code would be 3."""
-    file.write_text(broken.text, encoding="utf-8")
+    judge_content(broken.text.encode(), broken.says, broken.fix, command, file, run)
+
+
+def judge_content(content: bytes, says: str, fix: str, command: list[str], file: Path, run: Run) -> None:
+    file.write_bytes(content)
     ran = run(*command, "--machine", str(file), "--json")
     assert (ran.code, ran.out) == (2, "")
     (line,) = ran.err.splitlines()
     told = json.loads(line)
     assert told["exit"] == 2
-    assert told["summary"].startswith(f"{file}: {broken.says}")
-    assert broken.fix in f"{told['summary']} / {told['expected']} / {told['advice']}"
+    assert told["summary"].startswith(f"{file}: {says}")
+    assert fix in f"{told['summary']} / {told['expected']} / {told['advice']}"
     assert len(told["expected"]) < 400
     assert re.fullmatch(r".{6,}; nothing was opened", told["advice"])
     assert told["advice"].count("nothing was") == 1
@@ -256,6 +261,20 @@ def test_a_broken_file_ends_with_2_and_one_message(
     judge(broken, command, tmp_path / "bench.toml", run)
 
 
+@pytest.mark.parametrize("one", [pytest.param(one, id=name) for name, one in NO_TEXT.items()])
+def test_so_does_one_that_is_no_text(one: NoText, tmp_path: Path, run: Run) -> None:
+    says = f"it is no text: {one.says}"
+    judge_content(one.content, says, "save it as UTF-8", ["pose"], tmp_path / "bench.toml", run)
+
+
+@pytest.mark.parametrize("command", ["pose", "stop", "budget"])
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(command: str, tmp_path: Path, run: Run) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    ran = run(command, "--machine", str(tmp_path / "pipe"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "it cannot be read: it is a named pipe, and no file" in ran.err
+
+
 @pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in UNOPENABLE])
 @pytest.mark.parametrize("command", ["hold", "read shoulder", "pose", "budget", "safety"])
 def test_one_that_cannot_be_opened_does_so_too_whoever_reads_it(
@@ -266,6 +285,26 @@ def test_one_that_cannot_be_opened_does_so_too_whoever_reads_it(
 
 def test_there_are_fifty_broken_files_and_more() -> None:
     assert len(BROKEN) >= 50
+
+
+ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv", "safety")
+
+
+@pytest.mark.parametrize("command", ALL)
+def test_a_machine_without_an_axis_is_told_so(command: str, tmp_path: Path, run: Run) -> None:
+    file = tmp_path / "bench.toml"
+    judge_content(b"format = 1\n", "the machine has no axis", "[axis.NAME]", command.split(), file, run)
+
+
+ON_BUS = ("budget arm", "hold arm", "torque on arm", "jog arm=1 --seconds 1", "move arm=1", "follow arm arm")
+
+
+@pytest.mark.parametrize("command", ON_BUS)
+def test_so_is_a_bus_without_one(command: str, tmp_path: Path, run: Run) -> None:
+    file, content = tmp_path / "bench.toml", b'format = 1\n[bus.arm]\naddress = "feetech:sim"\n'
+    judge_content(content, "arm: no axis is on it", "[axis.NAME]", command.split(), file, run)
+    for safe in (["stop"], ["torque", "off", "arm"]):
+        assert run(*safe, "--machine", str(file)).code == 0
 
 
 def test_outside_of_a_command_the_usual_places_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import radians
 
 import pytest
@@ -178,3 +179,28 @@ def test_goals_are_read_in_the_unit_of_their_axis(bench: Bench) -> None:
         False,
         True,
     ]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("move a1=nan", "a1: position 'nan' is not a number"),
+        ("move a2=1deg a1+=5mm", "a1: position '5mm' has the unit 'mm'"),
+        ("move a1=1deg --duration -1", "--duration -1: not above 0"),
+        ("jog a1=1deg/s --seconds -1", "--seconds -1: not above 0"),
+        ("jog a1=nan --seconds 1", "a1: velocity 'nan' is not a number"),
+        ("teach a1 --output w.csv --seconds 0", "--seconds must be above 0"),
+        ("follow a1 a2 --seconds 0", "--seconds must be above 0"),
+        ("loop-stats a1 --seconds 0", "--seconds must be above 0"),
+    ],
+)
+def test_what_is_no_figure_names_its_axis_or_flag_and_a_fix(
+    words: str, says: str, bench: Bench, run: Run
+) -> None:
+    ran = run(*words.split(), "--json")
+    assert (ran.code, ran.out) == (2, "")
+    told = json.loads(ran.err)
+    assert told["summary"].startswith(says)
+    assert told["expected"]
+    assert told["advice"].endswith("nothing was sent")
+    assert says.startswith("a1") or told["advice"] != "nothing was sent"

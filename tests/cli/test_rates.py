@@ -8,7 +8,8 @@ from importlib import import_module
 import pytest
 
 from motorbus.cli import _COMMANDS
-from motorbus.cli.rates import HIGHEST, LOWEST, check_rate
+from motorbus.cli.rates import check_rate
+from motorbus.core.units import GREATEST_RATE, LEAST_RATE
 from tests.cli.conftest import Bench, Run
 from tests.motion.machines import listened, said
 
@@ -46,5 +47,5 @@ def test_a_rate_that_cannot_be_is_one_error(command: str, rate: str, bench: Benc
 
 
 def test_every_other_rate_is_left_to_whoever_knows_the_bus() -> None:
-    check_rate(HIGHEST)
-    check_rate(LOWEST)
+    check_rate(GREATEST_RATE)
+    check_rate(LEAST_RATE)

@@ -75,6 +75,27 @@ def test_corners_are_too_hard_and_nothing_moves(bench: Bench, run: Run) -> None:
     assert at(run, "a1") == pytest.approx([0], abs=0.1)
 
 
+def test_what_is_beyond_a_limit_is_told_with_the_file_and_its_rows(bench: Bench, run: Run) -> None:
+    text = "# by hand\ntime (s),a1 (deg)\n3,0\n5,0\n9,140\n12,160\n13,160\n"
+    Path("far.csv").write_text(text, encoding="utf-8")
+    for words in ([], ["--speed", "0.5"], ["--dry-run"]):
+        ran = run("replay", "far.csv", "--interpolation", "minimum_jerk", *words)
+        assert (ran.code, ran.out) == (8, "")
+        assert ran.err.startswith("error: far.csv, rows 3 to 4: a1: its position at ")
+    text = "time (s),a1 (deg)\n0,0\n20,160\n21,160\n"
+    Path("far.csv").write_text(text, encoding="utf-8")
+    ran = run("replay", "far.csv", "--interpolation", "linear")
+    assert ran.err.startswith("error: far.csv, row")
+
+
+@pytest.mark.parametrize(
+    ("at", "rows"),
+    [(0.0, "row 1"), (0.1, "rows 1 to 2"), (0.5, "row 2"), (0.4999999999, "row 2"), (9, "row 3")],
+)
+def test_a_moment_is_on_a_row_or_between_two(at: float, rows: str) -> None:
+    assert replay._rows((0.0, 0.5, 1.0), at) == rows
+
+
 def test_rows_that_are_coarser_than_goals_are_joined_by_what_was_chosen(bench: Bench, run: Run) -> None:
     Path("gentle.csv").write_text("time (s),a1 (deg)\n0,0\n1,20\n2,-20\n3,0\n", encoding="utf-8")
     assert "within all limits" in run("replay", "gentle.csv", "--dry-run").out

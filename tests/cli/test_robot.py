@@ -8,6 +8,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import robot
+from motorbus.cli.machine import machine as machine_of_file
 from motorbus.cli.machine import using
 from motorbus.cli.output import Output
 from motorbus.core.operation import INTENT, Journal, Progress
@@ -62,9 +63,10 @@ def test_a_command_that_is_recommended_names_the_bus_that_is_meant(bench: Bench)
 def test_options_go_before_the_file_and_only_where_they_are_needed(bench: Bench) -> None:
     with robot.robot(["a1"], {"baud": "1M"}, Output()) as hand:
         assert hand.robot.buses["arm"].link.rate == 1_000_000
-    changed = robot.with_options(bench.machine, ["a1"], {"baud": "500k"})
+    changed = robot.with_options(machine_of_file(), ["a1"], {"baud": "500k"})
     assert changed.buses["arm"].address.endswith(",baud=500k")
     assert changed.buses["can"] == bench.machine.buses["can"]
+    assert changed.file == machine_of_file().file != ""
     with pytest.raises(RequestError, match="unknown option 'colour'"):
         robot.with_options(bench.machine, ["a1"], {"colour": "red"})
 

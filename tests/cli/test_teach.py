@@ -57,6 +57,20 @@ def test_without_names_it_is_all_who_can_be_taught(bench: Bench, run: Run) -> No
     assert list(Trajectory.load("wave.csv").axes) == ["a1", "a2", "a3"]
 
 
+@pytest.mark.parametrize("limp", [[], ["--no-limp"]])
+def test_where_nobody_can_be_taught_no_torque_is_said_to_go_off(
+    limp: list[str], tmp_path: Path, run: Run
+) -> None:
+    file, wave = tmp_path / "bench.toml", tmp_path / "wave.csv"
+    file.write_text(described({"stage": "stepper:sim"}, "", "", True, {}, {}), encoding="utf-8")
+    ran = run("teach", "--output", str(wave), "--seconds", "1", *limp, "--machine", str(file))
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("error: none of these axes can be taught\n")
+    assert "lift: nobody can ask such a device in a loop" in ran.err
+    assert "limp" not in ran.err
+    assert not wave.exists()
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 10)])
 def test_a_signal_ends_it_and_what_was_taught_is_kept(
     number: signal.Signals, code: int, bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch

@@ -239,7 +239,7 @@ def test_a_member_that_takes_no_more() -> None:
     [
         ("can://slcan/dev/no-such-adapter", PortNotFound, "there is no such port"),
         ("can://slcan/socket://127.0.0.1:1", PortNotFound, "cannot be reached"),
-        ("can://slcan/dev/null", LinkError, "is not a serial port"),
+        ("can://slcan/dev/null", PortNotFound, "can://slcan/dev/null: /dev/null is not a serial port"),
         ("can://socketcand/127.0.0.1:1/can0", PortNotFound, "cannot be reached"),
         ("can://socketcand/127.0.0.1:x/can0", RequestError, "HOST:PORT/CHANNEL"),
         ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.link.adapters import PortInfo
-from motorbus.link.refusal import Owner, busy, forbidden, full, lost, not_found, wrong_rate
+from motorbus.link.refusal import Owner, busy, forbidden, full, lost, no_port, not_found, wrong_rate
 
 ACM = PortInfo(
     "/dev/ttyACM0", "", 0x1A86, 0x55D3, "", "", "USB Single Serial", "CH343: usual on servo boards"
@@ -24,6 +24,19 @@ def test_a_port_that_is_not_there_comes_with_those_that_are() -> None:
 
 def test_a_machine_without_ports_says_so() -> None:
     assert "none at present" in str(not_found("/dev/ttyACM9", []))
+
+
+@pytest.mark.parametrize(
+    ("port", "device", "says"),
+    [
+        ("/dev/null", "", "/dev/null is not a serial port"),
+        ("can://slcan/tmp", "/tmp", "can://slcan/tmp: /tmp is not a serial port"),
+    ],
+)
+def test_what_is_no_port_comes_with_those_that_are_ports(port: str, device: str, says: str) -> None:
+    error = no_port(port, [PLAIN], device)
+    assert (error.summary, error.expected) == (says, "one of /dev/ttyS0")
+    assert error.advice == "`motorbus ports` lists what there is; nothing was opened"
 
 
 def test_a_symbolic_link_that_leads_nowhere_is_recognised(tmp_path: Path) -> None:

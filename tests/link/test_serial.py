@@ -257,8 +257,9 @@ def test_a_port_that_does_not_exist_comes_with_those_that_do(monkeypatch: pytest
 @pytest.mark.parametrize("path", ["/dev/null", "/tmp", "file"])
 def test_what_is_no_serial_port(path: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(LinkError, match="is not a serial port"):
+    with pytest.raises(PortNotFound, match="is not a serial port") as refused:
         SerialLink(str(tmp_path / path), rate=1_000_000)
+    assert "`motorbus ports`" in refused.value.advice
 
 
 FORBIDDEN = """

@@ -8,7 +8,7 @@ from math import inf, nan
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.motion.budget import BusBudget, RobotBudget, refuse_above
+from motorbus.motion.budget import BusBudget, RobotBudget, check_figures, refuse_above
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.machines import Heard, machine
 
@@ -74,6 +74,12 @@ def test_figures_that_cannot_be(rate: float, turnaround: float) -> None:
         pytest.raises(RequestError, match="is (-1|nan|inf)"),
     ):
         robot.budget(rate, turnaround=turnaround)
+
+
+def test_what_is_no_number_is_no_figure() -> None:
+    for wrong in ("x", True, 10**400):
+        with pytest.raises(RequestError, match="rate is .*"):
+            check_figures(wrong)  # type: ignore[arg-type]
 
 
 def test_it_is_awaited_on_an_async_robot() -> None:

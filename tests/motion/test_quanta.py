@@ -83,6 +83,8 @@ def test_what_cannot_be_is_refused_before_anything_is_sent(velocity: float, rate
         listened(sims)
         with pytest.raises(MotorbusError, match="nothing was sent"):
             robot.jogging("a1", velocity, rate=rate)
+        with pytest.raises(RequestError, match="rate is"):
+            robot.jogging("a1", 0.5, rate="x")  # type: ignore[arg-type]
         assert not said(sims)
 
 

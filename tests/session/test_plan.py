@@ -27,6 +27,15 @@ def test_all_axes_or_those_that_are_wanted_and_the_buses_they_need() -> None:
         assert Plan.of(made, "led").buses == ("arm", "can")
 
 
+def test_a_machine_without_an_axis_is_refused_and_so_is_a_bus(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text('format = 1\n[bus.arm]\naddress = "feetech:sim"\n', encoding="utf-8")
+    for names, says in ((None, "the machine has no axis"), ("arm", "arm: no axis is on it")):
+        with pytest.raises(RequestError, match=f"^{file}: {says}\n") as caught:
+            Plan.of(loaded(file), names)
+        assert caught.value.advice.startswith("add a table [axis.NAME]")
+
+
 def test_a_name_that_is_none_is_refused_with_those_there_are() -> None:
     with (
         machine(arm="1") as (made, _),
@@ -189,3 +198,14 @@ def test_an_emergency_stop_that_a_device_does_not_have_is_refused(axis: str, est
         pytest.raises(RequestError, match=says),
     ):
         Plan.of(made)
+
+
+def test_a_port_that_does_not_exist_names_the_file_and_the_bus(tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_text(GOOD.replace("/dev/ttyACM0", f"{tmp_path}/none"), encoding="utf-8")
+    plan = Plan.of(loaded(file), "left")
+    with pytest.raises(PortNotFound) as caught:
+        plan.open("arm", None)
+    assert caught.value.summary == f"{file}: bus.arm: {tmp_path}/none: there is no such port"
+    with pytest.raises(PortNotFound, match=f"^{file}: bus.arm: {tmp_path}/none: there is no such port"):
+        plan.open_async("arm", None)

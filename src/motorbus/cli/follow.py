@@ -11,7 +11,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.moving import consent_to_far
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate
+from motorbus.cli.rates import check_rate, check_seconds
 from motorbus.cli.robot import place, robot
 from motorbus.cli.teach import counted
 from motorbus.core import units
@@ -103,8 +103,7 @@ def follow(
 def _span(seconds: str) -> float | None:
     """How long (s), None without an end. Raises RequestError for no time above 0."""
     span = units.parse(seconds, "time") if seconds else None
-    if span is not None and not span > 0:
-        raise RequestError("--seconds must be above 0", advice="nothing was sent")
+    check_seconds(span)
     return span
 
 

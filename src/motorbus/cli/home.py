@@ -172,7 +172,11 @@ def _pace(names: list[str], velocity: str) -> float | None:
         )
     for pace in paces:
         if not pace > 0:
-            raise RequestError(f"--velocity {velocity}: not above 0", advice="nothing was sent")
+            raise RequestError(
+                f"--velocity {velocity}: not above 0",
+                expected="a velocity above 0, as 5mm/s",
+                advice="leave it out for the usual one; nothing was sent",
+            )
         for name in names:
             check_velocity(name, machine().axes[name], pace)
     return paces[0] if paces else None

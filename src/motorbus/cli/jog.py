@@ -126,9 +126,13 @@ def _axis(
     if more:
         raise RequestError(f"{word} is several axes", expected="one axis", advice="nothing was sent")
     spec, span = machine().axes[name], how.span
-    velocity = units.parse(speed, VELOCITY.of(spec.linear))
+    velocity = _velocity(name, speed)
     if not span > 0:
-        raise RequestError(f"--seconds {span:g}: not above 0", advice="nothing was sent")
+        raise RequestError(
+            f"--seconds {span:g}: not above 0",
+            expected="s, above 0, as 0.5 or 500ms",
+            advice="say for how long; the sign of the velocity is the direction; nothing was sent",
+        )
     far, way = FAR_LINEAR if spec.linear else FAR, abs(velocity * span)
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")
@@ -147,6 +151,16 @@ def _axis(
     output.document("motorbus.jog.axes/1", {**facts, "result": plain(told)})
     output.text(f"{name}: by {spec.show(told)}; now at {stands}")
     return Exit.OK
+
+
+def _velocity(name: str, text: str) -> float:
+    """A velocity of this axis (rad/s, m/s). Raises RequestError, naming it, for what is none."""
+    from motorbus.motion.several import named
+
+    try:
+        return units.parse(text, VELOCITY.of(machine().axes[name].linear))
+    except RequestError as error:
+        raise named(name, error) from None
 
 
 def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool) -> float:

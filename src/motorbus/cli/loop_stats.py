@@ -10,7 +10,7 @@ from motorbus.cli.ending import asked_to_end
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_named
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate
+from motorbus.cli.rates import check_rate, check_seconds
 from motorbus.cli.robot import rehearse, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
@@ -83,8 +83,7 @@ def loop_stats(
     axes, span = axes_named(names), units.parse(seconds, "time")
     if rate is not None:
         check_rate(rate)
-    if not span > 0:
-        raise RequestError("--seconds must be above 0", expected="s", advice="nothing was sent")
+    check_seconds(span, "for 5 s")
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",

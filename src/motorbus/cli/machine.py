@@ -189,20 +189,32 @@ def name_of(address: str) -> str:
     return next((name for name, bus in buses.items() if bus.address == address), address)
 
 
-def axes_named(words: Sequence[str]) -> list[str]:
+def axes_named(words: Sequence[str], *, some: bool = True) -> list[str]:
     """The axes that names of axes, groups and buses stand for, each once; all of the machine for no names at all.
 
-    Raises RequestError for a name that is in no file, and for what is wrong with the file.
+    Raises RequestError for a name that is in no file, for what is wrong with the file, and, where there must be `some`,
+    for names or a machine without an axis.
     """
-    if not words:
-        return list(machine().axes)
-    found: dict[str, None] = {}
+    found = dict.fromkeys([] if words else machine().axes)
     for word in words:
         known = _machine_for(word)
         if word not in known.axes and word not in known.groups and word not in known.buses:
             raise _unknown(word, word, known)
         found.update(dict.fromkeys(known.axes_of(word)))
+    if some and not found:
+        raise without_axes(words)
     return list(found)
+
+
+def without_axes(words: Sequence[str] = ()) -> RequestError:
+    """The error for a machine file without an axis, or with none for these names."""
+    from motorbus.motion.machine.refusal import no_axes
+
+    error = no_axes(words)
+    error.summary = f"{machine().file}: {error.summary}"
+    error.args = (error.summary,)
+    machine_file().told_of(error)
+    return error
 
 
 def _machine_for(text: str) -> Machine:

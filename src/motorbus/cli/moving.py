@@ -64,10 +64,20 @@ def goals_of(texts: Iterable[str]) -> dict[str, Goal]:
             )
         way = head.endswith(("+", "-"))
         for axis in axes_named((head[:-1] if way else head,)):
-            value = machine().axes[axis].parse(position)
+            value = _position(axis, position)
             once(axis, found, text)
             found[axis] = Goal(-value if head.endswith("-") else value, way)
     return found
+
+
+def _position(axis: str, text: str) -> float:
+    """A position of this axis (rad, m). Raises RequestError, naming it, for what is none."""
+    from motorbus.motion.several import named
+
+    try:
+        return machine().axes[axis].parse(text)
+    except RequestError as error:
+        raise named(axis, error) from None
 
 
 def positions_of(texts: Iterable[str]) -> dict[str, float]:
@@ -101,7 +111,11 @@ def how_of(duration: str, kind: Kind, speed: str) -> How:
     except RequestError:
         share = 0.0
     if seconds is not None and not seconds > 0:
-        raise RequestError(f"--duration {duration}: not above 0", advice="nothing was sent")
+        raise RequestError(
+            f"--duration {duration}: not above 0",
+            expected="s, above 0, as 2 or 1500ms",
+            advice="leave it out to go as quickly as the limits allow; nothing was sent",
+        )
     if not 0 < share <= 1:
         raise RequestError(
             f"--speed {speed}: it is a share of the limits in the machine file",

@@ -1,32 +1,36 @@
-"""What `--rate` and `--smooth` say: every command that takes one refuses the same figures, in the same words."""
+"""What `--rate`, `--seconds` and `--smooth` say: every command with one refuses the same figures, in the same words."""
 
 from __future__ import annotations
 
-from typing import Final
-
+from motorbus.core.units import GREATEST_RATE, LEAST_RATE
 from motorbus.errors import RequestError
-
-HIGHEST: Final = 1e6
-"""Hz; on the quickest bus there is one byte takes longer than such a cycle."""
-LOWEST: Final = 1e-6
-"""Hz; a cycle in eleven days."""
 
 
 def check_rate(rate: float) -> None:
     """Raise RequestError for a rate (Hz) at which nobody can do anything. Nothing was sent."""
-    if not LOWEST <= rate <= HIGHEST:
+    if not LEAST_RATE <= rate <= GREATEST_RATE:
         raise RequestError(
             f"--rate {rate:g}: it cannot be done so often",
-            expected=f"cycles per second: {LOWEST:g} to {HIGHEST:g}",
+            expected=f"cycles per second: {LEAST_RATE:g} to {GREATEST_RATE:g}",
             advice="nothing was sent",
+        )
+
+
+def check_seconds(span: float | None, otherwise: str = "to go on until Enter or Ctrl-C") -> None:
+    """Raise RequestError for a time (s) that is none; left out it means what `otherwise` says. Nothing was sent."""
+    if span is not None and not span > 0:
+        raise RequestError(
+            "--seconds must be above 0",
+            expected="s, as 10 or 1500ms",
+            advice=f"leave it out {otherwise}; nothing was sent",
         )
 
 
 def check_smooth(smooth: float) -> None:
     """Raise RequestError for a frequency (Hz) by which nothing can be smoothed; 0 is for nothing. Nothing was sent."""
-    if smooth and not LOWEST <= smooth <= HIGHEST:
+    if smooth and not LEAST_RATE <= smooth <= GREATEST_RATE:
         raise RequestError(
             f"--smooth {smooth:g}: nothing can be smoothed by that",
-            expected=f"Hz: {LOWEST:g} to {HIGHEST:g}, or 0 for nothing",
+            expected=f"Hz: {LEAST_RATE:g} to {GREATEST_RATE:g}, or 0 for nothing",
             advice="nothing was sent",
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -18,7 +20,7 @@ from motorbus.core import units
 from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from motorbus.cli.robot import InHand
     from motorbus.motion.machine import AxisSpec
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 Interpolation = Literal["linear", "cubic", "spline", "minimum_jerk"]
 FASTEST: Final = 1000.0
 """How many times as fast as in the file, or as slow, at most; beyond that its samples would fall together."""
+NEAR: Final = 1e-9
+"""s; moments that are no farther apart are one: the speed is multiplied, and rounding makes as much of it."""
 
 app = App(
     name="replay",
@@ -36,8 +40,9 @@ app = App(
     help_epilogue="""The file is CSV, as `motorbus teach` writes it: a column time, then one for
 each axis of the machine file, units in the header. Its rows are joined, and
 the goals that leave on the way are judged by the limits of their axes before
-anything moves: it is refused with exit code 8 where one goes beyond them. The
-axes go to its first point together, then along it. A way there of more than
+anything moves: it is refused with exit code 8 where one goes beyond them, with
+the rows between which it does; row 1 is the first below the header. The axes
+go to its first point together, then along it. A way there of more than
 180 degrees needs --yes. Ctrl-C stops them.
 
 Rows are joined by a spline, without a jump of velocity; where an axis turns
@@ -90,11 +95,11 @@ def replay(
         Any option of the buses, as a flag.
     """
     share = _share(speed)
-    if repeat < 1:
-        raise RequestError(f"--repeat {repeat}: not at least 1", advice="nothing was sent")
+    _check_repeat(repeat)
     wanted = _read(file, smooth)
-    course = _course(wanted, share, interpolation)
-    with robot(list(wanted.axes), options, output) as hand:
+    with _told_of(file, wanted, share):
+        course = _course(wanted, share, interpolation)
+    with robot(list(wanted.axes), options, output) as hand, _told_of(file, wanted, share):
         _led(hand, wanted)
         first = wanted.positions(0.0)
         present, _ = absolute(hand, {name: Goal(at, way=False) for name, at in first.items()})
@@ -107,6 +112,15 @@ def replay(
         tell(hand, "replay", moved)
         output.text(f"furthest from the file on the way: {_worst(hand, moved)}")
     return Exit.OK
+
+
+def _check_repeat(repeat: int) -> None:
+    if repeat < 1:
+        raise RequestError(
+            f"--repeat {repeat}: not at least 1",
+            expected="how many times, 1 or more",
+            advice="leave it out for once; nothing was sent",
+        )
 
 
 def _share(speed: str) -> float:
@@ -146,17 +160,32 @@ def _course(wanted: Trajectory, share: float, interpolation: Interpolation) -> P
 def _judge(course: Paced, axes: Mapping[str, AxisSpec], rate: float = 0.0) -> Trajectory:
     """The goals of these axes as they leave at `rate` (Hz; 0: the usual one).
 
-    Raises LimitExceeded, in words of the shell, for a movement that goes beyond their limits.
+    Raises LimitExceeded for a movement that goes beyond their limits.
     """
     from motorbus.motion.moving.along import judged
     from motorbus.motion.moving.stream import USUAL
 
     there = course.positions(0.0)
+    return judged(course, {name: axes[name] for name in there if name in axes}, rate or USUAL)
+
+
+@contextmanager
+def _told_of(file: Path, wanted: Trajectory, share: float) -> Iterator[None]:
+    """Within it, a movement that goes beyond limits is told of in words of the shell, with the file and its rows."""
     try:
-        return judged(course, {name: axes[name] for name in there if name in axes}, rate or USUAL)
+        yield
     except LimitExceeded as error:
         in_words_of_the_shell(error)
+        rows = "" if error.at is None else f", {_rows(wanted.times, error.at * share)}"
+        error.summary = f"{file}{rows}: {error.summary}"
+        error.args = (error.summary,)
         raise
+
+
+def _rows(times: Sequence[float], at: float) -> str:
+    """Where in a file a moment is (s from its first row), in rows below the header, counted from 1."""
+    row = bisect_right(times, at + NEAR)
+    return f"row {row}" if at - times[row - 1] < NEAR or row == len(times) else f"rows {row} to {row + 1}"
 
 
 def _led(hand: InHand, wanted: Trajectory) -> None:

@@ -142,7 +142,9 @@ def with_options(known: Machine, axes: Sequence[str], options: Mapping[str, str]
         address = spot._replace(options={**spot.options, **said(options)}).bus
         prepare(address, {})
         buses[name] = structs.replace(buses[name], address=address)
-    return structs.replace(known, buses=buses)
+    found = structs.replace(known, buses=buses)
+    found.__dict__["file"] = known.file  # a copy of a machine is of no file, and this one still is
+    return found
 
 
 def rehearse(hand: InHand, names: Iterable[str], do: Callable[[Any], object], *, show: bool = True) -> None:

@@ -16,7 +16,7 @@ from motorbus.cli.exits import Partial
 from motorbus.cli.machine import is_address, is_name, machine_file
 from motorbus.cli.target import targets
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine
+from motorbus.motion.machine import AxisSpec, BusSpec, GroupSpec, Machine, kind_of_no_file
 from motorbus.motion.machine.model import ADDRESS, Estop
 from motorbus.motion.machine.reading import LONGEST
 from motorbus.motion.machine.refusal import listed, nearest
@@ -182,6 +182,8 @@ def _axes(words: Collection[str]) -> list[str]:
 def _seen(path: Path) -> Rough | None:
     """What can be seen in a file; None when it cannot be read, or there is not even a bus in it."""
     try:
+        if kind_of_no_file(path):
+            return None
         with path.open("rb") as file:
             raw = file.read(4 * LONGEST)
     except (OSError, ValueError):

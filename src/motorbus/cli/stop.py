@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli import resting
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
+from motorbus.cli.machine import machine_file, without_axes
 from motorbus.cli.output import Output
 from motorbus.cli.rough import beside_others, forgiving, together
 
@@ -69,6 +70,8 @@ def stop(
         unknown = list(meant.unclear.values())
         if unknown and not meant.known:
             raise together(unknown)
+        if not (devices or meant.known) and machine_file().path is not None:
+            raise without_axes()
         others = beside_others(unknown)
         look = resting.look if verify else None
         return each("stop", "stop", meant.known, options, output, dry_run=dry_run, unknown=others, look=look)

@@ -14,11 +14,11 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate, check_smooth
+from motorbus.cli.rates import check_rate, check_seconds, check_smooth
 from motorbus.cli.robot import place, robot
 from motorbus.core import units
 from motorbus.core.operation import Progress
-from motorbus.errors import MotorbusError, RequestError
+from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -107,24 +107,16 @@ def teach(
 def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: bool) -> None:
     """Say that torque goes off. Raises RequestError before, for who cannot be taught, and for too high a rate."""
     from motorbus.motion.budget import refuse_above
-    from motorbus.motion.follow import check_able
+    from motorbus.motion.teach import taught
 
-    if named:
-        check_able(hand.robot, axes, "train", "taught: nothing tells where it is in a loop")
-        if limp:
-            check_able(hand.robot, axes, "disable_torque", "taught by hand")
-    needed = {"train", "disable_torque"} if limp else {"train"}
-    taught = [name for name in axes if needed <= set(hand.robot[name].able)]
-    if taught:
-        refuse_above(hand.robot.budget(rate, taught))
+    refuse_above(hand.robot.budget(rate, taught(hand.robot, axes if named else None, limp=limp)))
     if limp:
         hand.output.note("the torque goes off now, and stays off: hold what could sag")
 
 
 def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
     """Raise RequestError for what cannot be, before anything is let go."""
-    if span is not None and not span > 0:
-        raise RequestError("--seconds must be above 0", advice="nothing was sent")
+    check_seconds(span)
     check_rate(rate)
     check_smooth(smooth)
     check_writable(file)

@@ -76,7 +76,7 @@ def _with_switch(words: tuple[str, ...], verb: str) -> tuple[str, ...]:
     """The words, and of a name for several those with a switch; all of them where none has one, to be refused."""
     found: list[str] = []
     for word in words:
-        axes = axes_named((word,)) if is_name(word) else []
+        axes = axes_named((word,), some=False) if is_name(word) else []
         able_ = [axis for axis in axes if _has(addresses(axis)[0], verb)]
         found += [word] if not able_ or len(able_) == len(axes) else able_
     return tuple(found)

@@ -74,6 +74,11 @@ QUANTITIES: Mapping[str, str] = {
 }
 """Which quantity a unit of the API (the unit of a table row) measures."""
 
+LEAST_RATE: Final = 1e-6
+"""Hz of anything that goes on in cycles: one in eleven days."""
+GREATEST_RATE: Final = 1e6
+"""Hz; on the quickest bus there is one byte takes longer than such a cycle."""
+
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
 _LONG = 16
 """Characters; a number with its unit that has as many is no number that a person wrote."""

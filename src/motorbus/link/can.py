@@ -28,7 +28,7 @@ from motorbus.link.can_wire import BusWire, Wire, build, refuse_bus_off
 from motorbus.link.foreign import who_holds
 from motorbus.link.identity import PSEUDO_TERMINALS
 from motorbus.link.lock import PortLock, taken
-from motorbus.link.refusal import busy, not_found
+from motorbus.link.refusal import busy, no_port, not_found
 from motorbus.link.serial import could_be_a_port, ports
 
 BY_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
@@ -152,7 +152,7 @@ class CanLink:
             if not os.path.exists(device):
                 raise not_found(self.name, ports())
             if not could_be_a_port(device):
-                raise LinkError(f"{self.name}: {device} is not a serial port")
+                raise no_port(self.name, ports(), device)
             holder = who_holds(os.path.realpath(device))
             if holder is not None:
                 raise busy(self.name, holder)

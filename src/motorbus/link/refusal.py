@@ -28,16 +28,29 @@ class Owner(NamedTuple):
 
 def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     """There is no such port, but there are these."""
-    names = [f"{info.device} ({info.guess})" if info.guess else info.device for info in others]
     relative = os.name != "nt" and "://" not in port and not os.path.isabs(port)
     meant = f"/dev/{port}" if relative and port.startswith("tty") and os.path.exists(f"/dev/{port}") else ""
     return PortNotFound(
         f"{port}: there is no such port",
-        expected=f"one of {', '.join(names)}" if names else "a serial port; this machine has none at present",
+        expected=_one_of(others),
         cause=_why_not(port, relative),
         advice=(f"did you mean {meant}? " if meant else "")
         + "is the adapter plugged in, the simulator running? `motorbus ports` lists what there is",
     )
+
+
+def no_port(port: str, others: Sequence[PortInfo], device: str = "") -> PortNotFound:
+    """There is something of this name, or there is the `device` that it names, but it is no port; these are."""
+    return PortNotFound(
+        f"{port}{device and f': {device}'} is not a serial port",
+        expected=_one_of(others),
+        advice="`motorbus ports` lists what there is; nothing was opened",
+    )
+
+
+def _one_of(others: Sequence[PortInfo]) -> str:
+    names = [f"{info.device} ({info.guess})" if info.guess else info.device for info in others]
+    return f"one of {', '.join(names)}" if names else "a serial port; this machine has none at present"
 
 
 def _why_not(port: str, relative: bool) -> str:

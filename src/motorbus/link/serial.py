@@ -26,7 +26,7 @@ from motorbus.link.adapters import PortInfo
 from motorbus.link.foreign import who_holds
 from motorbus.link.identity import PSEUDO_TERMINALS
 from motorbus.link.lock import PortLock, taken
-from motorbus.link.refusal import busy, forbidden, full, lost, not_found, wrong_rate
+from motorbus.link.refusal import busy, forbidden, full, lost, no_port, not_found, wrong_rate
 from motorbus.link.speed import line_speed
 from motorbus.link.tcp import CONNECT_TIME, give_up_soon, split_address
 from motorbus.link.waiting import doze, is_readable, wait_readable
@@ -97,7 +97,7 @@ class SerialLink:
         if not os.path.exists(self._device):
             raise not_found(port, ports())
         if not could_be_a_port(self._device):
-            raise LinkError(f"{port} is not a serial port")
+            raise no_port(port, ports())
         self.lock = taken(port, kept)
         try:
             self._open(sysfs)
@@ -314,7 +314,7 @@ def _refuse(port: str, device: str, error: OSError) -> NoReturn:
     if isinstance(error, PermissionError):
         raise forbidden(port, device) from error
     if error.errno == errno.ENOTTY:
-        raise LinkError(f"{port} is not a serial port") from error
+        raise no_port(port, ports()) from error
     raise LinkError(f"{port} cannot be opened: {error.strerror or error}") from error
 
 

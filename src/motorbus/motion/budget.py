@@ -168,6 +168,7 @@ def refuse_above(found: RobotBudget) -> None:
 def check_figures(rate: float, turnaround: float = 0.0) -> None:
     """Raise RequestError for a rate (Hz) or a time (s) that cannot be."""
     for what, figure in (("rate", rate), ("turnaround", turnaround)):
+        limits.check_number(what, figure)
         if not (isfinite(figure) and figure >= 0):
             raise RequestError(
                 f"{what} is {figure}", expected="a finite number, 0 or more", advice="nothing was sent"

@@ -40,6 +40,7 @@ class _Jog:
             raise RequestError(
                 f"{name}: a velocity of 0 is no jog", expected="another one", advice="nothing was sent"
             )
+        limits.check_number("rate", rate)
         if not (isfinite(rate) and rate >= 1 / LONGEST):
             raise RequestError(
                 f"rate is {rate}",

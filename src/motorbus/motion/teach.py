@@ -43,7 +43,7 @@ def teach(
     axis falls silent or a port is gone: the trajectory until then is `so_far` of that error.
     """
     check_seconds(seconds)
-    axes = _taught(body, names, limp)
+    axes = taught(body, names, limp=limp)
     teaching = _Teaching(rate, seconds, until)
     return Errand(
         teaching,
@@ -55,14 +55,23 @@ def teach(
     )
 
 
-def _taught(body: Body, names: str | Iterable[str] | None, limp: bool) -> tuple[str, ...]:
+def taught(body: Body, names: str | Iterable[str] | None, *, limp: bool) -> tuple[str, ...]:
+    """The axes that are taught of these; of all (None) those who can be. Raises RequestError for one that cannot be
+    taught, or when none can be. Nothing is sent."""
     chosen = body.chosen(names)
     if names is not None:
         check_able(body, chosen, "train", "taught: nothing tells where it is in a loop")
         if limp:
             check_able(body, chosen, "disable_torque", "taught by hand")
         return tuple(chosen)
-    led, _ = divided(chosen)
+    led, without = divided(chosen)
+    if not led:
+        raise RequestError(
+            "none of these axes can be taught",
+            expected="an axis that tells where it is in a loop",
+            cause=f"{', '.join(without)}: nobody can ask such a device in a loop",
+            advice=f"add such an axis to the machine; {NOTHING}",
+        )
     found = tuple(name for name, axis in led.items() if not limp or "disable_torque" in axis.able)
     if not found:
         raise RequestError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from os import PathLike
 from typing import NamedTuple, Self
@@ -17,7 +18,7 @@ from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
-from motorbus.motion.machine.refusal import of_file, path, refused
+from motorbus.motion.machine.refusal import no_axes, of_file, path, refused
 from motorbus.motion.several import named
 from motorbus.session.address import parse_address
 from motorbus.session.buses import AnyBus, open, open_async
@@ -46,9 +47,9 @@ class Plan(NamedTuple):
             )
         with of_file(machine.file):
             check(machine)
-        names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
-        if not names:
-            raise RequestError("the machine has no axis", expected="a file with [axis.NAME]")
+            names = tuple(machine.axes) if axes is None else _chosen(machine, axes)
+            if not names:
+                raise no_axes(() if axes is None else named_in(axes))
         buses = tuple(dict.fromkeys(machine.axes[name].bus for name in names))
         with of_file(machine.file):
             _check_ports(machine, buses)
@@ -56,19 +57,15 @@ class Plan(NamedTuple):
         return cls(machine, names, buses)
 
     def open(self, name: str, report: Callable[[object], None] | None) -> Bus:
-        """Open one of the buses. Raises as `motorbus.open`, naming the bus."""
-        try:
+        """Open one of the buses. Raises as `motorbus.open`, naming the file and the bus in it."""
+        with _of_bus(self.machine, name):
             return open(self.machine.buses[name].address, report=report, **estop_options(self.machine, name))
-        except MotorbusError as error:
-            raise named(f"bus.{name}", error) from error
 
     def open_async(self, name: str, report: Callable[[object], None] | None) -> AsyncBus:
         """The same for asyncio."""
-        try:
+        with _of_bus(self.machine, name):
             options = estop_options(self.machine, name)
             return open_async(self.machine.buses[name].address, report=report, **options)
-        except MotorbusError as error:
-            raise named(f"bus.{name}", error) from error
 
     def blocking(self, buses: Mapping[str, Bus]) -> dict[str, Axis]:
         """The axes on these buses, of whose devices nothing is known yet."""
@@ -88,6 +85,16 @@ class Plan(NamedTuple):
         for name in self.axes:
             spec = self.machine.axes[name]
             yield name, spec, buses[spec.bus]
+
+
+@contextmanager
+def _of_bus(machine: Machine, bus: str) -> Iterator[None]:
+    """Within it, what goes wrong with a bus of a machine begins with the path of its file, and the place in it."""
+    with of_file(machine.file):
+        try:
+            yield
+        except MotorbusError as error:
+            raise named(f"bus.{bus}", error) from error
 
 
 def loaded(file: str | PathLike[str]) -> Machine:

@@ -8,15 +8,27 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.units import GREATEST_RATE, LEAST_RATE
 from motorbus.errors import RequestError
 from motorbus.motion.loop.errors import as_number, check_loop, never_ahead, not_ahead, silence, stopped
 
 
-@pytest.mark.parametrize("rate", [0.0, -5.0, nan, inf])
+@pytest.mark.parametrize("rate", [0.0, -5.0, nan, inf, 1e-9, 1e9])
 def test_a_rate_that_cannot_be_is_told_with_what_can(rate: float) -> None:
-    with pytest.raises(RequestError, match=f"rate is {rate}") as caught:
+    with pytest.raises(RequestError, match=f"^rate is {rate}\n") as caught:
         check_loop(rate, direct=False, jerk=None)
-    assert caught.value.expected == "a finite number of Hz, above 0"
+    assert caught.value.expected == "cycles per second: 1e-06 to 1e+06"
+
+
+@pytest.mark.parametrize("rate", ["x", None, True, [50.0], pytest.param(10**400, id="10**400")])
+def test_what_is_no_number_is_no_rate(rate: Any) -> None:
+    with pytest.raises(RequestError, match="^rate is .*\n.*expected: a number"):
+        check_loop(rate, direct=False, jerk=None)
+
+
+def test_every_other_rate_is_left_to_whoever_knows_the_bus() -> None:
+    check_loop(GREATEST_RATE, direct=False, jerk=None)
+    check_loop(LEAST_RATE, direct=False, jerk=None)
 
 
 def test_jerk_is_for_goals_that_are_followed() -> None:
@@ -25,7 +37,7 @@ def test_jerk_is_for_goals_that_are_followed() -> None:
         check_loop(100.0, direct=True, jerk=5.0)
 
 
-@pytest.mark.parametrize("goal", ["1", None, True, [1.0]])
+@pytest.mark.parametrize("goal", ["1", None, True, [1.0], pytest.param(10**400, id="10**400")])
 def test_what_is_no_number_is_no_goal(goal: object) -> None:
     assert as_number("a1", 1) == 1.0
     with pytest.raises(RequestError, match=r"the goal of a1 is"):

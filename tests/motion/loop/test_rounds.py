@@ -240,7 +240,7 @@ def test_a_rate_that_no_bus_carries_is_refused_with_the_highest() -> None:
             assert loop.budget.fits()
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, nan, inf])
+@pytest.mark.parametrize("rate", [0.0, -1.0, nan, inf, "x", True, 1e-9, pytest.param(10**400, id="10**400")])
 def test_a_rate_is_a_number_above_nothing(rate: float) -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot, pytest.raises(RequestError, match="rate is"):
         robot.loop(rate)

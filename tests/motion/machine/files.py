@@ -80,6 +80,20 @@ class Broken(NamedTuple):
         return GOOD.replace(self.old, self.new)
 
 
+class NoText(NamedTuple):
+    """What is in a file that is no text at all, and how its message goes on behind `it is no text: `."""
+
+    content: bytes
+    says: str
+
+
+NO_TEXT = {
+    "utf-16": NoText(GOOD.encode("utf-16"), "invalid start byte"),
+    "utf-16-without-mark": NoText(GOOD.encode("utf-16-le"), "there are zero bytes in it"),
+    "binary": NoText(bytes(range(256)), "invalid start byte"),
+    "cut-off": NoText(GOOD.encode() + b"\xc3", "unexpected end of data"),
+}
+
 DEEP = "zero" + ".a" * 3000 + " = 1"
 BROKEN = (
     # the file itself

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from math import pi
 from pathlib import Path
 
@@ -10,7 +12,7 @@ from hypothesis import given
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine import AxisSpec, BusSpec, Machine, source
-from tests.motion.machine.files import GOOD, axis, machines
+from tests.motion.machine.files import GOOD, NO_TEXT, NoText, axis, machines
 
 MACHINE = Machine.parse(GOOD)
 
@@ -68,7 +70,6 @@ def test_it_is_loaded_from_a_file(tmp_path: Path) -> None:
     ("content", "says"),
     [
         (None, "it cannot be read: no such file or directory"),
-        (b"\xff\xfe", "it is no text"),
         (b"x" * (1 << 21), "the file has more than 1048576 characters"),
         (b"format = 3", "format: 3 is not known"),
     ],
@@ -82,6 +83,36 @@ def test_what_cannot_be_loaded_names_the_file(content: bytes | None, says: str, 
     assert caught.value.summary.startswith(f"{file}: {says}")
     assert str(caught.value).startswith(f"{file}: {says}")
     assert "nothing was opened" in caught.value.advice
+
+
+@pytest.mark.parametrize("one", [pytest.param(one, id=name) for name, one in NO_TEXT.items()])
+def test_what_is_no_text_is_to_be_saved_as_text(one: NoText, tmp_path: Path) -> None:
+    file = tmp_path / "motorbus.toml"
+    file.write_bytes(one.content)
+    with pytest.raises(RequestError) as caught:
+        Machine.load(file)
+    assert caught.value.summary == f"{file}: it is no text: {one.says}"
+    assert caught.value.expected == "TOML in UTF-8"
+    assert re.fullmatch(r"save it as UTF-8, .*; nothing was opened", caught.value.advice)
+
+
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RequestError, match="it cannot be read: it is a named pipe, and no file") as caught:
+        Machine.load(tmp_path / "pipe")
+    assert caught.value.advice == "see that the path is right; nothing was opened"
+    with pytest.raises(RequestError, match="it is a device, and no file"):
+        Machine.load("/dev/null")
+
+
+def test_what_is_piped_in_is_read() -> None:
+    end, other = os.pipe()
+    with open(other, "wb") as pipe:
+        pipe.write(GOOD.encode())
+    try:
+        assert Machine.load(f"/dev/fd/{end}").axes == MACHINE.axes
+    finally:
+        os.close(end)
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:

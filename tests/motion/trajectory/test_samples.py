@@ -130,6 +130,7 @@ def test_a_file_is_loaded_and_names_itself_where_it_is_wrong(tmp_path: Path) -> 
     with pytest.raises(RequestError, match="wave.csv: it is no text") as refused:
         Trajectory.load(file)
     assert refused.value.expected == "CSV in UTF-8"
+    assert refused.value.advice.startswith("save it as UTF-8, ")
     with pytest.raises(RequestError, match="cannot be read: no such file") as refused:
         Trajectory.load(tmp_path / "none.csv")
     assert refused.value.expected == "a CSV file of a trajectory"

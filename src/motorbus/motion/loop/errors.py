@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import TYPE_CHECKING
 
+from motorbus.core.entry import shown
+from motorbus.core.units import GREATEST_RATE, LEAST_RATE
 from motorbus.errors import Interrupted, NoReply, RequestError
+from motorbus.motion.limits import check_number
 
 if TYPE_CHECKING:
     from motorbus.motion.loop.place import Place
@@ -14,9 +16,12 @@ if TYPE_CHECKING:
 
 def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
     """Raise RequestError for what cannot be."""
-    if not (isfinite(rate) and rate > 0):
+    check_number("rate", rate)
+    if not LEAST_RATE <= rate <= GREATEST_RATE:
         raise RequestError(
-            f"rate is {rate}", expected="a finite number of Hz, above 0", advice="nothing was sent"
+            f"rate is {shown(rate)}",
+            expected=f"cycles per second: {LEAST_RATE:g} to {GREATEST_RATE:g}",
+            advice="choose such a rate; budget() tells the highest that the buses carry; nothing was sent",
         )
     if direct and jerk is not None:
         raise RequestError(
@@ -28,11 +33,14 @@ def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
 
 def as_number(name: str, goal: object) -> float:
     """The goal of this axis as it is (rad, m). Raises RequestError for what is no number."""
-    if isinstance(goal, bool) or not isinstance(goal, int | float):
-        raise RequestError(
-            f"the goal of {name} is {goal!r}", expected="a number (rad, m)", advice="nothing was sent"
-        )
-    return float(goal)
+    try:
+        if isinstance(goal, int | float) and not isinstance(goal, bool):
+            return float(goal)
+    except OverflowError:
+        pass
+    raise RequestError(
+        f"the goal of {name} is {shown(goal)}", expected="a number (rad, m)", advice="nothing was sent"
+    )
 
 
 def not_ahead(buses: Sequence[str]) -> RequestError:

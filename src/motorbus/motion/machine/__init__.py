@@ -10,6 +10,8 @@ wrote them; `Machine.text` writes a fresh one.
 
 from __future__ import annotations
 
+import os
+import stat
 from os import PathLike
 from pathlib import Path
 from typing import Final
@@ -26,6 +28,8 @@ from motorbus.motion.machine.schema import schema
 
 NAME: Final = "motorbus.toml"
 """What the file is called where nobody says otherwise."""
+PIPED: Final = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
+"""Where what others write for us is read: pipes that are open already."""
 
 
 class Machine(Description, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
@@ -101,17 +105,18 @@ def source(
     kind: str = "TOML",
     expected: str = f"a machine file, as {NAME}",
 ) -> str:
-    """The text of a file as it is on disk, with its ends of lines. Raises RequestError when it cannot be read.
+    """The text of a file as it is on disk, with its ends of lines.
 
-    No more than one character above `longest` is read; `kind` and `expected` are words for what it should be.
+    Raises RequestError when it cannot be read, is no text, or is no file: a pipe is read as /dev/stdin only. No more
+    than one character above `longest` is read; `kind` and `expected` are words for what it should be.
     """
     try:
+        if other := kind_of_no_file(path):
+            raise OSError(f"it is {other}, and no file")
         with Path(path).open(encoding="utf-8", newline="") as file:
-            return file.read(longest + 1)
+            text = file.read(longest + 1)
     except UnicodeDecodeError as error:
-        raise RequestError(
-            f"it is no text: {error.reason}", expected=f"{kind} in UTF-8", advice="nothing was opened"
-        ) from None
+        raise _no_text(kind, error.reason) from None
     except (OSError, ValueError) as error:
         why = (getattr(error, "strerror", None) or str(error)).lower()
         raise RequestError(
@@ -119,6 +124,30 @@ def source(
             expected=expected,
             advice="see that the path is right; nothing was opened",
         ) from error
+    if "\0" in text:  # as UTF-16 without its mark has beside each letter
+        raise _no_text(kind, "there are zero bytes in it")
+    return text
+
+
+def kind_of_no_file(path: str | PathLike[str]) -> str:
+    """What a path leads to where reading might never end, for nobody writes there; "" for anything else.
+
+    Whatever is piped in by a descriptor of ours has somebody who writes it. Raises OSError where there is nothing.
+    """
+    mode = os.stat(path).st_mode
+    if os.path.abspath(path).startswith(PIPED):
+        return ""
+    if stat.S_ISFIFO(mode):
+        return "a named pipe"
+    return "a device" if stat.S_ISCHR(mode) or stat.S_ISBLK(mode) else ""
+
+
+def _no_text(kind: str, why: str) -> RequestError:
+    return RequestError(
+        f"it is no text: {why}",
+        expected=f"{kind} in UTF-8",
+        advice="save it as UTF-8, or see that it is the right file; nothing was opened",
+    )
 
 
 __all__ = [
@@ -129,6 +158,7 @@ __all__ = [
     "GroupSpec",
     "Machine",
     "edited",
+    "kind_of_no_file",
     "renamed",
     "schema",
     "source",

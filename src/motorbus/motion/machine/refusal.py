@@ -10,7 +10,7 @@ from os import PathLike
 from typing import Any
 
 from motorbus.core.entry import shown
-from motorbus.errors import RequestError
+from motorbus.errors import LinkError, RequestError
 
 _BARE = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _NOTHING = ("nothing was sent", "nothing was opened")
@@ -33,12 +33,23 @@ def to_do(advice: str, otherwise: str = "change it") -> str:
     return "; ".join(part for part in advice.split("; ") if part not in ("", *_NOTHING)) or otherwise
 
 
+def no_axes(names: Iterable[str] = ()) -> RequestError:
+    """The error for a machine that has no axis, or for these names of it, which stand for none."""
+    those = ", ".join(names)
+    return refused(
+        those,
+        "no axis is on it" if those else "the machine has no axis",
+        "a file with [axis.NAME]",
+        "add a table [axis.NAME] for each device; `motorbus init BUS` writes a file with those that answer",
+    )
+
+
 @contextmanager
 def of_file(file: str | PathLike[str]) -> Iterator[None]:
-    """Within it, what a machine is refused for begins with the path of its file; "" where it is of none."""
+    """Within it, what a machine or its ports are refused for begins with the path of its file, if it has one."""
     try:
         yield
-    except RequestError as error:
+    except (RequestError, LinkError) as error:
         if str(file) and not error.summary.startswith(f"{file}: "):
             error.summary = f"{file}: {error.summary}"
             error.args = (error.summary,)

@@ -65,11 +65,13 @@ def check(trajectory: Trajectory, axes: Mapping[str, AxisSpec]) -> None:
     """Raise LimitExceeded for the first sample that goes beyond a limit; RequestError for an axis not in `axes`."""
     found = first_violation(trajectory, axes)
     if found is not None:
-        raise LimitExceeded(
+        error = LimitExceeded(
             found.told(axes[found.axis]),
             expected="a trajectory within the limits of its axes",
             advice=f"{_ADVICE[found.what]}; {NOTHING}",
         )
+        error.at = found.at
+        raise error
 
 
 def _spec(name: str, axes: Mapping[str, AxisSpec]) -> AxisSpec:
