@@ -56,11 +56,12 @@ class Rig:
 
 
 class Bytewise:
-    """Hands over what another line delivers to the host byte by byte, as a slow wire does."""
+    """Hands over what another line delivers to the host byte by byte, as a slow wire does: none overtakes another."""
 
     def __init__(self, line: Line, gap: float = 1e-5) -> None:
         self.line = line
         self.gap = gap
+        self._last = 0.0
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         return [piece for delivery in self.line.carry(sender, data, at) for piece in self._pieces(delivery)]
@@ -69,7 +70,9 @@ class Bytewise:
         if delivery.to is Side.DEVICE or not isinstance(delivery.data, bytes):
             return [delivery]
         bytes_ = [delivery.data[index : index + 1] for index in range(len(delivery.data))]
-        return [Delivery(delivery.at + n * self.gap, delivery.to, byte) for n, byte in enumerate(bytes_)]
+        begin = max(delivery.at, self._last + self.gap)
+        self._last = begin + (len(bytes_) - 1) * self.gap
+        return [Delivery(begin + n * self.gap, delivery.to, byte) for n, byte in enumerate(bytes_)]
 
 
 def words(answer: Answer) -> list[int]:
