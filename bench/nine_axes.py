@@ -69,6 +69,10 @@ class Witness:
         """Its standard input."""
         return [sys.stdin.fileno()]
 
+    def stuck(self) -> list[int]:
+        """Nothing: what it tells has room."""
+        return []
+
     def attend(self, descriptor: int) -> None:
         """A line with two moments came; an end of the input ends the process."""
         line = os.read(descriptor, 4096).decode()
