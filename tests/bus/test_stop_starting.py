@@ -91,6 +91,25 @@ def test_two_who_start_it_at_the_same_moment_have_one_thread_between_them(real: 
     assert set(threading.enumerate()) - before == {real.stopper._thread}
 
 
+def test_a_bus_that_is_closed_in_the_moment_its_thread_begins_leaves_it_nothing_to_do(
+    real: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Late(threading.Thread):
+        def start(self) -> None:
+            real.stopper.close()
+            super().start()
+
+    wrong: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", wrong.append)
+    monkeypatch.setattr(stop, "Thread", Late)
+    real.stopper.start()
+    assert real.stopper._ready.is_set(), "nobody waits for what does not come"
+    assert real.stopper._thread is not None
+    real.stopper._thread.join(5.0)
+    assert not real.stopper._thread.is_alive()
+    assert wrong == []
+
+
 def test_once_it_is_there_a_stop_waits_for_nobody_who_is_still_starting_it(real: Bus) -> None:
     """A signal handler may interrupt `start` where it waits for the thread, and ask for the stop."""
     real.stopper.start()

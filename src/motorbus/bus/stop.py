@@ -277,10 +277,14 @@ class Stopper:
         assert self._pair is not None
         wish = self._pair[0]
         with _listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
-            ready.register(wish, EVENT_READ)
             if listener is not None:
                 ready.register(listener, EVENT_READ)
-            self._ready.set()
+            try:
+                ready.register(wish, EVENT_READ)
+            except ValueError:  # it was closed in the moment in which it was started
+                return
+            finally:
+                self._ready.set()
             ended = False
             while not ended:
                 try:
