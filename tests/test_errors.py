@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+import pickle
 
 import pytest
 
@@ -58,3 +60,13 @@ def test_a_refusal_says_why_in_a_word() -> None:
     assert errors.Refused("no", reason="stale", node=3).reason == "stale"
     assert errors.LimitExceeded("no").reason == "limits"
     assert errors.LimitExceeded("no", reason="step").reason == "step"
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
+def test_what_is_said_anew_is_what_everybody_is_told(kind: type[errors.MotorbusError]) -> None:
+    """A traceback, a copy and another process show what Python keeps of an error, which is its arguments."""
+    error = kind("no answer", advice="ask again")
+    error.summary = f"arm.toml: {error.summary}"
+    for told in (error, copy.copy(error), pickle.loads(pickle.dumps(error))):
+        assert told.args == ("arm.toml: no answer",)
+        assert str(told) == "arm.toml: no answer\n  what to do: ask again"

@@ -199,7 +199,7 @@ def test_a_disk_that_takes_nothing_is_an_error_of_ours(path: Path, monkeypatch: 
     kept = begun(path)
     with monkeypatch.context() as patched:
         patched.setattr(os, "write", full)
-        with pytest.raises(LinkError, match="no space left on device"):
+        with pytest.raises(LinkError, match="cannot be written: no space left on device"):
             kept(record("writing 7", x=1))
     assert kept.unfinished() is not None
 

@@ -52,13 +52,21 @@ class MotorbusError(Exception):
         node: int | None = None,
     ) -> None:
         super().__init__(summary)
-        self.summary = summary
         self.sent = sent
         self.received = received
         self.expected = expected
         self.cause = cause
         self.advice = advice
         self.node = node
+
+    @property
+    def summary(self) -> str:
+        """What happened, in one line; whoever knows more of where it was may say it anew."""
+        return str(self.args[0])
+
+    @summary.setter
+    def summary(self, told: str) -> None:
+        self.args = (told,)
 
     def __str__(self) -> str:
         parts = (

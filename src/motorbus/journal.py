@@ -244,7 +244,7 @@ def _now() -> str:
 
 
 def _write(path: Path, flags: int, content: bytes) -> None:
-    descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_CLOEXEC", 0) | flags, 0o600)
+    descriptor = os.open(path, os.O_WRONLY | flags, 0o600)
     try:
         while content:
             content = content[os.write(descriptor, content) :]

@@ -189,9 +189,9 @@ def test_goals_are_read_in_the_unit_of_their_axis(bench: Bench) -> None:
         ("move a1=1deg --duration -1", "--duration -1: not above 0"),
         ("jog a1=1deg/s --seconds -1", "--seconds -1: not above 0"),
         ("jog a1=nan --seconds 1", "a1: velocity 'nan' is not a number"),
-        ("teach a1 --output w.csv --seconds 0", "--seconds must be above 0"),
-        ("follow a1 a2 --seconds 0", "--seconds must be above 0"),
-        ("loop-stats a1 --seconds 0", "--seconds must be above 0"),
+        ("teach a1 --output w.csv --seconds 0", "--seconds 0: not above 0"),
+        ("follow a1 a2 --seconds 0", "--seconds 0: not above 0"),
+        ("loop-stats a1 --seconds 0", "--seconds 0: not above 0"),
     ],
 )
 def test_what_is_no_figure_names_its_axis_or_flag_and_a_fix(

@@ -46,4 +46,3 @@ def explain(error: RequestError, command: Callable[..., object], options: dict[s
             error.summary = f"--{option}: no such flag"
             error.expected = f"did you mean --{meant[0]}?"
         error.advice = "`--help` lists the flags; nothing was sent"
-        error.args = (error.summary,)

@@ -13,6 +13,7 @@ from motorbus.cli.machine import axes_named, is_name, machine
 from motorbus.cli.moving import FAR_LINEAR, Goal, absolute, inside
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
+from motorbus.cli.rates import check_seconds
 from motorbus.cli.robot import able, place, rehearse, robot
 from motorbus.cli.target import device, offers, opened
 from motorbus.core import units
@@ -127,12 +128,7 @@ def _axis(
         raise RequestError(f"{word} is several axes", expected="one axis", advice="nothing was sent")
     spec, span = machine().axes[name], how.span
     velocity = _velocity(name, speed)
-    if not span > 0:
-        raise RequestError(
-            f"--seconds {span:g}: not above 0",
-            expected="s, above 0, as 0.5 or 500ms",
-            advice="say for how long; the sign of the velocity is the direction; nothing was sent",
-        )
+    check_seconds(span, "say for how long; the sign of the velocity is the direction")
     far, way = FAR_LINEAR if spec.linear else FAR, abs(velocity * span)
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")

@@ -83,7 +83,7 @@ def loop_stats(
     axes, span = axes_named(names), units.parse(seconds, "time")
     if rate is not None:
         check_rate(rate)
-    check_seconds(span, "for 5 s")
+    check_seconds(span, "leave it out for 5 s")
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",

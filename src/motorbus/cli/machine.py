@@ -212,7 +212,6 @@ def without_axes(words: Sequence[str] = ()) -> RequestError:
 
     error = no_axes(words)
     error.summary = f"{machine().file}: {error.summary}"
-    error.args = (error.summary,)
     machine_file().told_of(error)
     return error
 

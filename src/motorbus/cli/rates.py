@@ -16,13 +16,13 @@ def check_rate(rate: float) -> None:
         )
 
 
-def check_seconds(span: float | None, otherwise: str = "to go on until Enter or Ctrl-C") -> None:
-    """Raise RequestError for a time (s) that is none; left out it means what `otherwise` says. Nothing was sent."""
+def check_seconds(span: float | None, advice: str = "leave it out to go on until Enter or Ctrl-C") -> None:
+    """Raise RequestError, with this advice, for a time (s) that is none; None is one left out. Nothing was sent."""
     if span is not None and not span > 0:
         raise RequestError(
-            "--seconds must be above 0",
-            expected="s, as 10 or 1500ms",
-            advice=f"leave it out {otherwise}; nothing was sent",
+            f"--seconds {span:g}: not above 0",
+            expected="s, above 0, as 10 or 1500ms",
+            advice=f"{advice}; nothing was sent",
         )
 
 

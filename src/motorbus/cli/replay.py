@@ -178,7 +178,6 @@ def _told_of(file: Path, wanted: Trajectory, share: float) -> Iterator[None]:
         in_words_of_the_shell(error)
         rows = "" if error.at is None else f", {_rows(wanted.times, error.at * share)}"
         error.summary = f"{file}{rows}: {error.summary}"
-        error.args = (error.summary,)
         raise
 
 

@@ -99,7 +99,6 @@ def named(name: str, error: MotorbusError) -> MotorbusError:
         return error
     found = copy(error)
     found.summary = f"{name}: {error.summary}"
-    found.args = (found.summary,)
     found.__cause__ = error
     if hasattr(error, "__notes__"):
         found.__notes__ = list(error.__notes__)

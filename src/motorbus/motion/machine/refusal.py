@@ -52,7 +52,6 @@ def of_file(file: str | PathLike[str]) -> Iterator[None]:
     except (RequestError, LinkError) as error:
         if str(file) and not error.summary.startswith(f"{file}: "):
             error.summary = f"{file}: {error.summary}"
-            error.args = (error.summary,)
         raise
 
 

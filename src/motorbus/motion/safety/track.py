@@ -21,7 +21,7 @@ FASTEST: Final = 20.0
 MARGIN: Final = 1.5
 """How much farther than at its greatest speed a device may have come before that is called impossible."""
 TREMBLING: Final = 0.01
-"""rad by which readings of a device at rest may differ: two counts of the coarsest servo there is."""
+"""rad by which readings of a device at rest may differ: nearly two counts of the coarsest servo there is (0.0102)."""
 REACH: Final = 0.06
 """s for which the speed counts: after a longer time a motor can be anywhere, and one faulty reading must not say so."""
 STAYED: Final = 0.1

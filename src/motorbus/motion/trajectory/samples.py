@@ -79,7 +79,6 @@ class Trajectory:
             return cls.parse(_source(path), axes)
         except RequestError as error:
             error.summary = f"{path}: {error.summary}"
-            error.args = (error.summary,)
             raise
 
     def text(self, axes: Mapping[str, AxisSpec] | None = None) -> str:
