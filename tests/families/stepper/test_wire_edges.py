@@ -64,6 +64,56 @@ def test_a_number_that_is_too_large_is_told_with_its_size(name: str, value: int,
     assert caught.value.summary.endswith(f"{name} {value} does not fit {says}")
 
 
+# The manual's table of each command: where each number lies, low byte first, and that it reaches no farther.
+FULL = [
+    ("select_project", {"project": 1, "total_steps": 1}, "6E A1 B1 00 00 00 00 00"),
+    ("set_microstep_and_angle", {"microsteps": 2, "step_angle": 1}, "03 01 A1 A2 B1 00 00 00"),
+    ("set_turn_distance", {"turn_distance": 3}, "03 02 A1 A2 A3 00 00 00"),
+    ("set_step_distance", {"distance": 3, "step": 1}, "03 03 A1 A2 A3 00 00 B1"),
+    (
+        "set_step_direction_start",
+        {"direction": 1, "start_frequency": 2, "step": 1},
+        "03 04 A1 B1 B2 00 00 C1",
+    ),
+    ("set_step_accel_speed", {"acceleration": 2, "speed": 2, "step": 1}, "03 05 A1 A2 B1 B2 00 C1"),
+    ("set_step_output", {"output": 1, "step": 1}, "03 06 A1 00 00 00 00 B1"),
+    ("set_step_delay", {"delay": 3, "step": 1}, "03 07 A1 A2 A3 00 00 B1"),
+    ("set_step_start_input", {"start_input": 1, "step": 1}, "03 08 A1 00 00 00 00 B1"),
+    ("set_step_stop_input", {"stop_input": 1, "step": 1}, "03 09 A1 00 00 00 00 B1"),
+    ("set_segment_loop", {"loop_first": 1, "loop_last": 1, "loop_count": 1}, "7E A1 B1 C1 00 00 00 00"),
+    ("set_project_loop", {"project_loop": 1}, "8E A1 00 00 00 00 00 00"),
+    ("start_project", {"project": 1}, "4E A1 00 00 00 00 00 00"),
+    ("read_project", {"project": 1}, "3E A1 00 00 00 00 00 00"),
+    ("save_project", {"project": 1}, "2E A1 00 00 00 00 00 00"),
+    ("clear_project", {"project": 1}, "1E A1 00 00 00 00 00 00"),
+    ("set_stop_mode", {"stop_mode": 1}, "03 0E A1 00 00 00 00 00"),
+    ("set_output", {"port": 1, "level": 1}, "00 0C A1 B1 00 00 00 00"),
+    ("read_input", {"port": 1}, "00 0B A1 00 00 00 00 00"),
+    ("set_mode4", {"mode4": 1}, "9E A1 00 00 00 00 00 00"),
+    ("set_power_on_home", {"power_on_home": 1}, "AE A1 00 00 00 00 00 00"),
+]
+
+
+@pytest.mark.parametrize(("name", "sizes", "body"), FULL, ids=[name for name, _, _ in FULL])
+def test_each_number_fills_its_bytes_and_no_others(name: str, sizes: dict[str, int], body: str) -> None:
+    values = {
+        number: int.from_bytes(bytes(first + at for at in range(size)), "little")
+        for first, (number, size) in zip((0xA1, 0xB1, 0xC1), sizes.items(), strict=False)
+    }
+    request = wire.encode(name, **values)
+    assert request[2:10].hex(" ").upper() == body
+    assert wire.decode_request(request).values == values
+    for number, size in sizes.items():
+        with pytest.raises(RequestError, match=f"{number} .* does not fit its {size} byte"):
+            wire.encode(name, **{**values, number: 1 << 8 * size})
+
+
+def test_the_other_commands_carry_no_number() -> None:
+    bare = set(wire.COMMANDS) - {name for name, _, _ in FULL}
+    assert bare == {"stop_project", "jog_forward", "jog_reverse", "run_once", "stop_motor", "home"}
+    assert not any(wire.COMMANDS[name].places for name in bare)
+
+
 def test_an_unknown_command_is_told_with_all_there_are() -> None:
     with pytest.raises(RequestError) as caught:
         wire.named("warp")
