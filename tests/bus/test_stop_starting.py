@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -102,12 +103,34 @@ def test_a_bus_that_is_closed_in_the_moment_its_thread_begins_leaves_it_nothing_
     wrong: list[object] = []
     monkeypatch.setattr(threading, "excepthook", wrong.append)
     monkeypatch.setattr(stop, "Thread", Late)
+    monkeypatch.setattr(stop, "PATIENCE", 0.05)  # which a signal handler that closes the bus waits for in vain
     real.stopper.start()
     assert real.stopper._ready.is_set(), "nobody waits for what does not come"
     assert real.stopper._thread is not None
     real.stopper._thread.join(5.0)
     assert not real.stopper._thread.is_alive()
     assert wrong == []
+
+
+def test_a_bus_that_another_thread_closes_while_its_own_is_being_started_leaves_no_thread(
+    real: Bus, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    closing = Thread(target=real.stopper.close)
+    pair = socket.socketpair
+
+    def disturbed() -> tuple[socket.socket, socket.socket]:
+        closing.start()
+        closing.join(0.2)
+        return pair()
+
+    monkeypatch.setattr(socket, "socketpair", disturbed)
+    real.stopper.socket_path = tmp_path / "stop"
+    real.stopper.start()
+    closing.join(5)
+    assert real.stopper._thread is not None
+    real.stopper._thread.join(0.5)
+    assert not real.stopper._thread.is_alive()
+    assert not real.stopper.socket_path.exists()
 
 
 def test_once_it_is_there_a_stop_waits_for_nobody_who_is_still_starting_it(real: Bus) -> None:

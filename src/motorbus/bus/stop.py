@@ -334,6 +334,8 @@ class Stopper:
     def close(self) -> None:
         """End the thread, once a stop that has begun is over. Nothing else is sent."""
         self._closed = True
+        if self._starting.acquire(timeout=PATIENCE):  # whoever is starting the thread has it all there then
+            self._starting.release()
         atexit.unregister(self.close)
         self._wake(END)
         if self._thread is not None:

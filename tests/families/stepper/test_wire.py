@@ -216,6 +216,7 @@ def test_an_echo_is_certain_when_all_of_it_is_there() -> None:
     assert wire.echo(request, request + b"\xff\xaa") is wire.Echo.CERTAIN
     assert wire.echo(request, request[:6] + wire.NOTICE) is wire.Echo.NO
     assert wire.echo(request, b"\xff\xaa\x03\x0d\0\x01") is wire.Echo.NO
+    assert [verdict.value for verdict in wire.Echo] == ["no", "possible", "certain"]
 
 
 def test_a_dump_cannot_be_an_echo() -> None:

@@ -15,7 +15,7 @@ from motorbus.families.stepper.wire.commands import (
     Place,
     command_of,
 )
-from motorbus.families.stepper.wire.dump import ROW_LENGTH, ROWS, Dump, decode_dump, dump_fault, encode_dump
+from motorbus.families.stepper.wire.dump import ROW_LENGTH, Dump, decode_dump, dump_fault, encode_dump
 from motorbus.families.stepper.wire.echo import Echo, echo, looks_like_echo
 from motorbus.families.stepper.wire.frames import (
     DUMP_LENGTH,
@@ -61,7 +61,6 @@ __all__ = [
     "ONLY",
     "REPLY_LENGTH",
     "REQUEST_LENGTH",
-    "ROWS",
     "ROW_LENGTH",
     "SYSTEM",
     "Command",

@@ -21,7 +21,6 @@ from motorbus.families.stepper.wire.frames import (
 )
 
 ROW_LENGTH: Final = 20
-ROWS: Final = 11
 
 
 class Dump(NamedTuple):

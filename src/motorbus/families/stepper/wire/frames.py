@@ -57,11 +57,11 @@ class ReplyParts(NamedTuple):
 
     command: Command
     motor: int
-    project: int | None = None
-    step: int | None = None
-    port: int | None = None
-    level: int | None = None
-    data: bytes = b""
+    project: int | None
+    step: int | None
+    port: int | None
+    level: int | None
+    data: bytes
 
 
 def checksum(data: bytes) -> int:
