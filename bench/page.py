@@ -68,10 +68,10 @@ _GOALS = """## Goals
 theirs by ours where it is to be at least so much. What is measured in one thread may miss its goal by 15 % and what
 takes two processes by 25 %, for the machine is shared; a share of the wire limit, a cycle rate, a count, a time in ms
 and real time may not. Of the rows 4 to 7 and 12 one that misses is measured once more, and the second time counts. The
-*best* other
-library of a workload is the one in Python that needs least in the same run. A row that misses says why; one without a
-goal is told beside the one that is judged. *In one burst* and *in pieces* say how an adapter hands over the answers of
-several servos: all at once when the last byte has passed, or each packet as it has.
+*best* other library of a workload is the one in Python that needs least in the same run, and in row 10 in the same
+round. A row that misses says why; one without a goal is told beside the one that is judged. *In one burst* and
+*in pieces* say how an adapter hands over the answers of several servos: all at once when the last byte has passed, or
+each packet as it has.
 
 ![Every figure beside its goal](images/performance-goals.png)
 

@@ -91,7 +91,7 @@ def _factor(value: float, goal: str) -> float:
 
 
 def _label(row: Row) -> str:
-    against = "" if row.peer == "-" else f" by {row.peer}"
+    against = "" if row.peer == "-" else f" / {row.peer}"
     return f"{row.number}  {row.measure}{against}: {shown(row.value, row.unit)}"
 
 

@@ -64,8 +64,8 @@ REASONS: Final[dict[str, dict[str, str]]] = {
     },
     "8": {
         "streaming": "each piece costs a call and a result of its own, about as much as it takes to find its "
-        "packets, while the SDK has the whole capture at hand; where both read large blocks, as of a file, it is the "
-        "row beside this one",
+        "packets, while the SDK has the whole capture at hand; where ours has large blocks too, as of a "
+        "file, it is the row beside this one",
     },
     "9": {
         "bulk": "numpy finds the packets and cuts them out, but the bytes of each are an object of their own, and "
@@ -83,8 +83,9 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "answer; the blocking call waits for the one descriptor",
     },
     "12": {
-        "processor time per time-out": "what runs after a wait runs cold; ours sends a probe that no late reply "
-        "can answer, counts, and says what was sent and what to do",
+        "processor time per time-out": "what runs after a wait runs cold, which without the waiting is no such "
+        "figure (an exchange is in row 5); ours sends a probe that no late reply can answer, counts, and says what "
+        "was sent and what to do",
         "after the deadline": "the deadline passes while the process sleeps: the kernel wakes it when it comes "
         "to it, and whatever else runs on the machine comes first; the error is worded after that",
     },

@@ -200,8 +200,8 @@ def spoiled(results: Results) -> str:
         counts[sample.contender] += sample.repeats
     shown = ", ".join(f"{name} {count} times" for name, count in counts.items() if count)
     return (
-        f"Of what these tables and those in process show, measured again after an answer that was late or lost, or of "
-        f"others wrong: {shown or 'nobody'}. "
+        "Of what these tables, those in process and the rows 8 to 14 show, measured again after an answer that was "
+        f"late or lost, or of others wrong: {shown or 'nobody'}. "
         f"A wrong value of {OURS} is not measured again."
     )
 

@@ -22,6 +22,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any, NamedTuple
@@ -125,7 +126,7 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
         base = dict(next(loop).position)
         loop.goal.update(base)
         next(loop)  # torque on, in a cycle of its own
-        before, gone = loop.statistics.cycles, loop.statistics.overruns + loop.statistics.skipped
+        begun = copy(loop.statistics)
         goal = loop.goal
         gc.collect()
         gc.freeze()
@@ -139,15 +140,14 @@ def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
         lasted, used = perf_counter() - began, process_time() - used
         told = loop.statistics
     judged(positions)
-    cycles = told.cycles - before
+    cycles = told.cycles - begun.cycles
     return {
         "asked": rate,
         "cycles": cycles,
         "achieved": cycles / lasted,
-        "overruns": told.overruns,
-        "skipped": told.skipped,
+        "overruns": told.overruns - begun.overruns,
+        "skipped": told.skipped - begun.skipped,
         "unordered": told.unordered,
-        "before": gone,
         "lateness": told.lateness.mean,
         "cycle": told.cycle.mean,
         "processor": used / cycles,

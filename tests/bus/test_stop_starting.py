@@ -103,7 +103,9 @@ def test_a_bus_that_is_closed_in_the_moment_its_thread_begins_leaves_it_nothing_
     wrong: list[object] = []
     monkeypatch.setattr(threading, "excepthook", wrong.append)
     monkeypatch.setattr(stop, "Thread", Late)
-    monkeypatch.setattr(stop, "PATIENCE", 0.05)  # which a signal handler that closes the bus waits for in vain
+    monkeypatch.setattr(
+        stop, "PATIENCE", 0.05
+    )  # which a signal handler that closes the bus waits for in vain
     real.stopper.start()
     assert real.stopper._ready.is_set(), "nobody waits for what does not come"
     assert real.stopper._thread is not None

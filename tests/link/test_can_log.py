@@ -211,11 +211,32 @@ def test_what_python_can_passes_over_in_asc_and_looks_like_a_frame_is_told(
     assert [one.frame for one in found if not one.line] == [FRAMES[0]] * 2
 
 
-@pytest.mark.parametrize("line", ["     2)         2.0  R~  0625  8  22 03", "     2)   2.0", "     2)"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "     2)         2.0  R~  0625  8  22 03",
+        "     2)         2.0  R~  0625  3  22 EC 02",
+        "     2)         2.0  1  R~  0625  -  2  ER 03",
+        "     2)   2.0",
+        "     2)",
+    ],
+)
 def test_what_python_can_passes_over_in_trc_and_looks_like_a_frame_is_told(line: str, tmp_path: Path) -> None:
     *head, frame = TRC.splitlines()[:3]
     (tmp_path / "trace.trc").write_text("\n".join([*head, frame, line, frame]))
     assert [one.line for one in read_log(tmp_path / "trace.trc")] == [0, 4, 0]
+
+
+def test_in_a_trc_without_numbers_a_line_begins_with_its_time(tmp_path: Path) -> None:
+    head = (
+        ";$FILEVERSION=2.1",
+        ";$STARTTIME=43008.920986006946",
+        ";$COLUMNS=O,T,I,d,L,D",
+    )
+    frame = "      1.000 DT     0625 Rx 2  22 03"
+    damaged = ("      2.000 DZ     0625 Rx 2  22 03", "      3.000 DT     0625 R", "      4.000")
+    (tmp_path / "trace.trc").write_text("\n".join([*head, frame, *damaged, "      5.000 EC", frame]))
+    assert [one.line for one in read_log(tmp_path / "trace.trc")] == [0, 5, 6, 7, 0]
 
 
 def test_lines_about_other_things_are_not_told(tmp_path: Path) -> None:
@@ -230,8 +251,14 @@ def test_lines_about_other_things_are_not_told(tmp_path: Path) -> None:
     )
     (tmp_path / "trace.asc").write_text("\n".join([*ASC.splitlines()[:4], *about]))
     assert [one.frame for one in read_log(tmp_path / "trace.asc")] == [FRAMES[0]]
-    status = "     2)         2.0  Warng      FFFFFFFF  4  00 00 00 08 BUSHEAVY"
-    (tmp_path / "trace.trc").write_text("\n".join([*TRC.splitlines()[:3], status, ";   a comment"]))
+    status = (
+        "     2)         2.0  Warng      FFFFFFFF  4  00 00 00 08 BUSHEAVY",
+        "     3)         3.0  1  Error  0123  4  00 00 00 08",
+        "     4          4.0  ST 1      -    Rx -  4    00 00 00 00",
+        "     5          5.0  EV",
+        ";   a comment",
+    )
+    (tmp_path / "trace.trc").write_text("\n".join([*TRC.splitlines()[:3], *status]))
     assert [one.frame for one in read_log(tmp_path / "trace.trc")] == [FRAMES[0]]
 
 

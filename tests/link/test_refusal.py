@@ -36,7 +36,7 @@ def test_a_machine_without_ports_says_so() -> None:
 def test_what_is_no_port_comes_with_those_that_are_ports(port: str, device: str, says: str) -> None:
     error = no_port(port, [PLAIN], device)
     assert (error.summary, error.expected) == (says, "one of /dev/ttyS0")
-    assert error.advice == "`motorbus ports` lists what there is; nothing was opened"
+    assert error.advice == "`motorbus ports` lists what there is; nothing was sent"
 
 
 def test_a_symbolic_link_that_leads_nowhere_is_recognised(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 Time and bytes come in, bytes and results go out. Tickets wait in four queues by rank; `send` picks the next that
 may go, `feed` takes what arrived, `due` says when to look again. One exchange flies per lane, as many lanes as the
-family's window allows. Every deadline is fixed when the request leaves and no arriving byte extends it.
+family's window allows. Every deadline is fixed when the request leaves; `air` says the one thing that extends it.
 
 The pumps hold `lock` around every call. An interrupt at any line leaves the state usable: a node is tainted before
 anything else happens to it, a flight keeps its deadline, and what is half done is done again or times out.

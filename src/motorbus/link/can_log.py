@@ -28,10 +28,13 @@ _LIKE_A_FRAME: Final = {
     ".asc": re.compile(
         r"(?!.*J1939TP)(\d+\.\d+(\s+\d+(\s+[0-9A-F]+x?(\s|$)|$)|$)|\S+\s+\d+\s+\S+\s+(Rx|Tx)\b)", re.I
     ),
-    ".trc": re.compile(r"(?!.*\s(Warng|Error|FFFFFFFF|ST|EC|ER|EV)\s)\d+(\)$|\)?\s+\d)"),
+    ".trc": re.compile(
+        r"(?!.*\sFFFFFFFF\s)(?!\d+\)?\s+\S+\s+(\d+\s+)?(Warng|Error|ST|EC|ER|EV)(\s|$))"
+        r"(?!\d+\.\d+\s+(ST|EC|ER|EV)(\s|$))(\d+(\)$|\)?\s+\d)|\d+\.\d+(\s|$))"
+    ),
 }
 """By ending: what begins as a frame does, by a time, a channel and an identifier or so much of that as there is, or by
-a number and a time, without the word of a status; or has a direction in its place."""
+a number and a time, without the word of a status behind them; or has a direction in its place."""
 _BY_PYTHON_CAN: Final = (".asc", ".blf", ".trc")
 _TEXT: Final = (".log", ".txt", ".candump", "")
 _HIGHEST: Final = {3: 0x7FF, 8: 0x1FFFFFFF}

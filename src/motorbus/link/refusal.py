@@ -44,7 +44,7 @@ def no_port(port: str, others: Sequence[PortInfo], device: str = "") -> PortNotF
     return PortNotFound(
         f"{port}{device and f': {device}'} is not a serial port",
         expected=_one_of(others),
-        advice="`motorbus ports` lists what there is; nothing was opened",
+        advice="`motorbus ports` lists what there is; nothing was sent",
     )
 
 

@@ -22,8 +22,8 @@ from motorbus.simulation.faulted import Faulted, read_order
 from motorbus.simulation.told import told
 
 LONGEST_LINE = 1 << 16
-TOO_LONG = f"error: an order has at most {LONGEST_LINE} bytes; nothing has changed\n".encode()
 """Bytes of an order; a long script is the longest."""
+TOO_LONG = f"error: an order has at most {LONGEST_LINE} bytes; nothing has changed\n".encode()
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
 FAULTS = "motorbus.simulator-faults/1"
