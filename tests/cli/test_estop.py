@@ -103,11 +103,13 @@ def test_a_program_whose_event_loop_hangs_is_stopped(served: Simulated, run: Run
 
 
 def test_who_was_named_but_is_unknown_to_the_owner_is_silent(served: Simulated, run: Run) -> None:
-    with program(HANGING, served.bus):
+    with program(HANGING, served.bus) as process:
         ran = run("estop", f"{served.bus}#3+9", "--json")
     assert ran.code == 6
     (stop,) = ran.document["buses"]
     assert (stop["outcome"], stop["silent"]) == ("acknowledged by some", [9])
+    assert re.search(rf"process {process.pid} \(.*\) does not know #9, so it asked for no", stop["note"])
+    assert f"no acknowledgement from #9 ({stop['note']})" in ran.err
 
 
 def test_a_move_that_is_stopped_says_so(served: Simulated, run: Run) -> None:

@@ -192,6 +192,9 @@ def test_goals_are_read_in_the_unit_of_their_axis(bench: Bench) -> None:
         ("teach a1 --output w.csv --seconds 0", "--seconds 0: not above 0"),
         ("follow a1 a2 --seconds 0", "--seconds 0: not above 0"),
         ("loop-stats a1 --seconds 0", "--seconds 0: not above 0"),
+        ("move a1=1deg --duration nan", "--duration: time 'nan' is not a number"),
+        ("jog a1=1deg/s --seconds x", "--seconds: time 'x' is not a number"),
+        ("teach a1 --output w.csv --seconds inf", "--seconds: time 'inf' is not a number"),
     ],
 )
 def test_what_is_no_figure_names_its_axis_or_flag_and_a_fix(
@@ -204,3 +207,13 @@ def test_what_is_no_figure_names_its_axis_or_flag_and_a_fix(
     assert told["expected"]
     assert told["advice"].endswith("nothing was sent")
     assert says.startswith("a1") or told["advice"] != "nothing was sent"
+
+
+@pytest.mark.parametrize(
+    "words", ["teach a1 --output w.csv", "follow a1 a2", "loop-stats a1", "jog a1=1deg/s"]
+)
+def test_a_time_that_is_empty_is_none(words: str, bench: Bench, run: Run) -> None:
+    """A script whose variable is not set must not let anybody follow without an end."""
+    ran = run(*words.split(), "--seconds", "")
+    assert ran.code == 2
+    assert ran.err.startswith("error: --seconds: time '' is empty")

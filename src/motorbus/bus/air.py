@@ -1,10 +1,9 @@
 """What is in the air: exchanges under way, what comes in for them, and when each is settled.
 
-Every deadline is fixed when the request leaves and no arriving byte extends it; only where a whole reply is there, what
-may trail behind it is waited for once, for three byte times and the latency of the adapter at most. It allows for what
-flies on other lanes, which share the wire: those that flew before, and as many after it as the window lets fly. A reply
-counts only if its key and its exact length are due, nothing trails behind it, and its node may be believed. Turns
-builds on this.
+Every deadline is fixed when the request leaves and no arriving byte extends it; only behind a whole reply, what may
+trail it is waited for once, for three byte times and the latency of the adapter at most. It allows for what flies on
+other lanes, which share the wire: those that flew before, and as many after it as the window lets fly. A reply counts
+only if its key and its exact length are due, nothing trails it, and its node may be believed. Turns builds on this.
 """
 
 from __future__ import annotations

@@ -170,7 +170,10 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
         return _stop_ourselves(wanted, options, output)
     unheard = {*outcome.silent, *wanted.nodes} - {*outcome.acknowledged}
     by = f"process {owner.pid} ({owner.program})" if owner else "its owner"
+    unknown = sorted(unheard - {*outcome.silent})
     note = "" if wanted.nodes else "only devices that that process knows can acknowledge"
+    if unknown:
+        note = f"{by} does not know {_list(unknown)}, so it asked for no acknowledgement"
     return _facts(wanted.bus, by, outcome._replace(silent=tuple(sorted(unheard))), note)
 
 
@@ -345,7 +348,7 @@ def _verdict(
     lost = beside_others(list(unclear.values()))
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
     missing = [one for one in stops if not one["error"] and (one["silent"] or not one["acknowledged"])]
-    silent = [f"{one['bus']}: no acknowledgement from {_list(one['silent'], 'anybody')}" for one in missing]
+    silent = [f"{one['bus']}: {_missing(one)}" for one in missing]
     told = "; ".join([*failed, *silent, *(error.summary for error in lost)])
     if failed and len(failed) == len(stops):
         raise _all_failed(failures, told)
@@ -355,6 +358,11 @@ def _verdict(
         by_hand = [BY_HAND] if failed or silent else []
         raise Partial(told, advice="; ".join(dict.fromkeys([*by_hand, *(error.advice for error in lost)])))
     return Exit.OK
+
+
+def _missing(one: Mapping[str, Any]) -> str:
+    why = f" ({one['note']})" if one["silent"] and one["note"] else ""
+    return f"no acknowledgement from {_list(one['silent'], 'anybody')}{why}"
 
 
 def _all_failed(failures: list[MotorbusError], told: str) -> MotorbusError:

@@ -11,10 +11,9 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.moving import consent_to_far
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate, check_seconds
+from motorbus.cli.rates import check_rate, time_of
 from motorbus.cli.robot import place, robot
 from motorbus.cli.teach import counted
-from motorbus.core import units
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def follow(
     follower: Annotated[str, Parameter(name="FOLLOWER")],
     /,
     *,
-    seconds: str = "",
+    seconds: str | None = None,
     rate: float = 100.0,
     clamp: Flag = False,
     yes: Flag = False,
@@ -82,7 +81,7 @@ def follow(
         Any option of the buses, as a flag.
     """
     pairs = _pairs(leader, follower)
-    span = _span(seconds)
+    span = None if seconds is None else time_of(seconds)
     check_rate(rate)
     with robot([*pairs, *pairs.values()], options, output) as hand:
         _judge(hand, pairs, rate)
@@ -98,13 +97,6 @@ def follow(
             followed = hand.robot.follow(pairs, seconds=span, rate=rate, until=until, policy=policy)
     _tell(followed, output)
     return Exit.OK
-
-
-def _span(seconds: str) -> float | None:
-    """How long (s), None without an end. Raises RequestError for no time above 0."""
-    span = units.parse(seconds, "time") if seconds else None
-    check_seconds(span)
-    return span
 
 
 def _pairs(leader: str, follower: str) -> dict[str, str]:

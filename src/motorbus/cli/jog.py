@@ -13,7 +13,7 @@ from motorbus.cli.machine import axes_named, is_name, machine
 from motorbus.cli.moving import FAR_LINEAR, Goal, absolute, inside
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
-from motorbus.cli.rates import check_seconds
+from motorbus.cli.rates import time_of
 from motorbus.cli.robot import able, place, rehearse, robot
 from motorbus.cli.target import device, offers, opened
 from motorbus.core import units
@@ -83,14 +83,15 @@ def jog(
         raise RequestError(
             f"{device_}: how fast?", expected="BUS#ID=VELOCITY, as stepper:/dev/ttyUSB0#1=60rpm"
         )
+    span = time_of(seconds, advice="say for how long; the sign of the velocity is the direction")
     if is_name(where):
-        how = _How(units.parse(seconds, "time"), "clamp" if clamp else "reject")
+        how = _How(span, "clamp" if clamp else "reject")
         return _axis(where, speed, how, options, output, yes=yes, dry_run=dry_run)
     if clamp:
         raise _nothing_to_clamp()
     bus, family, (node,) = device(where)
     offers(family, "jog")
-    velocity, span = units.parse(speed, "velocity"), units.parse(seconds, "time")
+    velocity = units.parse(speed, "velocity")
     way = abs(velocity * span)
     question = f"turn #{node} by {units.show(way, 'position')}" if way > FAR and not yes else ""
     with opened(bus, options, output) as opening:
@@ -128,7 +129,6 @@ def _axis(
         raise RequestError(f"{word} is several axes", expected="one axis", advice="nothing was sent")
     spec, span = machine().axes[name], how.span
     velocity = _velocity(name, speed)
-    check_seconds(span, "say for how long; the sign of the velocity is the direction")
     far, way = FAR_LINEAR if spec.linear else FAR, abs(velocity * span)
     with robot([name], options, output) as hand:
         verb = able(hand, name, "jog")

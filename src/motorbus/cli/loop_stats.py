@@ -10,9 +10,8 @@ from motorbus.cli.ending import asked_to_end
 from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_named
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate, check_seconds
+from motorbus.cli.rates import check_rate, time_of
 from motorbus.cli.robot import rehearse, robot
-from motorbus.core import units
 from motorbus.core.operation import Progress
 from motorbus.errors import RequestError
 
@@ -80,10 +79,9 @@ def loop_stats(
     options
         Any option of the buses, as a flag.
     """
-    axes, span = axes_named(names), units.parse(seconds, "time")
+    axes, span = axes_named(names), time_of(seconds, advice="leave it out for 5 s")
     if rate is not None:
         check_rate(rate)
-    check_seconds(span, "leave it out for 5 s")
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",

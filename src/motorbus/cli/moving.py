@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from motorbus.cli.consent import consent_to
 from motorbus.cli.machine import axes_named, is_name, machine
+from motorbus.cli.rates import time_of
 from motorbus.cli.robot import InHand, able, place, rehearse
 from motorbus.core import units
 from motorbus.errors import NotHomed, RequestError
@@ -105,17 +106,12 @@ def once(axis: str, found: Mapping[str, object], text: str) -> None:
 
 def how_of(duration: str, kind: Kind, speed: str) -> How:
     """How they shall go, from what was typed. Raises RequestError for what is no duration and no share."""
-    seconds = units.parse(duration, "time") if duration else None
+    fastest = "leave it out to go as quickly as the limits allow"
+    seconds = time_of(duration, "--duration", fastest) if duration else None
     try:
         share = units.parse(speed, "load") if speed else 1.0
     except RequestError:
         share = 0.0
-    if seconds is not None and not seconds > 0:
-        raise RequestError(
-            f"--duration {duration}: not above 0",
-            expected="s, above 0, as 2 or 1500ms",
-            advice="leave it out to go as quickly as the limits allow; nothing was sent",
-        )
     if not 0 < share <= 1:
         raise RequestError(
             f"--speed {speed}: it is a share of the limits in the machine file",

@@ -1,8 +1,8 @@
-"""What `--rate`, `--seconds` and `--smooth` say: every command with one refuses the same figures, in the same words."""
+"""What `--rate`, `--seconds`, `--duration`, `--smooth` say: all commands refuse the same figures in the same words."""
 
 from __future__ import annotations
 
-from motorbus.core.units import GREATEST_RATE, LEAST_RATE
+from motorbus.core.units import GREATEST_RATE, LEAST_RATE, parse
 from motorbus.errors import RequestError
 
 
@@ -16,14 +16,21 @@ def check_rate(rate: float) -> None:
         )
 
 
-def check_seconds(span: float | None, advice: str = "leave it out to go on until Enter or Ctrl-C") -> None:
-    """Raise RequestError, with this advice, for a time (s) that is none; None is one left out. Nothing was sent."""
-    if span is not None and not span > 0:
+def time_of(
+    text: str, flag: str = "--seconds", advice: str = "leave it out to go on until Enter or Ctrl-C"
+) -> float:
+    """The time (s) that was typed behind a flag. Raises RequestError, with this advice, for one that is none."""
+    advice = f"{advice}; nothing was sent"
+    try:
+        span = parse(text, "time")
+    except RequestError as error:
+        error.summary, error.advice = f"{flag}: {error.summary}", advice
+        raise
+    if not span > 0:
         raise RequestError(
-            f"--seconds {span:g}: not above 0",
-            expected="s, above 0, as 10 or 1500ms",
-            advice=f"{advice}; nothing was sent",
+            f"{flag} {text}: not above 0", expected="s, above 0, as 10 or 1500ms", advice=advice
         )
+    return span
 
 
 def check_smooth(smooth: float) -> None:

@@ -14,9 +14,8 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import check_writable, usable
 from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.rates import check_rate, check_seconds, check_smooth
+from motorbus.cli.rates import check_rate, check_smooth, time_of
 from motorbus.cli.robot import place, robot
-from motorbus.core import units
 from motorbus.core.operation import Progress
 from motorbus.errors import MotorbusError
 
@@ -56,7 +55,7 @@ Examples:
 def teach(
     *names: Annotated[str, Parameter(name="NAME")],
     output_: Annotated[Path, Parameter(name="--output")],
-    seconds: str = "",
+    seconds: str | None = None,
     rate: float = 50.0,
     limp: Annotated[bool, Parameter(negative="--no-limp")] = True,
     smooth: float = 0.0,
@@ -86,8 +85,8 @@ def teach(
     options
         Any option of the buses, as a flag.
     """
-    axes, span = axes_named(names), units.parse(seconds, "time") if seconds else None
-    _check(output_, span, rate, smooth)
+    axes, span = axes_named(names), None if seconds is None else time_of(seconds)
+    _check(output_, rate, smooth)
     consent_to(f"replace {output_}", output, yes=yes or dry_run or not output_.exists())
     with robot(axes, options, output) as hand:
         if dry_run:
@@ -114,9 +113,8 @@ def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: boo
         hand.output.note("the torque goes off now, and stays off: hold what could sag")
 
 
-def _check(file: Path, span: float | None, rate: float, smooth: float) -> None:
+def _check(file: Path, rate: float, smooth: float) -> None:
     """Raise RequestError for what cannot be, before anything is let go."""
-    check_seconds(span)
     check_rate(rate)
     check_smooth(smooth)
     check_writable(file)

@@ -129,6 +129,7 @@ REFUSED: dict[str, Callable[[], bytes]] = {
     "write too much": lambda: wire.write(1, 0, bytes(254)),
     "a packet too long": lambda: wire.encode_instruction(1, 3, bytes(254)),
     "reg write without datum": lambda: wire.reg_write(1, 42, b""),
+    "reg write past the last register": lambda: wire.reg_write(1, 255, b"\x00\x00"),
     "action to 255": lambda: wire.action(255),
     "restore everyone": lambda: wire.factory_restore(254),
     "clear the turns of everyone": lambda: wire.clear_turns(254),

@@ -55,6 +55,60 @@ def test_a_short_one_is_made_up_for() -> None:
         assert held
 
 
+@pytest.mark.parametrize("axis", ["a1", "c1"])
+@pytest.mark.parametrize("share", [0.4, 0.6, 0.7, 0.8, 0.9, 0.99])
+def test_nobody_is_blamed_for_what_the_host_did_not_say(axis: str, share: float) -> None:
+    """So short a gap that the movement might go on; where an axis cannot make up for it that is why it ends."""
+    with machine(arm="1", can="0x25") as (made, _):
+        machines: list[Any] = []
+        held: list[int] = []
+        ended: list[str] = []
+
+        def hear(event: object) -> None:
+            if isinstance(event, Progress) and event.done > 500 and not held:
+                held.append(event.done)
+                for bus in machines[0].buses.values():
+                    bus.link.advance(share * HELD_UP)
+
+        with Robot.of(made, report=hear) as robot:
+            machines.append(robot)
+            try:
+                robot.move({axis: 0.8}, duration=1.6)
+            except Interrupted as told:
+                ended.append(told.cause)
+            assert all("held up" in cause for cause in ended)
+            assert share > 0.5 or not ended, "so short a gap is made up for"
+            assert not any(one.under_way for one in robot.axes.values())
+        assert held
+
+
+def test_a_host_that_is_held_up_while_an_answer_is_on_its_way_is_told_as_that() -> None:
+    with machine(arm="1") as (made, sims):
+        machines: list[Any] = []
+        held: list[float] = []
+
+        class Frozen(Doubtful):
+            """The host is held up while an answer is on its way."""
+
+            def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+                if held == [1.0] and sender is Side.DEVICE:
+                    held.append(at)
+                    machines[0].buses["arm"].link.advance(0.45)
+                return super().carry(sender, data, at)
+
+        def hear(event: object) -> None:
+            if isinstance(event, Progress) and event.done > 500 and not held:
+                held.append(1.0)
+
+        sims["arm"].line = Frozen()
+        with Robot.of(made, report=hear) as robot:
+            machines.append(robot)
+            with pytest.raises(Interrupted, match=r"told where to go for \d") as told:
+                robot.move({"a1": 0.8}, duration=1.6)
+            assert "held up" in told.value.cause
+        assert len(held) == 2
+
+
 class SomeLost(Doubtful):
     """As many answers as `left` says are lost, of those that are mute."""
 

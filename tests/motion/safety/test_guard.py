@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motorbus.core.operation import Goal
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.limits import SLOWEST
-from motorbus.motion.moving.stream import FAR, LAG
+from motorbus.motion.moving.lagging import FAR, LAG
 from motorbus.motion.safety.guard import LATE, NEAR, ROUNDED, UNIT, Bounds, Guard
 
 BOUNDS = Bounds(-1.0, 2.0, 0.5, 3.0)

@@ -235,8 +235,9 @@ def blocking_loop(
     that out.
 
     With `ahead` the loop is one cycle ahead of what it tells: while the body of the `for` is at work, the next cycle is
-    on the wire already, so the wire need not wait for the program, and a goal leaves a cycle later than it would. That
-    is for a loop near the limit of its wire, and for the axes of one serial bus.
+    on the wire already, so the wire need not wait for the program, and a goal leaves a cycle later than it would. What
+    keeps a cycle from leaving is raised in its own round: the reading before it is told first. That is for a loop near
+    the limit of its wire, and for the axes of one serial bus.
 
     Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from motorbus.errors import Interrupted, NoReply, Stalled
 from motorbus.motion.safety.canary import PROTECTIVE
@@ -11,11 +11,22 @@ from motorbus.motion.safety.canary import PROTECTIVE
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
 
+LAG: Final = 0.3
+"""s that an axis may be behind, at the highest speed of its course: slower servos need another max_velocity."""
+FAR: Final = 0.1
+"""rad of the device that an axis may be off where it should be, whatever its speed."""
+
+
+def allowed(axis: AxisVerbs, speed: float) -> float:
+    """How far an axis may be from where it should be (rad, m); `max_step` bounds that too."""
+    most = max(FAR / abs(axis.spec.ratio), LAG * speed)
+    return most if axis.spec.max_step is None else min(most, axis.spec.max_step)
+
 
 def behind(
-    axis: AxisVerbs, goal: float, present: float, allowed: float, alarms: Collection[str] = ()
+    axis: AxisVerbs, goal: float, present: float, most: float, alarms: Collection[str] = ()
 ) -> Stalled:
-    """The error for an axis that is farther from where it should be by now than is `allowed` (all rad, m).
+    """The error for an axis that is more than `most` from where it should be by now (all rad, m).
 
     `alarms` are those of its device.
     """
@@ -23,7 +34,7 @@ def behind(
     where = f"it is at {spec.show(present)}, and should be at {spec.show(goal)} by now"
     return Stalled(
         f"{axis.name} does not follow: {where}{_told(alarms)}",
-        expected=f"within {spec.show(allowed)} of where it should be",
+        expected=f"within {spec.show(most)} of where it should be",
         cause=_cause(
             alarms, "something blocks it, the load is too heavy, or it is slower than max_velocity says"
         ),

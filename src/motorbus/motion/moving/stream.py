@@ -18,17 +18,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from motorbus.bus.face import BusFace
 from motorbus.core.family import Positions, Train
 from motorbus.core.operation import Operation, Pause, Progress, Report, Together
-from motorbus.errors import (
-    Interrupted,
-    LimitExceeded,
-    MotorbusError,
-    RequestError,
-    Stalled,
-)
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.motion import limits
 from motorbus.motion.command import Command
 from motorbus.motion.moving.forgiving import forgiven
-from motorbus.motion.moving.lagging import behind, held_up, not_there, silent
+from motorbus.motion.moving.gaps import Gaps
+from motorbus.motion.moving.lagging import FAR, allowed, behind, held_up, not_there, silent
 from motorbus.motion.moving.moved import STILL, Cycles, Track
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.safety.watch import Watch
@@ -47,10 +42,6 @@ SETTLE: Final = 1.0
 """s after the end of the course within which an axis must be in position."""
 HELD_UP: Final = 0.5
 """s between two goals after which nobody is led on: the next one would be far ahead of where the axes stopped."""
-LAG: Final = 0.3
-"""s that an axis may be behind, at the highest speed of its course: slower servos need another max_velocity."""
-FAR: Final = 0.1
-"""rad of the device that an axis may be off where it should be, whatever its speed."""
 FINEST: Final = 1e-5
 """rad of the device; no servo can be told less."""
 SILENCE: Final = 0.3
@@ -177,7 +168,7 @@ class Stream:
         self._train: Final = train
         self._course: Final = course
         self._grid: Final = Grid.over(course.duration, rate)
-        self._allowed: Final = {axis.name: _allowed(axis, speeds[axis.name]) for axis in axes}
+        self._allowed: Final = {axis.name: allowed(axis, speeds[axis.name]) for axis in axes}
         self._within: Final = within
         self._command: Final = command
         self._watch: Final = watch
@@ -188,6 +179,7 @@ class Stream:
             axis.name: ([], [], []) for axis in axes
         }
         self._start = self._lead = self._first = self._reported = 0.0
+        self._gaps: Final = Gaps(self._grid.period)
         self._over = False
         self._silent: dict[int, float] = {}
         self._places: dict[int, float] = {}
@@ -201,8 +193,8 @@ class Stream:
         """Lead them along the course, which begins at `start` (s on the link's clock), and see them arrive.
 
         Goals leave `lead` s before their slot. Raises Stalled for an axis that does not follow or arrive, NoReply for
-        one that is silent, Interrupted when somebody else has told one of them something or another part has failed,
-        and what the watch over them raises: Faulted, Overloaded.
+        one that is silent, Interrupted when somebody else has told one of them something, another part has failed or
+        the host was held up, and what the watch over them raises: Faulted, Overloaded.
         """
         self._start = start
         self._lead = lead
@@ -265,13 +257,17 @@ class Stream:
     def _order(self, at: float) -> Operation[None]:
         try:
             yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
-        except LimitExceeded as error:
+        except Refused as error:
             if error.reason in ("step", "velocity") and error.node in self._axes:
                 raise (yield from self._stalled(self._axes[error.node])) from error
+            if error.reason == "stale" and (gap := self._gaps.lately((yield from Pause(0)))):
+                raise held_up(gap) from error
             raise
         except Interrupted:
             if self._watch.fault is None:  # else who looks is about to raise that
                 raise
+        else:
+            self._gaps.left((yield from Pause(0)))
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -365,9 +361,12 @@ class Stream:
         _, goals, presents = self._tracks[axis.name]
         return bool(goals) and abs(goals[-1] - presents[-1]) > self._allowed[axis.name]
 
-    def _stalled(self, axis: AxisVerbs) -> Operation[Stalled]:
+    def _stalled(self, axis: AxisVerbs) -> Operation[MotorbusError]:
         """The error for one that does not follow; raises what is the matter with it, if it tells that."""
+        gap = self._gaps.lately((yield from Pause(0)))
         yield from self._watch.examine(axis)
+        if gap:
+            return held_up(gap)
         goal, present = (row[-1] for row in self._tracks[axis.name][1:])
         return behind(axis, goal, present, self._allowed[axis.name], self._watch.alarms(axis))
 
@@ -392,9 +391,3 @@ class Stream:
 
 def _track(times: Sequence[float], goals: Sequence[float], presents: Sequence[float]) -> Track:
     return Track(tuple(times), tuple(goals), tuple(presents))
-
-
-def _allowed(axis: AxisVerbs, speed: float) -> float:
-    """How far an axis may be from where it should be (rad, m); `max_step` bounds that too."""
-    most = max(FAR / abs(axis.spec.ratio), LAG * speed)
-    return most if axis.spec.max_step is None else min(most, axis.spec.max_step)

@@ -23,12 +23,12 @@ UNIT: Final = 0.08
 LATE: Final = 0.8
 """s of its greatest speed that an order without a speed may lead from where a device is measured to be.
 
-So far goals are ahead where a device is led. It may be behind by 0.3 s (`moving.stream.LAG`), its last reading was
+So far goals are ahead where a device is led. It may be behind by 0.3 s (`moving.lagging.LAG`), its last reading was
 taken one period ago, and the goal is for one period from now: 0.25 s each where goals are slowest
 (`motion.limits.SLOWEST`).
 """
 NEAR: Final = 0.1
-"""rad that it may lead besides, whatever its speed: how far one that is led may be off (`moving.stream.FAR`)."""
+"""rad that it may lead besides, whatever its speed: how far one that is led may be off (`moving.lagging.FAR`)."""
 
 PLACES: Final = ("position", "relative")
 """Quantities that lead to a place."""
