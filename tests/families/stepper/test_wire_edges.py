@@ -102,7 +102,9 @@ def test_each_number_fills_its_bytes_and_no_others(name: str, sizes: dict[str, i
     }
     request = wire.encode(name, **values)
     assert request[2:10].hex(" ").upper() == body
-    assert wire.decode_request(request).values == values
+    decoded = wire.decode_request(request)
+    assert decoded is not None
+    assert decoded.values == values
     for number, size in sizes.items():
         with pytest.raises(RequestError, match=f"{number} .* does not fit its {size} byte"):
             wire.encode(name, **{**values, number: 1 << 8 * size})
