@@ -118,6 +118,8 @@ def measured(times: int) -> report.Results:
 def printed(found: list[Row], failures: list[str]) -> int:
     """Some rows on the terminal; exit code 1 when one could not be measured."""
     print(report.as_text(report.goal_table(found)))
+    for said in (*goals.reasons(found), *goals.notes(found)):
+        print(said.replace("**", ""))
     print(goals.summary(found))
     for name, times in apart.repeated.items():
         print(f"run once more {times} times: {name}", file=sys.stderr)

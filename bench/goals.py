@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import ModuleType
 
 from bench import rows as package
 from bench.reasons import reason
-from bench.row import Row, Say, met, noted, shown, verdict
+from bench.row import Row, Say, met, shown, verdict
 
-COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs", "notes")
+COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs")
 SHORT = 1e-2
 Measure = Callable[[int, Say], list[Row]]
 
@@ -54,7 +54,6 @@ def _place(row: Row) -> tuple[int, str]:
 
 def cells(row: Row) -> tuple[str, ...]:
     """One row of the table."""
-    why = "" if met(row) else reason(row)
     return (
         row.number,
         row.measure,
@@ -65,8 +64,31 @@ def cells(row: Row) -> tuple[str, ...]:
         f"{row.least:.2f} – {row.greatest:.2f}",
         verdict(row),
         _seconds(row),
-        noted(row.note, why),
     )
+
+
+def reasons(rows: Sequence[Row]) -> list[str]:
+    """Why rows miss; it is too long for the table."""
+    return _said((row, reason(row)) for row in rows if row.goal and not met(row))
+
+
+def notes(rows: Sequence[Row]) -> list[str]:
+    """What was measured besides, and belongs to a row."""
+    return _said((row, row.note) for row in rows)
+
+
+def _said(texts: Iterable[tuple[Row, str]]) -> list[str]:
+    """Each text behind the rows that it is about; what is the same of several is said once."""
+    about: dict[str, list[str]] = {}
+    for row, text in texts:
+        if text:
+            about.setdefault(text, []).append(_called(row))
+    return [f"{'; '.join(names)}: {text}." for text, names in about.items()]
+
+
+def _called(row: Row) -> str:
+    against = "" if row.peer == "-" else f" / {row.peer}"
+    return f"**{row.number} {row.measure}{against}**"
 
 
 def _seconds(row: Row) -> str:

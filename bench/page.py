@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bench import can_report, estimates, estop, goals, growth, robot_loop, stepper_line
 from bench.report import (
     OURS,
@@ -69,15 +71,15 @@ theirs by ours where it is to be at least so much. What is measured in one threa
 takes two processes by 25 %, for the machine is shared; a share of the wire limit, a cycle rate, a count, a time in ms
 and real time may not. Of the rows 4 to 7 and 12 one that misses is measured once more, and the second time counts. The
 *best* other library of a workload is the one in Python that needs least in the same run, and in row 10 in the same
-round. A row that misses says why; one without a goal is told beside the one that is judged. *In one burst* and
-*in pieces* say how an adapter hands over the answers of several servos: all at once when the last byte has passed, or
-each packet as it has.
+round. A row that misses says why, below the table; one without a goal is told beside the one that is judged. *In one
+burst* and *in pieces* say how an adapter hands over the answers of several servos: all at once when the last byte has
+passed, or each packet as it has.
 
 ![Every figure beside its goal](images/performance-goals.png)
 
 {table}
 
-{failures}"""
+{reasons}{notes}{failures}"""
 
 _GROWTH = """## Growth with the number of servos
 
@@ -128,7 +130,15 @@ def _goals(results: Results) -> str:
     if not results.rows:
         return failures
     table = as_markdown(goal_table(results.rows))
-    return _GOALS.format(summary=goals.summary(results.rows), table=table, failures=failures)
+    said = {
+        "reasons": _list("Why rows miss", goals.reasons(results.rows)),
+        "notes": _list("Measured besides", goals.notes(results.rows)),
+    }
+    return _GOALS.format(summary=goals.summary(results.rows), table=table, failures=failures, **said)
+
+
+def _list(head: str, texts: Sequence[str]) -> str:
+    return f"### {head}\n\n" + "".join(f"- {text}\n" for text in texts) + "\n" if texts else ""
 
 
 def _growth(results: Results) -> str:
