@@ -11,7 +11,7 @@ from bench import rows as package
 from bench.reasons import reason
 from bench.row import Row, Say, met, shown, verdict
 
-COLUMNS = ("#", "measure", "against", "goal", "stretch", "figure", "min – max", "", "ours / theirs")
+COLUMNS = ("measure", "against", "goal, stretch", "figure, min – max", "", "ours / theirs")
 SHORT = 1e-2
 Measure = Callable[[int, Say], list[Row]]
 
@@ -55,13 +55,10 @@ def _place(row: Row) -> tuple[int, str]:
 def cells(row: Row) -> tuple[str, ...]:
     """One row of the table."""
     return (
-        row.number,
-        row.measure,
+        f"{row.number}: {row.measure}",
         row.peer,
-        row.goal,
-        row.stretch,
-        shown(row.value, row.unit),
-        f"{row.least:.2f} – {row.greatest:.2f}",
+        ", ".join(one for one in (row.goal, row.stretch) if one),
+        f"{shown(row.value, row.unit)}, {row.least:.2f} – {row.greatest:.2f}",
         verdict(row),
         _seconds(row),
     )
@@ -88,7 +85,7 @@ def _said(texts: Iterable[tuple[Row, str]]) -> list[str]:
 
 def _called(row: Row) -> str:
     against = "" if row.peer == "-" else f" / {row.peer}"
-    return f"**{row.number} {row.measure}{against}**"
+    return f"**{row.number}: {row.measure}{against}**"
 
 
 def _seconds(row: Row) -> str:

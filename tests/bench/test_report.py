@@ -75,7 +75,7 @@ def test_the_page_begins_with_the_goals_and_shows_the_pictures() -> None:
     point = Point(MEMORY, "motorbus", 253, Spread(1e-4, 9e-5, 2e-4))
     text = page(RESULTS._replace(rows=[row], growth=[point], failures=["rows of x: why"]))
     assert text.index("## Goals") < text.index("## On a pseudo-terminal") < text.index("## Growth")
-    assert "| 4 | something | somebody | <= 0.8 | <= 0.65 | 0.70 | 0.60 – 0.90 | met |" in text
+    assert "| 4: something | somebody | <= 0.8, <= 0.65 | 0.70, 0.60 – 0.90 | met |" in text
     assert "1 of 1 goals are met." in text
     assert "Not measured: rows of x: why." in text
     assert "| in process | motorbus | 253 | 100.0 | 90.0 – 200.0 |" in text

@@ -219,3 +219,19 @@ def test_a_caller_waits_as_long_as_the_stop_of_many_silent_servos_lasts() -> Non
     begun = bus.link.now()
     assert len(bus.estop().silent) == 30
     assert bus.link.now() - begun < stop.PATIENCE
+
+
+def test_five_may_wait_while_the_thread_is_at_work(tmp_path: Path) -> None:
+    """Nobody answers them here. A sixth is refused by Linux, and so are those of a flood."""
+    with contextlib.ExitStack() as kept, stop._listening(tmp_path / "stop", lambda: None) as listener:
+        assert listener is not None
+
+        def connects() -> bool:
+            client = kept.enter_context(socket.socket(socket.AF_UNIX))
+            client.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                client.connect(str(tmp_path / "stop"))
+                return True
+            return False
+
+        assert [connects() for _ in range(6)] == [True] * 5 + [False]
