@@ -98,8 +98,10 @@ def test_what_misses_says_so_on_the_page_with_its_reason_and_what_is_met_does_no
     nothing = Results(machine, 7, [], [], None, [], [])
     lines = page(nothing._replace(rows=missed)).splitlines()
     for row in missed:
-        (line,) = [one for one in lines if one.startswith(f"| {row.number} | {row.measure} | {row.peer} |")]
+        (line,) = [one for one in lines if one.startswith(f"| {row.number}: {row.measure} | {row.peer} |")]
         assert "MISSED" in line
-        assert reason(row) in line
+        against = "" if row.peer == "-" else f" / {row.peer}"
+        (why,) = [one for one in lines if one.endswith(f": {reason(row)}.")]
+        assert f"**{row.number}: {row.measure}{against}**" in why
     met = missed[0]._replace(value=0.0)
     assert reason(met) not in page(nothing._replace(rows=[met]))
