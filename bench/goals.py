@@ -9,7 +9,7 @@ from types import ModuleType
 
 from bench import rows as package
 from bench.reasons import reason
-from bench.row import Row, Say, met, shown, verdict
+from bench.row import Row, Say, called, met, shown, verdict
 
 COLUMNS = ("measure", "against", "goal, stretch", "figure, min – max", "", "ours / theirs")
 SHORT = 1e-2
@@ -79,13 +79,8 @@ def _said(texts: Iterable[tuple[Row, str]]) -> list[str]:
     about: dict[str, list[str]] = {}
     for row, text in texts:
         if text:
-            about.setdefault(text, []).append(_called(row))
+            about.setdefault(text, []).append(f"**{called(row)}**")
     return [f"{'; '.join(names)}: {text}." for text, names in about.items()]
-
-
-def _called(row: Row) -> str:
-    against = "" if row.peer == "-" else f" / {row.peer}"
-    return f"**{row.number}: {row.measure}{against}**"
 
 
 def _seconds(row: Row) -> str:

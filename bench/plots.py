@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.growth import MEMORY, WIRE, Point
-from bench.row import Row, limit, met, shown
+from bench.row import Row, called, limit, met, shown
 
 INK, FAINT, GRID = "#24292f", "#8c959f", "#e6e9ec"
 MET, MISSED = "#0072b2", "#d55e00"
@@ -91,8 +91,7 @@ def _factor(value: float, goal: str) -> float:
 
 
 def _label(row: Row) -> str:
-    against = "" if row.peer == "-" else f" / {row.peer}"
-    return f"{row.number}  {row.measure}{against}: {shown(row.value, row.unit)}"
+    return f"{called(row)}: {shown(row.value, row.unit)}"
 
 
 def _sheet(width: float, height: float, columns: int) -> tuple[Any, Sequence[Any]]:

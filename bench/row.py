@@ -100,6 +100,12 @@ def shown(value: float, unit: str) -> str:
     return f"{value:.{digits}f}" if unit in ("x", "") else f"{value:.{digits}f} {unit}"
 
 
+def called(row: Row) -> str:
+    """What it is, and by whose figure it is judged if by anybody's, as `4: cycle / rustypot`."""
+    against = "" if row.peer == "-" else f" / {row.peer}"
+    return f"{row.number}: {row.measure}{against}"
+
+
 def noted(*notes: str) -> str:
     """Several notes as one."""
     return "; ".join(note for note in notes if note)
