@@ -41,7 +41,7 @@ TURNAROUND = 100e-6
 SERVOS, NODES = range(1, 254), range(1, 128)
 _GOAL, _POSITION = 42, 56
 _READ, _TARGET = 0x6002, 0x6003
-_PATIENCE = 2.0
+_PATIENCE = 10.0
 
 
 class Filled(NamedTuple):
@@ -87,13 +87,16 @@ def exchanges(random: Random) -> list[Exchange]:
 
 
 def serial(seconds: float, seed: int = 1) -> Filled:
-    """253 FEETECH servos at 1 Mbit/s for so long. Raises Lost, and MotorbusError when they do not start."""
+    """253 FEETECH servos at 1 Mbit/s for so long, and until 251 of them have told their position.
+
+    Raises Lost, and MotorbusError when they do not start.
+    """
     random = Random(seed)
     turns = cycle([one for _ in range(10) for one in exchanges(random)])
     with _simulated("feetech", "1-253", {}) as (port, pid):
         late: list[float] = []
         used, began, carried = processor_time(pid), time.monotonic(), 0
-        while time.monotonic() < began + seconds:
+        while not late or time.monotonic() < began + seconds:
             one = next(turns)
             late += _late(port, one)
             carried += len(one.request) + sum(one.answers)
@@ -128,7 +131,10 @@ def frames(random: Random) -> Iterator[CanFrame]:
 
 
 def can(seconds: float, seed: int = 1) -> Filled:
-    """127 KST nodes at 1 Mbit/s for so long, over slcan. Raises Lost, and MotorbusError when they do not start."""
+    """127 KST nodes at 1 Mbit/s for so long, over slcan, and until each was asked.
+
+    Raises Lost, and MotorbusError when they do not start.
+    """
     rate = str(RATE)
     with _simulated("kst", "1-127", {"bit-rate": rate, "bitrate": rate}) as (port, pid):
         os.write(port, b"S8\rO\r")
@@ -150,8 +156,8 @@ def _flooded(port: int, requests: Iterator[CanFrame], until: float) -> tuple[Log
     sent: Log = []
     heard: Log = []
     half = b""
-    while time.monotonic() < until or len(heard) < len(sent):
-        if time.monotonic() < until and len(sent) - len(heard) < WINDOW:
+    while (filling := time.monotonic() < until or len(sent) < len(NODES)) or len(heard) < len(sent):
+        if filling and len(sent) - len(heard) < WINDOW:
             batch = [next(requests) for _ in range(WINDOW - len(sent) + len(heard))]
             os.write(port, b"".join(b"t%03X8%b\r" % (one.id, one.data.hex().encode()) for one in batch))
             sent += [(time.monotonic(), one) for one in batch]
