@@ -23,7 +23,7 @@ from motorbus.families.feetech import wire
 BAUD = 1_000_000
 GOAL, PRESENT, SIZE = 42, 56, 2
 BITS = 10
-PATIENCE = 0.05
+PATIENCE = 10.0
 
 
 class Bare(NamedTuple):

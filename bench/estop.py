@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -27,6 +28,8 @@ from motorbus.cli.simulated import Simulated
 
 STOPS = 1000
 MOST = 0.050
+LATEST = 30.0
+"""s after the last one was asked for, in which whoever listens may still write it down."""
 SHARE = 0.999
 BUSES = {"arm": "feetech", "stage": "stepper", "noisy": "feetech"}
 """Those on which somebody listens; the blocked one takes nothing that could be timed."""
@@ -62,7 +65,20 @@ def samples(stops: int, progress: Callable[[str], None]) -> list[Sample]:
                 asked.append(float(line))
                 if number % 100 == 0:
                     progress(f"emergency stop {number} of {stops}")
+        for bus in BUSES:
+            _await(place / f"{bus}.heard", asked[-1])
         return [one for bus in BUSES for one in _matched(bus, asked, place / f"{bus}.heard")]
+
+
+def _await(heard: Path, last: float) -> None:
+    """Until a stop arrived that was asked for then, or nobody can be so late: whoever listens has no processor yet."""
+    until = time.monotonic() + LATEST
+    while _arrived(heard)[-1] < last and time.monotonic() < until:
+        time.sleep(0.01)
+
+
+def _arrived(heard: Path) -> list[float]:
+    return [0.0, *map(float, heard.read_text(encoding="ascii").split())]
 
 
 def _matched(bus: str, asked: Sequence[float], heard: Path) -> Iterator[Sample]:
@@ -70,7 +86,7 @@ def _matched(bus: str, asked: Sequence[float], heard: Path) -> Iterator[Sample]:
 
     Raises Wrong where none came any more.
     """
-    arrived = [float(line) for line in heard.read_text(encoding="ascii").split()]
+    arrived = _arrived(heard)
     for number, begun in enumerate(asked):
         first = next((at for at in arrived if at >= begun), None)
         if first is None:

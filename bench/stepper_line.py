@@ -22,6 +22,8 @@ from motorbus.families.stepper import Controller, Program
 from motorbus.families.stepper.table import Project, Step, with_steps
 
 WITHIN = 0.15
+LATENCY = "1s"
+"""What an answer may take longer when the machine has other work; no answer comes later because of it."""
 BYTE = 10 / 9600
 COMMAND, DUMP = 17, 237
 """Bytes of a command and its acknowledgement, and of a dump and the request for it."""
@@ -58,7 +60,7 @@ def samples(times: int, progress: Callable[[str], None]) -> list[Sample]:
         with (
             tempfile.TemporaryDirectory() as folder,
             Simulated("stepper", link=Path(folder) / "bus", pace=True) as simulated,
-            motorbus.open(simulated.bus) as bus,
+            motorbus.open(f"{simulated.bus},latency={LATENCY}") as bus,
         ):
             one = Controller(bus)
             found += [_written(one, TEN_STEPS, 10), _written(one, ONE_NUMBER, 11), _copied(one)]

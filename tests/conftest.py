@@ -14,6 +14,7 @@ from typing import Protocol
 import pytest
 from hypothesis import settings
 
+from motorbus.link import adapters
 from scripts import soaked
 
 HERE = Path(__file__).parent
@@ -115,6 +116,12 @@ class Figures(Protocol):
     def __call__(
         self, what: str, *, family: str = "", promise: int = 0, **figures: int | float | str
     ) -> None: ...
+
+
+@pytest.fixture
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever answers in a process of its own may wait for a processor; costs nothing where all answer undisturbed."""
+    monkeypatch.setattr(adapters, "TERMINAL_LATENCY", 1.0)
 
 
 @pytest.fixture

@@ -6,11 +6,14 @@ import os
 from select import select
 from time import monotonic
 
+import pytest
+
 from bench import memory
 from bench.responder import Responder, build, responder
 from bench.workloads import IDS, block
 
 TURNAROUND = 0.004
+TRIES = 10
 
 
 def asked(wire: Responder, request: bytes, due: int, patience: float = 10.0) -> bytes:
@@ -58,11 +61,14 @@ def test_only_every_so_manieth_servo_is_there() -> None:
 def test_an_answer_is_handed_over_whole_or_packet_by_packet_as_it_has_passed() -> None:
     request = memory.packet(254, memory.SYNC_READ, bytes((memory.POSITION, 2, *IDS)))
     expected = [memory.packet(node, 0, block(node, 0)[:2]) for node in IDS]
-    slow = 2000  # bit/s: 40 ms for each packet, longer than anybody is held up
+    slow = 2000  # bit/s: 40 ms for each packet
     with responder(build(), slow) as wire:
         assert looks(wire, request, 8 * len(IDS)) == [b"".join(expected)]
-    with responder(build(), slow, pieces=True) as wire:
-        came = looks(wire, request, 8 * len(IDS))
-    assert b"".join(came) == b"".join(expected)
-    assert len(came) > 1
-    assert all(len(one) % 8 == 0 for one in came)
+    for _ in range(TRIES):
+        with responder(build(), slow, pieces=True) as wire:
+            came = looks(wire, request, 8 * len(IDS))
+        assert b"".join(came) == b"".join(expected)
+        assert all(len(one) % 8 == 0 for one in came)
+        if len(came) > 1:
+            return
+    pytest.fail("it came whole each time, or this process never had a processor in the meantime")

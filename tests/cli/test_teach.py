@@ -105,7 +105,9 @@ def test_what_cannot_be_kept_is_said_beside_the_error(
 def test_what_was_recorded_until_the_bus_died_is_kept(tmp_path: Path, state_folder: Path) -> None:
     file, wave = tmp_path / "motorbus.toml", tmp_path / "wave.csv"
     with Simulated("feetech", ids="1-2", link=tmp_path / "bus") as served:
-        file.write_text(described({"arm": served.bus}, "1-2", "", False, {}, {}), encoding="utf-8")
+        file.write_text(
+            described({"arm": f"{served.bus},latency=1s"}, "1-2", "", False, {}, {}), encoding="utf-8"
+        )
         words = ["--machine", str(file), "teach", "arm", "--output", str(wave), "-vv"]
         command = [sys.executable, "-m", "motorbus.cli", *words]
         pipe = subprocess.PIPE

@@ -16,7 +16,7 @@ class Client:
     """The calls of its STS3215 controller under names that both clients share; angles are its own radians."""
 
     def __init__(self, port: str) -> None:
-        self.controller = rustypot.Sts3215PyController(port, 1_000_000, 0.5)
+        self.controller = rustypot.Sts3215PyController(port, 1_000_000, 3.0)
 
     def ping(self, node: int) -> bool:
         return bool(self.controller.ping(node))

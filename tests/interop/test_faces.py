@@ -107,6 +107,7 @@ def test_the_same_verbs_say_and_send_the_same(
     by: str,
     face: Any,
     tmp_path: Path,
+    unhurried: None,
     monkeypatch: pytest.MonkeyPatch,
     reference: tuple[list[object], list[bytes]],
 ) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
+from motorbus.link import can_slcan
 from motorbus.link.pty import PtyMaster
 
 
@@ -27,6 +28,13 @@ def no_can_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(can.util, "CONFIG_FILES", [])
     for name in [name for name in os.environ if name.startswith("CAN_")]:
         monkeypatch.delenv(name)
+
+
+@pytest.fixture
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine under load must not pass for a mute adapter."""
+    monkeypatch.setattr(can_slcan, "LISTENING", 10.0)
+    monkeypatch.setattr(can_slcan, "PATIENCE", 10.0)
 
 
 @pytest.fixture

@@ -177,6 +177,7 @@ def test_the_rate_is_changed(transport: str) -> None:
         link.close()
 
 
+@pytest.mark.usefixtures("patience")
 @pytest.mark.parametrize("transport", ["slcan on a terminal", "virtual"])
 def test_it_is_opened_to_listen_only(transport: str) -> None:
     with TRANSPORTS[transport]() as peer:

@@ -64,6 +64,7 @@ def test_s7_means_two_things_so_neither_is_used(rate: int) -> None:
     assert (peer.heard, peer.adapter.open) == ([], False)
 
 
+@pytest.mark.usefixtures("patience")
 def test_what_the_advice_says_works() -> None:
     with on_terminal() as peer:
         link = open_can(peer, **BITS)

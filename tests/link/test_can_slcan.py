@@ -17,12 +17,7 @@ from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
 from tests.link.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
 
-
-@pytest.fixture(autouse=True)
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine under load must not pass for a mute adapter."""
-    monkeypatch.setattr(can_slcan, "LISTENING", 10.0)
-    monkeypatch.setattr(can_slcan, "PATIENCE", 10.0)
+pytestmark = pytest.mark.usefixtures("patience")
 
 
 class Cramped:

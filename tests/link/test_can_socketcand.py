@@ -76,7 +76,7 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
     monkeypatch: pytest.MonkeyPatch, words: tuple[bytes, ...]
 ) -> None:
     """It has greeted who knocked; python-can would wait for it without end."""
-    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
+    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 10.0)
     with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as ends:
         scripts = iter([(b"< hi >", b"< ok >"), words])
 
@@ -85,6 +85,9 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
             for number, word in enumerate(next(scripts)):
                 if number:
                     connection.recv(256)
+                    monkeypatch.setattr(
+                        can_socketcand, "ANSWER_TIME", 0.1
+                    )  # for whoever comes after this one
                 connection.sendall(word)
             return True
 

@@ -181,12 +181,14 @@ def is_locked(bus: Bus) -> bool:
     )
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_two_terminals_at_once(terminals: Terminals) -> None:
     for number in range(1, 7):
         work = {"a": own_id(number), "b": own_id(7 - number)}
         assert terminals.conductor.run(Abreast(work, settled)) == {"a": number, "b": 7 - number}
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_a_silent_node_on_one_terminal_holds_up_no_other(terminals: Terminals) -> None:
     heard: list[float] = []
     failed: list[float] = []
@@ -219,6 +221,7 @@ def test_interrupts_at_many_lines_leave_both_terminals_usable(terminals: Termina
     assert at > 300, "the whole path was walked"
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_threads_share_terminals_with_a_conductor(terminals: Terminals) -> None:
     wrong: list[object] = []
 
@@ -271,6 +274,7 @@ def test_an_emergency_stop_from_another_thread_reaches_a_terminal_meanwhile(term
     assert told["a"] == 4
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_a_terminal_whose_process_ends_is_lost_and_the_other_goes_on(
     terminals: Terminals, served: list[Simulated]
 ) -> None:
@@ -286,6 +290,7 @@ def test_a_terminal_whose_process_ends_is_lost_and_the_other_goes_on(
     assert told["b"] == 1
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_two_terminals_on_an_event_loop(served: list[Simulated]) -> None:
     async def main() -> None:
         async with motorbus.open_async(served[0].bus) as a, motorbus.open_async(served[1].bus) as b:

@@ -94,7 +94,7 @@ def test_what_was_taught_until_an_axis_fell_silent_goes_along_with_the_error() -
 
 
 def test_a_port_that_dies_takes_nothing_along_of_what_was_taught(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, unhurried: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     with Simulated("feetech", ids="1-2", link=tmp_path / "bus") as served:

@@ -178,7 +178,7 @@ def test_a_slow_bus_delays_no_other_where_time_is_real() -> None:
         device.enable_torque()
         robot["c1"].under_way = True
         for _ in range(2):
-            robot.lease = robot.lease or Lease(0.3)
+            robot.lease = robot.lease or Lease(3.0)
             robot.lease.reset(robot.now)
             robot.lease.take("page", robot.now, attended=True)
             device.set_velocity(1.0)

@@ -97,9 +97,11 @@ def test_a_train_of_replies_arrives_whole_and_in_order() -> None:
 def test_motion_takes_real_time() -> None:
     bus = simulate((1,), position=2000)
     with terminal(bus) as port:
-        # to 2048 at 1000 counts/s: some 70 ms, ramps included
-        assert asked(port, "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5", 6) == PONG_1
+        # to 2048 at 1 count/s, which nobody waits for
+        assert asked(port, "FF FF 01 09 03 2A 00 08 00 00 01 00 BF", 6) == PONG_1
         assert asked(port, "FF FF 01 04 02 42 01 B5", 7) == "FF FF 01 03 00 01 FA"  # moving
+        # at 1000 counts/s: some 70 ms, ramps included
+        assert asked(port, "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5", 6) == PONG_1
         while asked(port, "FF FF 01 04 02 42 01 B5", 7) != "FF FF 01 03 00 00 FB":
             pass
         assert asked(port, "FF FF 01 04 02 38 02 BE", 8) == "FF FF 01 04 00 00 08 F2"
@@ -108,8 +110,8 @@ def test_motion_takes_real_time() -> None:
 def test_an_eeprom_write_is_answered_later_than_a_ping_behind_it() -> None:
     with terminal(simulate((1, 2))) as port:
         assert asked(port, "FF FF 01 04 03 37 00 C0", 6) == PONG_1  # unlock
-        os.write(port, bytes.fromhex("FF FF 01 04 03 0D 41 A9"))  # max temperature 65: 20 ms
-        assert asked(port, "FF FF 02 02 01 FA", 12) == f"FF FF 02 02 00 FB {PONG_1}"
+        both = "FF FF 01 04 03 0D 41 A9 FF FF 02 02 01 FA"  # max temperature 65 takes 20 ms
+        assert asked(port, both, 12) == f"FF FF 02 02 00 FB {PONG_1}"
 
 
 def test_nobody_reading_holds_nothing_up() -> None:

@@ -15,7 +15,7 @@ from bench.workloads import WARM_UP
 @pytest.mark.parametrize("name", [AWAITED, BLOCKING])
 def test_each_reads_what_is_said(name: str) -> None:
     with responder(build()) as wire:
-        assert measured(name, wire.port, 20)["processor"] > 0
+        assert measured(name, f"{wire.port},latency=1s", 20)["processor"] > 0
     reads, writes, _ = wire.books["servos"]["1"]
     assert (reads, writes) == (WARM_UP + 20, 0)
 

@@ -25,8 +25,10 @@ from motorbus.link.serial import SerialLink
 KILLED_AT = """
 import os, signal, sys
 from motorbus.cli import main
+from motorbus.link import adapters
 from motorbus.link.serial import SerialLink
 
+adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 write, count = SerialLink.write, [0, int(sys.argv[1])]
 
 def doomed(self, data):
@@ -48,7 +50,7 @@ READ = 0x3E
 
 
 @pytest.fixture
-def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simulated]:
+def served(tmp_path: Path, unhurried: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simulated]:
     """A simulated controller in a process of its own on a pseudo-terminal."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     with Simulated("stepper", link=tmp_path / "bus") as simulated:

@@ -33,7 +33,9 @@ import json, os, signal, sys
 from random import Random
 from motorbus import Robot
 from motorbus.bus.air import Air
+from motorbus.link import adapters
 
+adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 chance, left, launch = Random(int(sys.argv[2])), [int(sys.argv[3])], Air._launch
 names, places, goals = {}, {}, {}
 
@@ -99,7 +101,7 @@ class Served(NamedTuple):
 
 
 @pytest.fixture
-def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
+def served(tmp_path: Path, unhurried: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     """Three servos on a line and one on CAN, each bus served by a process of its own."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     control = {"arm": tmp_path / "a.sock", "can": tmp_path / "c.sock"}

@@ -28,8 +28,10 @@ PROGRAM = """
 import os, signal, sys
 from random import Random
 from motorbus import Robot
+from motorbus.link import adapters
 from motorbus.link.serial import SerialLink
 
+adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 chance, left, write = Random(int(sys.argv[2])), [int(sys.argv[3])], SerialLink.write
 
 def doomed(link, data):
@@ -81,7 +83,7 @@ def killed(file: Path, seed: int, chance: Random) -> list[float]:
 
 @pytest.mark.timeout(0)
 def test_the_one_move_that_was_ordered_comes_to_its_end_and_no_other_begins(
-    tmp_path: Path, rounds: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, rounds: Callable[[int], int], unhurried: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     control, file, chance, caught = tmp_path / "control", tmp_path / "motorbus.toml", Random(8), 0
