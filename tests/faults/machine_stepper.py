@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Hashable
 from contextlib import suppress
+from math import inf
 from random import Random
 from types import MappingProxyType
 from typing import Any, Final
@@ -121,6 +122,12 @@ class StepperRig(Rig):
         if request is not None:
             self.obeyed.append((at, request.command.name, dict(request.values)))
         return self.obey(data, at)
+
+    @property
+    def troubled(self) -> bool:
+        """Or it has still to answer: the copy of a request waits until it has dealt with the first one."""
+        owes = self.simulator._waiting or self.simulator._line.due() < inf
+        return super().troubled or bool(owes)
 
     def slowest(self) -> Exchange[Any]:
         return dump_once(Controller(self.bus), 1)
