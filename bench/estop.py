@@ -66,7 +66,7 @@ def samples(stops: int, progress: Callable[[str], None]) -> list[Sample]:
                 if number % 100 == 0:
                     progress(f"emergency stop {number} of {stops}")
         for bus in BUSES:
-            _await(place / f"{bus}.heard", asked[-1])
+            _await(place / f"{bus}.heard", max(asked, default=0.0))
         return [one for bus in BUSES for one in _matched(bus, asked, place / f"{bus}.heard")]
 
 
