@@ -30,7 +30,7 @@ from motorbus.core.operation import (
     Tune,
     outcome,
 )
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
 
@@ -128,7 +128,17 @@ class Run(Generic[T]):
         if all(child.finished for child in branch.children):
             self._join(branch)
             return True
-        return any(moved)
+        if not any(moved):
+            return False
+        self._heed(branch.children)
+        return True
+
+    def _heed(self, children: list[Branch]) -> None:
+        """What is no error of ours ends those beside it too: they may wait for what this one will never do."""
+        if self.interruption is None:
+            for child in children:
+                if child.error is not None and not isinstance(child.error, MotorbusError):
+                    raise child.error
 
     def _settled(self, branch: Branch) -> tuple[Any, BaseException | None]:
         ticket, branch.ticket = branch.ticket, None

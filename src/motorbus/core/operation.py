@@ -243,7 +243,8 @@ class Together(Generic[T_co]):
     """Operations that may overlap where the bus allows it; results in order.
 
     One failure does not stop the others; when all have ended the first error is raised, with a note for each
-    of the rest. Wrap each in `outcome()` to have the errors as values.
+    of the rest. Wrap each in `outcome()` to have the errors as values. Whatever else is raised in one of them,
+    KeyboardInterrupt included, interrupts them all.
     """
 
     __slots__ = ("operations",)
