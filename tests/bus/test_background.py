@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from threading import Thread
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.background import Background
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Operation, Pause, Together
 from motorbus.errors import Interrupted, NoReply
 from motorbus.families.feetech import Servo
 
@@ -25,7 +26,7 @@ def twice(bus: Any, node: int, found: list[object]) -> Operation[str]:
 def test_whoever_pumps_carries_it_along_and_no_further_than_time_goes() -> None:
     with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
         found: list[object] = []
-        one = Background(bus, twice(bus, 1, found))
+        one = Background(bus, lambda: twice(bus, 1, found))
         one.along()
         assert found == []
         bus.run(iter(Pause(0.5)))
@@ -40,7 +41,7 @@ def test_whoever_pumps_carries_it_along_and_no_further_than_time_goes() -> None:
 def test_an_error_of_it_is_nobody_elses() -> None:
     with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
         sim[1].unplug()
-        one = Background(bus, twice(bus, 1, []))
+        one = Background(bus, lambda: twice(bus, 1, []))
         one.along()
         for _ in range(3):
             Servo(bus, 2).position()
@@ -54,7 +55,7 @@ def test_a_thread_carries_it_out_by_itself() -> None:
     with motorbus.simulate("feetech", ids="1", clock="real") as sim, motorbus.open(sim.url) as bus:
         found: list[object] = []
         told: list[str] = []
-        thread = Thread(target=lambda: told.append(Background(bus, twice(bus, 1, found)).carried()))
+        thread = Thread(target=lambda: told.append(Background(bus, lambda: twice(bus, 1, found)).carried()))
         thread.start()
         Servo(bus, 1).position()
         thread.join(60)
@@ -73,7 +74,7 @@ def test_an_emergency_stop_does_not_end_it() -> None:
                     found.append(error)
                 found.append(None)
 
-        one = Background(bus, goes_on())
+        one = Background(bus, goes_on)
         one.along()
         bus.run(iter(Pause(0.1)))
         bus.estop()
@@ -85,7 +86,7 @@ def test_an_emergency_stop_does_not_end_it() -> None:
 def test_a_pause_of_it_can_be_ended() -> None:
     with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
         found: list[object] = []
-        one = Background(bus, twice(bus, 1, found))
+        one = Background(bus, lambda: twice(bus, 1, found))
         one.hurry()
         one.along()
         bus.run(iter(Pause(0.1)))
@@ -99,7 +100,7 @@ def test_it_can_be_dropped_before_it_has_begun_and_where_it_pauses() -> None:
     with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
         found: list[object] = []
         for told in (0, 1):
-            one = Background(bus, twice(bus, 1, found))
+            one = Background(bus, lambda: twice(bus, 1, found))
             one.along()
             if told:
                 bus.run(iter(Pause(0.1)))
@@ -117,7 +118,73 @@ def test_where_it_is_at_work_it_goes_on_when_it_is_dropped() -> None:
             one.drop()
             found.append((yield from Servo.position.function(Servo(bus, 1))))
 
-        one: Background[None] = Background(bus, asked())
+        one: Background[None] = Background(bus, asked)
         one.along()
         bus.run(iter(Pause(1.0)))
         assert (len(found), bus.turns.chores) == (1, [])
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_an_interruption_that_falls_into_it_is_raised_by_whoever_pumps_and_it_begins_anew(
+    beside: bool,
+) -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+        found: list[str] = []
+
+        def struck() -> Operation[None]:
+            yield from Servo.position.function(Servo(bus, 1))
+            if len(found) == 1:
+                raise KeyboardInterrupt("once")
+
+        def waits() -> Operation[None]:
+            try:
+                yield from Pause(1.0)
+            finally:
+                found.append("over")
+
+        def work() -> Operation[None]:
+            found.append("begun")
+            yield from Together([struck(), waits()]) if beside else struck()
+
+        one = Background(bus, work)
+        one.along()
+        with pytest.raises(KeyboardInterrupt, match="once"):
+            bus.run(iter(Pause(5.0)))
+        bus.run(iter(Pause(5.0)))
+        assert found == (["begun", "over", "begun", "over"] if beside else ["begun", "begun"])
+        assert (one.run.root.error, bus.turns.chores, bus.turns.idle) == (None, [], True)
+        assert Servo(bus, 2).position()
+
+
+def test_one_that_falls_into_a_thread_of_its_own_is_raised_there() -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+
+        def struck() -> Operation[None]:
+            yield from Servo.position.function(Servo(bus, 1))
+            raise MemoryError("once")
+
+        def both() -> Operation[None]:
+            yield from Together([struck(), iter(Pause(1e9))])
+
+        with pytest.raises(MemoryError, match="once"):
+            Background(bus, both).carried()
+        assert bus.turns.idle
+        assert Servo(bus, 2).position()
+
+
+def test_who_was_dropped_does_not_begin_anew() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        begun: list[None] = []
+
+        def struck() -> Operation[None]:
+            begun.append(None)
+            yield from Servo.position.function(Servo(bus, 1))
+            one.drop()
+            raise KeyboardInterrupt("once")
+
+        one = Background(bus, struck)
+        one.along()
+        with suppress(KeyboardInterrupt):
+            bus.run(iter(Pause(1.0)))
+        bus.run(iter(Pause(1.0)))
+        assert (len(begun), bus.turns.chores) == (1, [])

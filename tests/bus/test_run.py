@@ -82,35 +82,6 @@ def test_one_failure_in_together_does_not_stop_the_others() -> None:
     assert {packet.id for packet in responder.heard} == {1, 2, 3, 4}
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, ZeroDivisionError])
-@pytest.mark.parametrize("deep", [False, True])
-def test_whatever_is_no_error_of_ours_ends_those_beside_it(error: type[BaseException], deep: bool) -> None:
-    """They may wait for what it will never do."""
-    bus, _ = memory_bus()
-    cleaned: list[float] = []
-
-    def fails() -> Operation[None]:
-        yield from position(1)
-        raise error("once")
-
-    def waits() -> Operation[None]:
-        try:
-            while True:
-                yield from Pause(1.0)
-        finally:
-            cleaned.append((yield from position(2)))
-
-    def both() -> Operation[None]:
-        yield from Together([waits(), iter(Alone(fails())) if deep else fails(), waits()])
-
-    with pytest.raises(error, match="once") as caught:
-        bus.run(both())
-    assert not hasattr(caught.value, "__notes__")
-    assert cleaned == [2, 2]
-    assert bus.link.now() < 1.0
-    assert bus.turns.idle
-
-
 def test_outcomes_are_collected_in_order() -> None:
     bus, responder = memory_bus()
     responder.dead = {2}

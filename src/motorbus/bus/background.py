@@ -8,11 +8,12 @@ else, as the thread of the emergency stop does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
-from motorbus.bus.run import Run
+from motorbus.bus.run import Run, interrupts
 from motorbus.bus.ticket import Timer
 from motorbus.core.operation import Operation
 
@@ -25,13 +26,22 @@ LOOK = 0.02
 class Background(Generic[T]):
     """One operation on one bus, for which either `along` or `carried` is called, once. `run` tells how it stands."""
 
-    def __init__(self, bus: BusFace, operation: Operation[T]) -> None:
+    def __init__(self, bus: BusFace, operation: Callable[[], Operation[T]]) -> None:
         self.link = bus.link
         self.turns = bus.turns
-        self.run: Run[T] = Run(bus.turns, operation, now=bus.link.now, report=bus.listener(None))
+        self._bus = bus
+        self._operation = operation
+        self._dropped = False
+        self.run = self._begun()
+
+    def _begun(self) -> Run[T]:
+        return Run(self.turns, self._operation(), now=self.link.now, report=self._bus.listener(None))
 
     def along(self) -> None:
-        """From now on whoever pumps the bus carries it along."""
+        """From now on whoever pumps the bus carries it along.
+
+        An interruption that falls into it is his, so it is raised there; this one cleans up, and begins anew.
+        """
         with self.turns.lock:
             self.turns.chores.append(self._chore)
 
@@ -44,6 +54,7 @@ class Background(Generic[T]):
     def drop(self) -> None:
         """Where it pauses or has not begun nobody carries it along any more; at work it ends by itself."""
         with self.turns.lock:
+            self._dropped = True
             ticket = self.run.root.ticket
             rests = isinstance(ticket, Timer) or not self.run.root.started
             if rests and self._chore in self.turns.chores:
@@ -53,11 +64,28 @@ class Background(Generic[T]):
 
     def carried(self) -> T:
         """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises."""
-        while not self.run.advance():
+        while not self._advance(raising=False):
             crank(self.link, self.turns, self.link.now() + LOOK)
         return self.run.result()
 
     def _chore(self) -> None:
         """One step further; the caller holds the lock of the turns."""
-        if self._chore in self.turns.chores and self.run.advance():
+        if self._chore not in self.turns.chores or not self._advance(raising=True):
+            return
+        told, ended = self.run.interruption, self.run.root.error
+        if not interrupts(ended) or self._dropped:
             self.turns.chores.remove(self._chore)
+            return
+        self.run = self._begun()
+        if told is None and ended is not None:
+            raise ended
+
+    def _advance(self, raising: bool) -> bool:
+        """One step further; an interruption that falls into it has all of it clean up."""
+        try:
+            return self.run.advance()
+        except BaseException as interruption:
+            self.run.interrupt(interruption)
+            if raising:
+                raise
+            return False

@@ -30,7 +30,7 @@ from motorbus.core.operation import (
     Tune,
     outcome,
 )
-from motorbus.errors import MotorbusError, RequestError
+from motorbus.errors import RequestError
 
 T = TypeVar("T")
 
@@ -125,20 +125,12 @@ class Run(Generic[T]):
             self._step(branch, *self._settled(branch))
             return True
         moved = [self._pass(child) for child in branch.children]
-        if all(child.finished for child in branch.children):
+        if any(moved) and self.interruption is None:
+            _heed(branch.children)
+        if _all_finished(branch):
             self._join(branch)
             return True
-        if not any(moved):
-            return False
-        self._heed(branch.children)
-        return True
-
-    def _heed(self, children: list[Branch]) -> None:
-        """What is no error of ours ends those beside it too: they may wait for what this one will never do."""
-        if self.interruption is None:
-            for child in children:
-                if child.error is not None and not isinstance(child.error, MotorbusError):
-                    raise child.error
+        return any(moved)
 
     def _settled(self, branch: Branch) -> tuple[Any, BaseException | None]:
         ticket, branch.ticket = branch.ticket, None
@@ -274,12 +266,16 @@ class Run(Generic[T]):
             self._finish(branch, None, interruption)
             branch.generator.close()  # it has not begun, so it has nothing to clean up
             return
-        for child in branch.children:
-            self._throw(child, interruption)
-        if not branch.children:
-            self._abandon(branch)
-            branch.thrown = True
-            self._step(branch, error=interruption)
+        if not _all_finished(branch):
+            for child in branch.children:
+                self._throw(child, interruption)
+            return
+        for child in branch.children:  # nobody takes their values any more; what went wrong is not lost
+            _note(interruption, child.error)
+        branch.children = []
+        self._abandon(branch)
+        branch.thrown = True
+        self._step(branch, error=interruption)
 
     def _abandon(self, branch: Branch) -> None:
         if branch.ticket is not None:
@@ -323,6 +319,22 @@ def _looked(turns: Turns, wish: Exchange[T]) -> Operation[T]:
         for question in questions(turns, wish):
             yield from outcome(question)
     return (yield from wish)
+
+
+def interrupts(error: BaseException | None) -> bool:
+    """Whether this is nobody's failure, and may fall on any line: Ctrl-C, the end of a program, want of memory."""
+    return error is not None and (not isinstance(error, Exception) or isinstance(error, MemoryError))
+
+
+def _heed(children: list[Branch]) -> None:
+    """Raise the interruption that fell into one: those beside it may wait for what it will never do."""
+    for child in children:
+        if child.error is not None and interrupts(child.error):
+            raise child.error
+
+
+def _all_finished(branch: Branch) -> bool:
+    return all(child.finished for child in branch.children)
 
 
 def _note(interruption: BaseException, error: BaseException | None) -> None:

@@ -242,9 +242,8 @@ _ITS_OWN: Final = ("request", "replies", "read", "other", "whole", "course")
 class Together(Generic[T_co]):
     """Operations that may overlap where the bus allows it; results in order.
 
-    One failure does not stop the others; when all have ended the first error is raised, with a note for each
-    of the rest. Wrap each in `outcome()` to have the errors as values. Whatever else is raised in one of them,
-    KeyboardInterrupt included, interrupts them all.
+    One failure does not stop the others, an interruption in one (KeyboardInterrupt, want of memory) ends them all. When
+    all have ended the first error is raised, with a note for each other; `outcome()` around each makes them values.
     """
 
     __slots__ = ("operations",)

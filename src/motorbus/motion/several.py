@@ -41,9 +41,7 @@ def insisted(axes: Sequence[AxisVerbs], act: Act[Any]) -> Operation[Told]:
         told[axis.name] = yield from outcome(act(axis))
 
     def rest() -> Operation[None]:
-        for axis in axes:
-            if axis.name not in told:
-                yield from one(axis)
+        yield from Together([one(axis) for axis in axes if axis.name not in told])
 
     def all_of_them() -> Operation[None]:
         yield from Together([one(axis) for axis in axes])

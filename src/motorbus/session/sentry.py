@@ -7,6 +7,8 @@ told again and again while the lease is lost: a cable that was out may be in aga
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from functools import partial
 from threading import Event, Thread
 from typing import Any, Final
 
@@ -45,7 +47,7 @@ class Sentry:
         for name, bus in self._body.buses.items():
             post = self._posts[name]
             if bus.link.virtual:
-                post.along = Background(bus, self._watching(name))
+                post.along = Background(bus, partial(self._watching, name))
                 post.along.along()
             else:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
@@ -106,12 +108,15 @@ class Sentry:
         woken = self._posts[bus].woken
         while not self._over.is_set():
             woken.clear()
-            if self._late(bus):
-                try:
-                    Background(self._body.buses[bus], self._stopping(bus)).carried()
-                except Exception as error:  # not even the pump works: later once more
+            left = AGAIN
+            try:
+                if self._late(bus):
+                    Background(self._body.buses[bus], partial(self._stopping, bus)).carried()
+                left = self._left(bus)
+            except Exception as error:  # not even the pump works: later once more
+                with suppress(Exception):  # nor may want of memory end this thread
                     self._failed(bus, self._lease.losses, self._body.axes.keys(), error)
-            woken.wait(0.0 if self._over.is_set() else self._left(bus))
+            woken.wait(0.0 if self._over.is_set() else left)
 
     def _stopping(self, bus: str) -> Operation[None]:
         """Tell to stop whoever must; nothing that goes wrong is raised, for this bus is looked at again."""

@@ -1,0 +1,92 @@
+"""An interruption that falls into one of several operations at once, or between them: it ends them all, and is told."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.bus.run import Branch, Run
+from motorbus.core.operation import Alone, Operation, Pause, Together
+from motorbus.errors import MotorbusError
+from tests.bus.responder import memory_bus, position
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+@pytest.mark.parametrize("deep", [False, True])
+def test_an_interruption_of_one_ends_those_beside_it(error: type[BaseException], deep: bool) -> None:
+    """They may wait for what it will never do."""
+    bus, _ = memory_bus()
+    cleaned: list[float] = []
+
+    def fails() -> Operation[None]:
+        yield from position(1)
+        raise error("once")
+
+    def waits() -> Operation[None]:
+        try:
+            while True:
+                yield from Pause(1.0)
+        finally:
+            cleaned.append((yield from position(2)))
+
+    def both() -> Operation[None]:
+        yield from Together([waits(), iter(Alone(fails())) if deep else fails(), waits()])
+
+    with pytest.raises(error, match="once") as caught:
+        bus.run(both())
+    assert not hasattr(caught.value, "__notes__")
+    assert cleaned == [2, 2]
+    assert bus.link.now() < 1.0
+    assert bus.turns.idle
+
+
+def test_one_that_falls_into_the_last_of_them_is_not_lost_to_an_error_of_another() -> None:
+    """Their parent would go on after an error of ours."""
+    bus, responder = memory_bus()
+    responder.dead = {1}
+    found: list[object] = []
+
+    def last() -> Operation[None]:
+        yield from Pause(1.0)
+        raise KeyboardInterrupt("once")
+
+    def both() -> Operation[None]:
+        try:
+            yield from Together([iter(position(1)), last()])
+        except MotorbusError as error:
+            found.append(error)
+
+    with pytest.raises(KeyboardInterrupt, match="once") as caught:
+        bus.run(both())
+    assert found == []
+    assert caught.value.__notes__ == ["node 1 did not answer (2 tries)"]
+    assert bus.turns.idle
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_one_that_falls_behind_the_last_of_them_is_told_to_whoever_waited_for_them(
+    alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, _ = memory_bus()
+    join, cut = Run._join, [KeyboardInterrupt("once")]
+    told: list[BaseException] = []
+
+    def joined(run: Run[None], branch: Branch) -> None:
+        if cut:
+            raise cut.pop()
+        join(run, branch)
+
+    def goes_on() -> Operation[None]:
+        try:
+            yield from Alone(position(1)) if alone else Together([position(1), position(2)])
+            while True:
+                yield from position(3)
+        except BaseException as error:
+            told.append(error)
+            raise
+
+    monkeypatch.setattr(Run, "_join", joined)
+    with pytest.raises(KeyboardInterrupt, match="once") as caught:
+        bus.run(goes_on())
+    assert told == [caught.value]
+    assert bus.turns.statistics.nodes.get(3) is None, "nothing is asked any more"
+    assert bus.turns.idle
