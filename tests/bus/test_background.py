@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from threading import Thread
 from typing import Any
 
@@ -184,7 +183,50 @@ def test_who_was_dropped_does_not_begin_anew() -> None:
 
         one = Background(bus, struck)
         one.along()
-        with suppress(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt, match="once"):
             bus.run(iter(Pause(1.0)))
         bus.run(iter(Pause(1.0)))
         assert (len(begun), bus.turns.chores) == (1, [])
+
+
+def test_one_that_is_struck_each_time_leaves_the_others_their_turns() -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+
+        def struck() -> Operation[None]:
+            yield from Pause(0)
+            raise MemoryError("always")
+
+        one = Background(bus, struck)
+        one.along()
+        with pytest.raises(MemoryError, match="always"):
+            bus.run(iter(Pause(1.0)))
+        assert bus.estop().acknowledged
+        one.drop()
+
+
+def test_it_begins_anew_also_where_its_cleaning_up_fails() -> None:
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+        sim[2].unplug()
+        begun: list[None] = []
+
+        def struck() -> Operation[None]:
+            yield from Pause(0.1)
+            raise KeyboardInterrupt("once")
+
+        def waits() -> Operation[None]:
+            try:
+                yield from Pause(1.0)
+            finally:
+                yield from Servo.position.function(Servo(bus, 2))
+
+        def work() -> Operation[None]:
+            begun.append(None)
+            if len(begun) == 1:
+                yield from Together([waits(), struck()])
+
+        one = Background(bus, work)
+        one.along()
+        with pytest.raises(KeyboardInterrupt, match="once"):
+            bus.run(iter(Pause(5.0)))
+        bus.run(iter(Pause(5.0)))
+        assert (len(begun), bus.turns.chores) == (2, [])

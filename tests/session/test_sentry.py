@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Data, Pause
+from motorbus.core.operation import Data, Operation, Pause
 from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion import capabilities
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.session.sentry import AGAIN, Sentry
 from motorbus.simulation.named import Simulation
@@ -215,6 +216,30 @@ def test_who_watches_outlives_what_falls_into_him(
                 break
         assert not turning(sims)
         assert not robot._sentry or not robot._sentry.busy("arm")
+
+
+@pytest.mark.parametrize("options", [{}, REAL])
+def test_want_of_memory_in_the_stop_of_an_axis_ends_neither_the_stop_nor_the_watch(
+    options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop, struck = capabilities.stop, Event()
+
+    def once(axis: Any) -> Operation[Any]:
+        if not struck.is_set():
+            struck.set()
+            raise MemoryError
+        return (yield from stop(axis))
+
+    monkeypatch.setattr(capabilities, "stop", once)
+    with turned(options=options) as (robot, sims, _):
+        for _ in range(1000):
+            with suppress(MemoryError):
+                passes(robot, 0.05)
+            if struck.is_set() and not turning(sims):
+                break
+        assert not turning(sims)
+        passes(robot, 3.0)
+        assert not turning(sims)
 
 
 # -- without who attends -------------------------------------------------------------------------------------------

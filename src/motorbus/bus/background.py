@@ -15,12 +15,13 @@ from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
 from motorbus.bus.run import Run, interrupts
 from motorbus.bus.ticket import Timer
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Operation, Pause
 
 T = TypeVar("T")
 
 LOOK = 0.02
-"""s; a thread that waits for an answer looks at least so often whether another one has brought it."""
+"""s; a thread that waits for an answer looks at least so often whether another one has brought it. What begins anew does
+so behind as long a pause."""
 
 
 class Background(Generic[T]):
@@ -32,10 +33,15 @@ class Background(Generic[T]):
         self._bus = bus
         self._operation = operation
         self._dropped = False
-        self.run = self._begun()
+        self.run = self._begun(operation())
 
-    def _begun(self) -> Run[T]:
-        return Run(self.turns, self._operation(), now=self.link.now, report=self._bus.listener(None))
+    def _begun(self, operation: Operation[T]) -> Run[T]:
+        return Run(self.turns, operation, now=self.link.now, report=self._bus.listener(None))
+
+    def _again(self) -> Operation[T]:
+        """Behind a pause: what is struck each time would leave nobody else a moment."""
+        yield from Pause(LOOK)
+        return (yield from self._operation())
 
     def along(self) -> None:
         """From now on whoever pumps the bus carries it along.
@@ -73,11 +79,11 @@ class Background(Generic[T]):
         if self._chore not in self.turns.chores or not self._advance(raising=True):
             return
         told, ended = self.run.interruption, self.run.root.error
-        if not interrupts(ended) or self._dropped:
+        if self._dropped or not (told is not None or interrupts(ended)):
             self.turns.chores.remove(self._chore)
-            return
-        self.run = self._begun()
-        if told is None and ended is not None:
+        else:
+            self.run = self._begun(self._again())
+        if ended is not None and ended is not told and interrupts(ended):
             raise ended
 
     def _advance(self, raising: bool) -> bool:

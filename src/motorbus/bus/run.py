@@ -270,9 +270,9 @@ class Run(Generic[T]):
             for child in branch.children:
                 self._throw(child, interruption)
             return
-        for child in branch.children:  # nobody takes their values any more; what went wrong is not lost
+        children, branch.children = branch.children, []
+        for child in children:  # nobody takes their values any more; what went wrong is not lost
             _note(interruption, child.error)
-        branch.children = []
         self._abandon(branch)
         branch.thrown = True
         self._step(branch, error=interruption)

@@ -128,6 +128,8 @@ class Sentry:
         again = () if anew else post.failed
         try:
             errors = yield from (given_up(axes, again) if lost else stopped_going_on(axes))
+        except MemoryError:  # an interruption, behind which nothing here may go on
+            raise
         except Exception as error:  # the port is gone: this bus is told again, and the others at any rate
             self._failed(bus, loss, moving if lost else (), error)
         else:
