@@ -20,8 +20,8 @@ from motorbus.core.operation import Operation, Pause
 T = TypeVar("T")
 
 LOOK = 0.02
-"""s; a thread that waits for an answer looks at least so often whether another one has brought it. What begins anew does
-so behind as long a pause."""
+"""s; a thread that waits for an answer looks at least so often whether another one has brought it. What begins anew
+does so behind as long a pause."""
 
 
 class Background(Generic[T]):
