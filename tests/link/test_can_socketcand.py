@@ -85,9 +85,8 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
             for number, word in enumerate(next(scripts)):
                 if number:
                     connection.recv(256)
-                    monkeypatch.setattr(
-                        can_socketcand, "ANSWER_TIME", 0.1
-                    )  # for whoever comes after this one
+                    # for what is said after this one
+                    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
                 connection.sendall(word)
             return True
 
