@@ -9,6 +9,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.background import Background
+from motorbus.bus.crank import crank
 from motorbus.core.operation import Operation, Pause, Together
 from motorbus.errors import Interrupted, NoReply
 from motorbus.families.feetech import Servo
@@ -169,6 +170,32 @@ def test_one_that_falls_into_a_thread_of_its_own_is_raised_there() -> None:
             Background(bus, both).carried()
         assert bus.turns.idle
         assert Servo(bus, 2).position()
+
+
+def test_one_that_falls_beside_it_into_its_thread_has_it_clean_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Want of memory may fall into the waiting as into the work."""
+    with motorbus.simulate("feetech", ids="1", clock="real") as sim, motorbus.open(sim.url) as bus:
+        found: list[object] = []
+        short = [MemoryError("once")]
+
+        def stopping() -> Operation[str]:
+            try:
+                return (yield from twice(bus, 1, found))
+            finally:
+                found.append("cleaned")
+                yield from Servo.position.function(Servo(bus, 1))
+                found.append("up")
+
+        def without_memory(*given: Any) -> None:
+            if found and short:
+                raise short.pop()
+            crank(*given)
+
+        monkeypatch.setattr("motorbus.bus.background.crank", without_memory)
+        with pytest.raises(MemoryError, match="once"):
+            Background(bus, stopping).carried()
+        assert found[1:] == ["cleaned", "up"]
+        assert bus.turns.idle
 
 
 def test_who_was_dropped_does_not_begin_anew() -> None:

@@ -265,10 +265,10 @@ def test_of_several_that_were_cut_off_each_thing_is_said_once() -> None:
     assert not hasattr(plain.value, "__notes__")
     with pytest.raises(KeyboardInterrupt) as cut:
         interrupted(bus, together(None, RequestError("it may turn"), RequestError("it may turn")), 2)
-    assert cut.value.__notes__ == ["also: it may turn"]
+    assert cut.value.__notes__ == ["it may turn"]
     with pytest.raises(KeyboardInterrupt) as first:
         interrupted(bus, together(RequestError("it may turn"), None, RequestError("so may this")), 2)
-    assert first.value.__notes__ == ["it may turn", "also: so may this"]
+    assert first.value.__notes__ == ["it may turn", "so may this"]
 
 
 def test_of_several_that_an_emergency_stop_ended_it_is_said_once() -> None:

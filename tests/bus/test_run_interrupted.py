@@ -90,3 +90,49 @@ def test_one_that_falls_behind_the_last_of_them_is_told_to_whoever_waited_for_th
     assert told == [caught.value]
     assert bus.turns.statistics.nodes.get(3) is None, "nothing is asked any more"
     assert bus.turns.idle
+
+
+def test_a_parent_that_goes_on_after_an_error_does_not_go_on_after_an_interruption() -> None:
+    """One has failed before, one is cut off, one still cleans up: what is behind them is not begun."""
+    bus, responder = memory_bus()
+    responder.dead = {1}
+    told: list[BaseException] = []
+    cleaned: list[float] = []
+
+    def fails() -> Operation[None]:
+        yield from Pause(1.0)
+        raise KeyboardInterrupt("once")
+
+    def cleans() -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            yield from Together([pause(0.1), deep()])
+
+    def pause(seconds: float) -> Operation[None]:
+        yield from Pause(seconds)
+
+    def deep() -> Operation[None]:
+        yield from Alone(cleaning())
+
+    def cleaning() -> Operation[None]:
+        cleaned.append((yield from Alone(position(2))))
+        cleaned.extend((yield from Together([position(3), position(5)])))
+
+    def goes_on() -> Operation[None]:
+        while True:
+            try:
+                yield from Together([iter(position(1)), fails(), cleans()])
+            except BaseException as error:
+                told.append(error)
+                if not isinstance(error, MotorbusError):
+                    raise
+            yield from position(4)
+
+    with pytest.raises(KeyboardInterrupt, match="once") as caught:
+        bus.run(goes_on())
+    assert told == [caught.value]
+    assert caught.value.__notes__ == ["node 1 did not answer (2 tries)"]
+    assert cleaned == [2, 3, 5], "what is begun to clean up ends, however deep it goes"
+    assert bus.turns.statistics.nodes.get(4) is None
+    assert bus.turns.idle

@@ -70,13 +70,17 @@ class Background(Generic[T]):
 
     def carried(self) -> T:
         """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises."""
-        while not self._advance(raising=False):
-            crank(self.link, self.turns, self.link.now() + LOOK)
+        while not self.run.root.finished:
+            try:
+                if not self.run.advance():
+                    crank(self.link, self.turns, self.link.now() + LOOK)
+            except BaseException as interruption:  # want of memory, wherever it falls: all of it cleans up
+                self.run.interrupt(interruption)
         return self.run.result()
 
     def _chore(self) -> None:
         """One step further; the caller holds the lock of the turns."""
-        if self._chore not in self.turns.chores or not self._advance(raising=True):
+        if self._chore not in self.turns.chores or not self._advance():
             return
         told, ended = self.run.interruption, self.run.root.error
         if self._dropped or not (told is not None or interrupts(ended)):
@@ -86,12 +90,10 @@ class Background(Generic[T]):
         if ended is not None and ended is not told and interrupts(ended):
             raise ended
 
-    def _advance(self, raising: bool) -> bool:
+    def _advance(self) -> bool:
         """One step further; an interruption that falls into it has all of it clean up."""
         try:
             return self.run.advance()
         except BaseException as interruption:
             self.run.interrupt(interruption)
-            if raising:
-                raise
-            return False
+            raise

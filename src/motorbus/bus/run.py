@@ -73,7 +73,10 @@ class Branch:
             self.owner = self  # the outermost one owns the bus; what is nested in it belongs to it
         self.ticket: Ticket | None = None
         self.children: list[Branch] = []
-        self.started = self.thrown = self.finished = False
+        self.started = self.finished = False
+        self.thrown: bool = (
+            parent is not None and parent.thrown
+        )  # what is begun to clean up is not cut off again
         self.value: Any = None
         self.error: BaseException | None = None
 
@@ -96,6 +99,7 @@ class Run(Generic[T]):
         self.wake = wake
         self.losses = turns.losses
         self.interruption: BaseException | None = None
+        self.noted: set[str] = set()
         self.thrown = False
         self.deadline = inf
         self.patience = 0.0
@@ -225,11 +229,13 @@ class Run(Generic[T]):
         branch.finished = True
 
     def _join(self, branch: Branch) -> None:
-        """All children have ended: their results, or the first error, go to the parent."""
-        children, branch.children = branch.children, []
-        if not children and branch.thrown:  # what it waited for was lost to one more interrupt: it is told
-            self._step(branch, error=self.interruption)
+        """All children have ended: their results, or the first error, go to the parent; an interruption before both."""
+        if self.interruption is not None and not (branch.thrown and branch.children):
+            self._tell(
+                branch, self.interruption
+            )  # without children what it waited for was lost to one more interrupt
             return
+        children, branch.children = branch.children, []
         errors = [child.error for child in children if child.error is not None]
         if errors:
             said = {str(errors[0])}  # several that were cut off by one thing say the same
@@ -270,12 +276,24 @@ class Run(Generic[T]):
             for child in branch.children:
                 self._throw(child, interruption)
             return
+        self._tell(branch, interruption)
+
+    def _tell(self, branch: Branch, interruption: BaseException) -> None:
         children, branch.children = branch.children, []
         for child in children:  # nobody takes their values any more; what went wrong is not lost
-            _note(interruption, child.error)
+            self._note(interruption, child.error)
         self._abandon(branch)
         branch.thrown = True
         self._step(branch, error=interruption)
+
+    def _note(self, interruption: BaseException, error: BaseException | None) -> None:
+        if error is None or error is interruption:
+            return
+        notes = getattr(error, "__notes__", ())
+        for text in (getattr(error, "summary", "") or str(error) or type(error).__name__, *notes):
+            if text not in self.noted:  # several that were cut off by one thing say the same
+                self.noted.add(text)
+                interruption.add_note(text)
 
     def _abandon(self, branch: Branch) -> None:
         if branch.ticket is not None:
@@ -296,7 +314,7 @@ class Run(Generic[T]):
         What the cleaning up failed with goes along as a note, for it may be that a motor still turns.
         """
         if self.interruption is not None:
-            _note(self.interruption, self.root.error)
+            self._note(self.interruption, self.root.error)
             raise self.interruption
         if self.root.error is not None:
             raise self.root.error
@@ -335,14 +353,6 @@ def _heed(children: list[Branch]) -> None:
 
 def _all_finished(branch: Branch) -> bool:
     return all(child.finished for child in branch.children)
-
-
-def _note(interruption: BaseException, error: BaseException | None) -> None:
-    if error is None or error is interruption:
-        return
-    notes = getattr(error, "__notes__", ())
-    for text in (getattr(error, "summary", "") or str(error) or type(error).__name__, *notes):
-        interruption.add_note(text)
 
 
 def _alive(generator: Operation[Any]) -> bool:
