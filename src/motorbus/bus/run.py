@@ -74,9 +74,8 @@ class Branch:
         self.ticket: Ticket | None = None
         self.children: list[Branch] = []
         self.started = self.finished = False
-        self.thrown: bool = (
-            parent is not None and parent.thrown
-        )  # what is begun to clean up is not cut off again
+        # what is begun to clean up is not cut off again
+        self.thrown: bool = parent is not None and parent.thrown
         self.value: Any = None
         self.error: BaseException | None = None
 
