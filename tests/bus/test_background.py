@@ -198,6 +198,35 @@ def test_one_that_falls_beside_it_into_its_thread_has_it_clean_up(monkeypatch: p
         assert bus.turns.idle
 
 
+def test_a_second_interruption_in_what_cleans_up_is_raised_too() -> None:
+    """By whoever pumps then: the first one is long raised."""
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        begun: list[int] = []
+
+        def cleans() -> Operation[None]:
+            try:
+                yield from Pause(1e9)
+            finally:
+                yield from Pause(0.1)
+                raise KeyboardInterrupt("second")
+
+        def struck() -> Operation[None]:
+            yield from Pause(1.0)
+            raise MemoryError("first")
+
+        def both() -> Operation[None]:
+            begun.append(1)
+            yield from Together([cleans(), struck()] if len(begun) == 1 else [iter(Pause(1e9))])
+
+        Background(bus, both).along()
+        with pytest.raises(MemoryError, match="first"):
+            bus.run(iter(Pause(2.0)))
+        with pytest.raises(KeyboardInterrupt, match="second"):
+            bus.run(iter(Pause(2.0)))
+        bus.run(iter(Pause(2.0)))
+        assert begun == [1, 1], "and it begins anew"
+
+
 def test_who_was_dropped_does_not_begin_anew() -> None:
     with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
         begun: list[None] = []

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from motorbus.bus.run import Branch, Run
-from motorbus.core.operation import Alone, Operation, Pause, Together
+from motorbus.core.operation import Alone, Operation, Pause, Report, Together, afterwards, outcome
 from motorbus.errors import MotorbusError
-from tests.bus.responder import memory_bus, position
+from tests.bus.responder import memory_bus, position, write
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
@@ -136,3 +136,52 @@ def test_a_parent_that_goes_on_after_an_error_does_not_go_on_after_an_interrupti
     assert cleaned == [2, 3, 5], "what is begun to clean up ends, however deep it goes"
     assert bus.turns.statistics.nodes.get(4) is None
     assert bus.turns.idle
+
+
+def test_what_a_clean_up_failed_with_is_told_though_it_was_only_a_value() -> None:
+    """Whoever asks several for their outcomes, to raise them behind the last, is interrupted before he can."""
+    bus, responder = memory_bus()
+    responder.dead = {1, 2}
+
+    def turns() -> Operation[None]:
+        yield from Pause(1e9)
+
+    def struck() -> Operation[None]:
+        yield from Pause(1.0)
+        raise KeyboardInterrupt("once")
+
+    def both() -> Operation[None]:
+        polled = outcome(position(2))  # nobody's clean-up: what it fails with is for whoever asked
+        yield from Together([polled, outcome(afterwards(turns(), lambda: position(1))), struck()])
+
+    with pytest.raises(KeyboardInterrupt, match="once") as caught:
+        bus.run(both())
+    assert caught.value.__notes__ == ["node 1 did not answer (2 tries)"]
+
+
+def test_an_interrupt_in_who_listens_to_a_clean_up_leaves_the_rest_of_it_its_time() -> None:
+    bus, responder = memory_bus()
+
+    def reports() -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            yield from afterwards(told(), lambda: write(3, 20, 1))
+
+    def told() -> Operation[None]:
+        yield from Report("stopping")
+
+    def struck() -> Operation[None]:
+        yield from Pause(1.0)
+        raise KeyboardInterrupt("once")
+
+    def both() -> Operation[None]:
+        yield from Together([reports(), struck()])
+
+    def listens(event: object) -> None:
+        raise KeyboardInterrupt("again")
+
+    with pytest.raises(KeyboardInterrupt, match="once"):
+        bus.run(afterwards(both(), lambda: write(4, 20, 1)), report=listens)
+    assert [packet.id for packet in responder.heard] == [3, 4]
+    assert bus.link.now() < 1.1

@@ -69,13 +69,20 @@ class Background(Generic[T]):
                 self.turns.abandon(ticket)
 
     def carried(self) -> T:
-        """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises."""
-        while not self.run.root.finished:
+        """Carry it out in this thread, whoever else pumps the bus, and return its value. Raises what it raises.
+
+        Only where time is real. Whatever else falls into it, want of memory say, has all of it clean up.
+        """
+        caught: BaseException | None = None
+        while True:
             try:
-                if not self.run.advance():
+                if caught is not None:
+                    self.run.interrupt(caught)
+                while not self.run.advance():
                     crank(self.link, self.turns, self.link.now() + LOOK)
-            except BaseException as interruption:  # want of memory, wherever it falls: all of it cleans up
-                self.run.interrupt(interruption)
+                break
+            except BaseException as interruption:
+                caught = interruption
         return self.run.result()
 
     def _chore(self) -> None:

@@ -197,7 +197,16 @@ class Run(Generic[T]):
         return timer
 
     def _await(self, branch: Branch, ticket: Ticket) -> None:
-        branch.ticket = ticket
+        try:
+            branch.ticket = ticket
+            self._submit(ticket)
+        except (
+            BaseException
+        ):  # one more interrupt: nobody would settle it, and what cleans up would wait for it
+            self._abandon(branch)
+            raise
+
+    def _submit(self, ticket: Ticket) -> None:
         if self.now() >= self.deadline:
             ticket.finish(error=verdict.cancelled())
             return
@@ -209,16 +218,15 @@ class Run(Generic[T]):
 
     def _notify(self, branch: Branch, event: object) -> None:
         done = Ticket()
-        branch.ticket = done
         if self.report is None and isinstance(event, Journal):
             done.finish(error=_no_journal(event))
-            return
         try:
             if self.report is not None:
                 self.report(event)
         except Exception as error:  # what the listener raises is the operation's to clean up after
             done.finish(error=error)
         done.finish()
+        branch.ticket = done  # not before: an interrupt in the listener would leave it to nobody
 
     def _finish(self, branch: Branch, value: Any, error: BaseException | None) -> None:
         branch.value, branch.error = value, error
@@ -278,21 +286,27 @@ class Run(Generic[T]):
         self._tell(branch, interruption)
 
     def _tell(self, branch: Branch, interruption: BaseException) -> None:
-        children, branch.children = branch.children, []
-        for child in children:  # nobody takes their values any more; what went wrong is not lost
-            self._note(interruption, child.error)
+        """Throw it into this one, whose children have ended: nobody takes their values; what went wrong is not lost."""
+        told: BaseException | None = interruption
+        for child in branch.children:
+            failed = child.value if child.thrown and isinstance(child.value, Exception) else None
+            self._note(interruption, child.error or failed)
+            if child.error is not interruption and interrupts(child.error):
+                told = child.error  # one more
+        branch.children = []
         self._abandon(branch)
         branch.thrown = True
-        self._step(branch, error=interruption)
+        self._step(branch, error=told)
 
     def _note(self, interruption: BaseException, error: BaseException | None) -> None:
         if error is None or error is interruption:
             return
-        notes = getattr(error, "__notes__", ())
-        for text in (getattr(error, "summary", "") or str(error) or type(error).__name__, *notes):
-            if text not in self.noted:  # several that were cut off by one thing say the same
-                self.noted.add(text)
+        said = {str(error): getattr(error, "summary", "") or str(error) or type(error).__name__}
+        said.update((note, note) for note in getattr(error, "__notes__", ()))
+        for whole, text in said.items():
+            if whole not in self.noted:  # several that were cut off by one thing say the same
                 interruption.add_note(text)
+                self.noted.add(whole)
 
     def _abandon(self, branch: Branch) -> None:
         if branch.ticket is not None:
