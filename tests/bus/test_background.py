@@ -10,7 +10,8 @@ import pytest
 import motorbus
 from motorbus.bus.background import Background
 from motorbus.bus.crank import crank
-from motorbus.core.operation import Operation, Pause, Together
+from motorbus.bus.run import Run
+from motorbus.core.operation import Alone, Operation, Pause, Report, Together
 from motorbus.errors import Interrupted, NoReply
 from motorbus.families.feetech import Servo
 
@@ -60,6 +61,66 @@ def test_a_thread_carries_it_out_by_itself() -> None:
         Servo(bus, 1).position()
         thread.join(60)
         assert (told, len(found)) == (["done"], 2)
+
+
+def test_a_listener_that_uses_the_bus_holds_up_what_reports_to_it() -> None:
+    """It pumps, and so it comes by what is waiting for it."""
+    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url) as bus:
+        told: list[object] = []
+
+        def listens(event: object) -> None:
+            told.append((event, Servo(bus, 2).position()))
+
+        def reports() -> Operation[None]:
+            yield from Report("one")
+            told.append((yield from Alone(Servo.position.function(Servo(bus, 1)))))
+            yield from Report("two")
+
+        one = Background(bus, reports)
+        one.run.report = listens
+        one.along()
+        bus.run(iter(Pause(1.0)))
+        found = [Servo(bus, node).position() for node in (1, 2)]
+        assert told == [("one", found[1]), found[0], ("two", found[1])]
+        assert one.run.root.finished
+        assert not bus.turns.chores
+
+
+@pytest.mark.parametrize("line", [1, 3, 5])
+def test_one_more_that_falls_into_what_deals_with_the_first_is_dealt_with(
+    line: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with motorbus.simulate("feetech", ids="1-3") as sim, motorbus.open(sim.url) as bus:
+        cleaned: list[float] = []
+        throw, thrown = Run._throw, iter(range(1, 100))
+
+        def stops() -> Operation[None]:
+            try:
+                yield from Pause(1e9)
+            finally:
+                cleaned.append((yield from Servo.position.function(Servo(bus, 3))))
+
+        def struck() -> Operation[None]:
+            yield from Pause(1.0)
+            raise MemoryError("first")
+
+        begun: list[int] = []
+
+        def both() -> Operation[None]:
+            begun.append(1)
+            yield from Together([stops(), stops(), struck()] if len(begun) == 1 else [])
+
+        def struck_again(run: Run[None], *given: Any) -> None:
+            if next(thrown) == line:
+                raise KeyboardInterrupt("second")
+            throw(run, *given)
+
+        monkeypatch.setattr(Run, "_throw", struck_again)
+        Background(bus, both).along()
+        with pytest.raises(MemoryError, match="first"):
+            bus.run(iter(Pause(1.5)))
+        bus.run(iter(Pause(0.5)))
+        assert len(cleaned) == 2
 
 
 def test_an_emergency_stop_does_not_end_it() -> None:

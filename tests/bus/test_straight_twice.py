@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import pytest
 
 from motorbus.bus.pump import Bus
@@ -59,10 +61,11 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
     what: str, fault: str, rounds: Rounds, figures: Figures
 ) -> None:
     nodes, call = CALLS[what]
-    bus, _, line, exchange = flown(nodes)
-    line.fault = fault
-    whole = cut(lambda: call(bus, exchange))
-    assert whole.error is None
+    for _ in range(2):  # the first call in a process takes more lines: it fills what is kept for all buses
+        bus, _, line, exchange = flown(nodes)
+        line.fault = fault
+        whole = cut(functools.partial(call, bus, exchange))
+        assert whole.error is None
     cuts, twice, struck, wrong = 0, 0, 0, list[str]()
     most = rounds(NEVER, 12)
     for number, at in enumerate(places(whole.walked, 1, most)):

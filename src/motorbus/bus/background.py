@@ -98,9 +98,14 @@ class Background(Generic[T]):
             raise ended
 
     def _advance(self) -> bool:
-        """One step further; an interruption that falls into it has all of it clean up."""
-        try:
-            return self.run.advance()
-        except BaseException as interruption:
-            self.run.interrupt(interruption)
-            raise
+        """One step further; an interruption that falls into it has all of it clean up, and is raised."""
+        first: BaseException | None = None
+        while True:
+            try:
+                if first is None:
+                    return self.run.advance()
+                self.run.interrupt(first)
+                break
+            except BaseException as interruption:
+                first = first or interruption  # one more fell into what deals with the first
+        raise first

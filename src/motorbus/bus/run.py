@@ -169,8 +169,9 @@ class Run(Generic[T]):
         elif isinstance(wish, Together):
             branch.children = [Branch(operation, branch) for operation in wish.operations]
             if not branch.children:
-                branch.ticket = Ticket()
-                branch.ticket.finish([])
+                done = Ticket()
+                done.finish([])
+                branch.ticket = done
         elif isinstance(wish, Alone):
             child = Branch(wish.operation, branch, alone=True)
             child.started = True
@@ -200,9 +201,8 @@ class Run(Generic[T]):
         try:
             branch.ticket = ticket
             self._submit(ticket)
-        except (
-            BaseException
-        ):  # one more interrupt: nobody would settle it, and what cleans up would wait for it
+        except BaseException:
+            # Nobody would settle it, and all that cleans up would wait for it.
             self._abandon(branch)
             raise
 
@@ -217,16 +217,23 @@ class Run(Generic[T]):
             self.turns.submit(ticket, self.now())
 
     def _notify(self, branch: Branch, event: object) -> None:
-        done = Ticket()
+        try:
+            branch.ticket = done = Ticket()  # first: a listener that uses the bus may come by here again
+            self._deliver(event, done)
+        except BaseException:
+            branch.ticket = None
+            raise
+
+    def _deliver(self, event: object, done: Ticket) -> None:
         if self.report is None and isinstance(event, Journal):
             done.finish(error=_no_journal(event))
+            return
         try:
             if self.report is not None:
                 self.report(event)
         except Exception as error:  # what the listener raises is the operation's to clean up after
             done.finish(error=error)
         done.finish()
-        branch.ticket = done  # not before: an interrupt in the listener would leave it to nobody
 
     def _finish(self, branch: Branch, value: Any, error: BaseException | None) -> None:
         branch.value, branch.error = value, error
@@ -236,14 +243,16 @@ class Run(Generic[T]):
         branch.finished = True
 
     def _join(self, branch: Branch) -> None:
-        """All children have ended: their results, or the first error, go to the parent; an interruption before both."""
+        """All children have ended: their results, or the first error, go to the parent.
+
+        If there was an interruption that goes instead, once; again where it fell into what the parent waited for.
+        """
         if self.interruption is not None and not (branch.thrown and branch.children):
-            self._tell(
-                branch, self.interruption
-            )  # without children what it waited for was lost to one more interrupt
+            self._tell(branch, self.interruption)
             return
         children, branch.children = branch.children, []
         errors = [child.error for child in children if child.error is not None]
+        errors.sort(key=interrupts, reverse=True)  # who retries after an error must not do so after those
         if errors:
             said = {str(errors[0])}  # several that were cut off by one thing say the same
             for other in errors[1:]:
@@ -292,7 +301,7 @@ class Run(Generic[T]):
             failed = child.value if child.thrown and isinstance(child.value, Exception) else None
             self._note(interruption, child.error or failed)
             if child.error is not interruption and interrupts(child.error):
-                told = child.error  # one more
+                told = child.error  # a second one, which fell into its cleaning up
         branch.children = []
         self._abandon(branch)
         branch.thrown = True
@@ -301,7 +310,8 @@ class Run(Generic[T]):
     def _note(self, interruption: BaseException, error: BaseException | None) -> None:
         if error is None or error is interruption:
             return
-        said = {str(error): getattr(error, "summary", "") or str(error) or type(error).__name__}
+        name = str(error) or type(error).__name__
+        said = {name: getattr(error, "summary", "") or name}
         said.update((note, note) for note in getattr(error, "__notes__", ()))
         for whole, text in said.items():
             if whole not in self.noted:  # several that were cut off by one thing say the same
