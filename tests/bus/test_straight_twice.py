@@ -7,11 +7,14 @@ import functools
 import pytest
 
 from motorbus.bus.pump import Bus
+from motorbus.bus.straight import usual
 from tests.bus.responder import position
-from tests.bus.test_straight_ends import CALLS, flown, heard_of_all, in_another_thread, unanswered
+from tests.bus.test_straight_ends import CALLS as STRAIGHT
+from tests.bus.test_straight_ends import flown, heard_of_all, in_another_thread, unanswered
 from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 
+CALLS = {**STRAIGHT, "usual": ((1,), lambda bus, exchange: usual(bus, exchange))}
 SOON = 1.0
 """s in which the lock is free."""
 LATER = 60
@@ -38,6 +41,8 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, int,
         return came, line.struck, [*wrong, "nobody else may pump any more"]
     if not in_another_thread(lambda: is_free(bus)):
         return came, line.struck, [*wrong, "the lock is held"]
+    if any(bus.turns._queues):
+        wrong.append("what nobody waits for may still leave")
     wrong += [f"{node} is believed" for node in unanswered(bus) if not bus.turns.trust.nodes[node].tainted]
     line.fault = line.fault if line.sent else ""
     due = bool(fault) and bool(line.sent)  # an answer meets the fault, here or in what is asked now
@@ -69,13 +74,16 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
     cuts, twice, struck, wrong = 0, 0, 0, list[str]()
     most = rounds(NEVER, 12)
     for number, at in enumerate(places(whole.walked, 1, most)):
-        for later in range(1, LATER) if most == NEVER else (1 + number * 7 % 23, 1 + number * 13 % LATER):
+        some = sorted((1 + number * 7 % 23, 1 + number * 13 % LATER))
+        for later in range(1, LATER) if most == NEVER else some:
             came, met, found = cut_twice(what, fault, at, later)
             assert came.where is not None
             cuts += 1
             twice += came.again is not None
             struck += met
             wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
+            if came.again is None:  # by then all is over
+                break
     figures(
         f"L17 interrupted twice: {what}, {fault or 'no fault'}, the straight way",
         family="feetech", cuts=cuts, twice=twice, struck=struck, wrong=len(wrong),
@@ -83,3 +91,20 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
     assert wrong == []
     assert twice >= cuts / 3 > 0  # the others were over by then
     assert (struck > 0) is bool(fault)
+
+
+def test_l17_a_second_interrupt_at_each_line_of_what_deals_with_the_first_in_the_usual_way() -> None:
+    """There it must also not leave any more: nobody waits for it."""
+    nodes, call = CALLS["usual"]
+    bus, _, _, exchange = flown(nodes)
+    whole = cut(lambda: call(bus, exchange))
+    twice, wrong = 0, list[str]()
+    for at in places(whole.walked, 1, 60):
+        for later in range(1, LATER):
+            came, _, found = cut_twice("usual", "", at, later)
+            wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
+            if came.again is None:  # by then all is over
+                break
+            twice += 1
+    assert wrong == []
+    assert twice > 500

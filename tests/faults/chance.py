@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, count
-from math import exp
+from math import exp, lgamma, log
 
 FREE = 4
 """Bytes in front that are compared whole."""
@@ -52,10 +52,11 @@ def turned(byte: int) -> Iterator[int]:
 
 def poisson_line(expected: float, certainty: float = 0.999) -> int:
     """So many are chance where so many are expected; more is a fault of ours, but for one time in a thousand."""
-    reached = term = exp(-expected)
+    reached = 0.0
     for number in count():
+        reached += exp(
+            number * log(expected) - expected - lgamma(number + 1)
+        )  # exp(-expected) alone may be too small
         if reached >= certainty:
             return number
-        term *= expected / (number + 1)
-        reached += term
     raise AssertionError

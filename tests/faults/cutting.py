@@ -69,6 +69,12 @@ def putting_away(frame: FrameType) -> bool:
     return now == opmap["PUSH_EXC_INFO"] or opmap["POP_EXCEPT"] in later
 
 
+def returning(frame: FrameType) -> bool:
+    """Whether nothing is left but to return a constant: no signal is looked at there, nor is it within a `try`."""
+    now, then = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]
+    return now == opmap.get("RETURN_CONST") or (now, then) == (opmap["LOAD_CONST"], opmap["RETURN_VALUE"])
+
+
 class Scissors:
     """Raises this before the nth executed line, and `later` lines on once more.
 
@@ -101,7 +107,9 @@ class Scissors:
         return self._world
 
     def _line(self, frame: FrameType, event: str, argument: object) -> Any:
-        if event == "line" and not putting_away(frame) and not (self.error is MemoryError and leaving(frame)):
+        if event == "line" and not (
+            putting_away(frame) or returning(frame) or (self.error is MemoryError and leaving(frame))
+        ):
             self.count += 1
             if self.at == NEVER:
                 self.walked.append((frame.f_code, frame.f_lineno))

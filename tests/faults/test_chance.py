@@ -182,5 +182,8 @@ def read_position(rig: KstRig) -> None:
 def test_the_line_between_chance_and_a_fault_is_that_of_poisson() -> None:
     """For 2.2 and 37 expected, the figures that tables of that distribution have for 99.9 %."""
     assert (poisson_line(2.2), poisson_line(37.0)) == (8, 57)
+    assert abs(poisson_line(11_274.3) - (11_274.3 + 3.09 * 11_274.3**0.5)) < 3, (
+        "many are spread as a normal curve"
+    )
     lines = [poisson_line(0.5 * number) for number in range(1, 60)]
     assert all(one <= two for one, two in pairwise(lines))

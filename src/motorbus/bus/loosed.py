@@ -14,7 +14,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 from motorbus.bus.run import taken
-from motorbus.bus.straight import brought, fallen, found, is_sure, launched_now, noted, off
+from motorbus.bus.straight import brought, fallen, fallen_again, found, is_sure, launched_now, noted, off
 from motorbus.bus.volley import rides, volley
 from motorbus.core.operation import UNLIKE, Exchange
 from motorbus.errors import LinkError
@@ -128,8 +128,8 @@ def _loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None
         except BaseException as error:
             fallen(bus, _in_the_air(bus, launched), error)
             raise
-    except BaseException:  # as in `fly`
-        bus.relay.recover()
+    except BaseException as error:  # as in `fly`
+        fallen_again(bus, _in_the_air(bus, launched), error)
         raise
 
 
@@ -173,8 +173,8 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
             new = None if behind is None else behind.course
             fallen(bus, _in_the_air(bus, new, course), error)
             raise
-    except BaseException:  # as in `fly`
-        relay.recover()
+    except BaseException as error:  # as in `fly`
+        fallen_again(bus, _in_the_air(bus, course, None if behind is None else behind.course), error)
         raise
     return taken(turns, course.exchange, course.result())
 
@@ -207,8 +207,8 @@ def _left(bus: Bus, last: Course, behind: Behind) -> bool:
         except BaseException as error:
             fallen(bus, _in_the_air(bus, behind.course), error)
             raise
-    except BaseException:  # as in `fly`
-        relay.recover()
+    except BaseException as error:  # as in `fly`
+        fallen_again(bus, _in_the_air(bus, behind.course), error)
         raise
     return behind.at is not None
 

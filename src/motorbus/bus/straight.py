@@ -67,8 +67,8 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
         except BaseException as error:
             fallen(bus, _mine(bus, launched), error)
             raise
-    except BaseException:  # a second interrupt may fall into what the first one has brought about
-        bus.relay.recover()
+    except BaseException as error:  # a second interrupt may fall into what the first one has brought about
+        fallen_again(bus, _mine(bus, launched), error)
         raise
     answer: Any = course.result()
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
@@ -179,8 +179,8 @@ def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
         except BaseException as error:
             fallen(bus, _mine(bus, None), error)
             raise
-    except BaseException:  # as in `fly`
-        bus.relay.recover()
+    except BaseException as error:  # as in `fly`
+        fallen_again(bus, _mine(bus, None), error)
         raise
     if moment is None:
         return UNLIKE
@@ -208,13 +208,15 @@ def usual(bus: Bus, exchange: Exchange[T]) -> T:
     """The usual way of one exchange, which needs no run."""
     flight, relay = Flight(exchange), bus.relay
     try:
-        relay.start(flight)
-        while not flight.done:
-            relay.turn()
-    except BaseException:
-        relay.recover()
-        with bus.turns.lock:
-            bus.turns.abandon(flight)
+        try:
+            relay.start(flight)
+            while not flight.done:
+                relay.turn()
+        except BaseException:
+            given_up(bus, flight)
+            raise
+    except BaseException:  # as in `fly`
+        given_up(bus, flight)
         raise
     value: T = taken(bus.turns, exchange, flight.result())
     return value
@@ -294,15 +296,30 @@ def _astray(bus: Bus, course: Course, arrived: list[Data]) -> None:
 
 def fallen(bus: Bus, course: Course | None, error: BaseException) -> None:
     """The flight has ended by this: where the link is lost all learn it, and whatever happens the bus is let go."""
+    mine = [] if course is None else [course]
     try:
         if isinstance(error, LinkError):
             with bus.turns.lock:
                 bus.turns.lost(error)
             if bus.relay.pumper == get_ident():
                 bus.relay.hand_over()
-            course = None  # settled like all the others
+            mine = []  # settled like all the others
     finally:
-        _cut_short(bus, course)
+        given_up(bus, *mine)
+
+
+def fallen_again(bus: Bus, course: Course | None, error: BaseException) -> None:
+    """The same once more, for one more interrupt may have fallen into it."""
+    given_up(bus, *([] if course is None or isinstance(error, LinkError) else [course]))
+
+
+def given_up(bus: Bus, *flights: Flight) -> None:
+    """Nobody waits for these any more: they must not leave, and what is in the air lands, or its time is over."""
+    bus.relay.recover()
+    if flights:
+        with bus.turns.lock:
+            for flight in flights:
+                bus.turns.abandon(flight)
 
 
 def _mine(bus: Bus, launched: Course | None) -> Course | None:
@@ -310,11 +327,3 @@ def _mine(bus: Bus, launched: Course | None) -> Course | None:
     if bus.relay.pumper == get_ident():
         return bus.turns.aloft or launched
     return launched if launched is not None and launched.is_detached else None
-
-
-def _cut_short(bus: Bus, course: Course | None) -> None:
-    """Whoever waits for this waits no more; in the air it stays until it lands, or its time is over."""
-    bus.relay.recover()
-    if course is not None:
-        with course.lock:
-            course.turns.abandon(course)

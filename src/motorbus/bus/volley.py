@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.bus.look import questions
 from motorbus.bus.run import taken
-from motorbus.bus.straight import fly
+from motorbus.bus.straight import fly, given_up
 from motorbus.bus.ticket import Flight
 from motorbus.core.entry import shown
 from motorbus.core.operation import UNLIKE, Exchange
@@ -98,16 +98,17 @@ def _sent(bus: Bus, burst: Exchanges) -> list[Flight]:
     flights = [Flight(exchange) for exchange in burst]
     relay = bus.relay
     try:
-        relay.start(*flights)
-        for number, flight in enumerate(flights):
-            if number and not (flight.left or flight.done):
-                return flights[:number]
-            while not flight.done:
-                relay.turn()
-        return flights
-    except BaseException:
-        relay.recover()
-        with bus.turns.lock:
-            for flight in flights:
-                bus.turns.abandon(flight)
+        try:
+            relay.start(*flights)
+            for number, flight in enumerate(flights):
+                if number and not (flight.left or flight.done):
+                    return flights[:number]
+                while not flight.done:
+                    relay.turn()
+            return flights
+        except BaseException:
+            given_up(bus, *flights)
+            raise
+    except BaseException:  # a second interrupt may fall into what the first one has brought about
+        given_up(bus, *flights)
         raise
