@@ -9,12 +9,17 @@ import pytest
 from motorbus.bus.pump import Bus
 from motorbus.bus.straight import usual
 from tests.bus.responder import position
+from tests.bus.struck import order
 from tests.bus.test_straight_ends import CALLS as STRAIGHT
 from tests.bus.test_straight_ends import flown, heard_of_all, in_another_thread, unanswered
 from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 
-CALLS = {**STRAIGHT, "usual": ((1,), lambda bus, exchange: usual(bus, exchange))}
+CALLS = {
+    **STRAIGHT,
+    "usual": ((1,), lambda bus, exchange: usual(bus, exchange)),
+    "burst": ((1, 2), lambda bus, exchange: bus.volley(order(), order(), exchange)),
+}
 SOON = 1.0
 """s in which the lock is free."""
 LATER = 60
@@ -93,15 +98,16 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_the_straight_wa
     assert (struck > 0) is bool(fault)
 
 
-def test_l17_a_second_interrupt_at_each_line_of_what_deals_with_the_first_in_the_usual_way() -> None:
+@pytest.mark.parametrize("what", ["usual", "burst"])
+def test_l17_a_second_interrupt_at_each_line_of_what_deals_with_the_first_in_the_usual_way(what: str) -> None:
     """There it must also not leave any more: nobody waits for it."""
-    nodes, call = CALLS["usual"]
+    nodes, call = CALLS[what]
     bus, _, _, exchange = flown(nodes)
     whole = cut(lambda: call(bus, exchange))
     twice, wrong = 0, list[str]()
-    for at in places(whole.walked, 1, 60):
+    for at in places(whole.walked, 1, 24):
         for later in range(1, LATER):
-            came, _, found = cut_twice("usual", "", at, later)
+            came, _, found = cut_twice(what, "", at, later)
             wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
             if came.again is None:  # by then all is over
                 break
