@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
+from functools import partial
 from typing import Any
 
 import pytest
 
-from motorbus.bus import straight
+from motorbus.bus import loosed, straight
+from motorbus.bus.loosed import Loosed
 from motorbus.bus.pump import Bus
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
@@ -116,10 +119,12 @@ def test_l16_two_threads_that_share_one_kept_exchange_get_values_true_inside_the
     told: list[BaseException] = []
     wrong: list[str] = []
 
-    def poll() -> None:
+    def poll(rest: float) -> None:
         asked = 0
-        # how often they meet is the affair of the machine, so they go on; but not for ever
+        # how often they meet is the affair of the machine, so they go on, and one of them rests in between
         while asked < count or (left.straight < count / 10 and asked < 100 * count):
+            if asked >= count:
+                time.sleep(rest)
             asked += 1
             before = line.heard
             try:
@@ -131,7 +136,7 @@ def test_l16_two_threads_that_share_one_kept_exchange_get_values_true_inside_the
             if value not in true:
                 wrong.append(f"{value}, and it was one of {true}")
 
-    assert together(poll, poll, within=rounds(580, 60)) == []
+    assert together(partial(poll, 0.0), partial(poll, 0.005), within=rounds(580, 60)) == []
     ledger = bus.statistics.nodes[1]
     assert wrong == []
     assert line.struck >= 2 * count // Changing.EVERY
@@ -210,3 +215,32 @@ def test_a_latched_bus_lets_no_order_through_straight() -> None:
     with pytest.raises(MotorbusError, match="stop"):
         bus.volley(order(), exchange)
     assert line.sent == []
+
+
+def test_who_was_interrupted_takes_nothing_from_who_lets_the_same_loose_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Between letting go of the bus and raising another thread may have its turn."""
+    bus, _, _ = struck_bus()
+    question = kept(1)
+    for _ in range(6):
+        bus.run(question)
+    others: list[Loosed] = []
+    recover, landed = bus.relay.recover, straight.brought
+
+    def anothers_turn() -> None:
+        recover()
+        if not others:
+            assert together(lambda: bus.run(question), lambda: others.append(Loosed(bus, (question,)))) == []
+
+    def struck(*given: Any) -> None:
+        landed(*given)
+        raise KeyboardInterrupt
+
+    mine = Loosed(bus, (question,))
+    monkeypatch.setattr(bus.relay, "recover", anothers_turn)
+    monkeypatch.setattr(loosed, "brought", struck)
+    with pytest.raises(KeyboardInterrupt):
+        mine.land()
+    monkeypatch.undo()
+    assert others[0].land() == [([(1, 0, 1, 0)], ())]

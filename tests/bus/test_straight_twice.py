@@ -20,6 +20,8 @@ CALLS = {
     "usual": ((1,), lambda bus, exchange: usual(bus, exchange)),
     "burst": ((1, 2), lambda bus, exchange: bus.volley(order(), order(), exchange)),
 }
+LOOSE = ("loosed", "behind", "later")
+"""Of these something may be in the air on purpose: whoever let it loose may still land it."""
 SOON = 1.0
 """s in which the lock is free."""
 LATER = 60
@@ -46,7 +48,8 @@ def cut_twice(what: str, fault: str, at: int, later: int) -> tuple[Outcome, int,
         return came, line.struck, [*wrong, "nobody else may pump any more"]
     if not in_another_thread(lambda: is_free(bus)):
         return came, line.struck, [*wrong, "the lock is held"]
-    if any(bus.turns._queues):
+    flying = [one for one in bus.turns.flying.values() if not (one.abandoned or one.done or one.parent)]
+    if any(bus.turns._queues) or (flying and what not in LOOSE):
         wrong.append("what nobody waits for may still leave")
     wrong += [f"{node} is believed" for node in unanswered(bus) if not bus.turns.trust.nodes[node].tainted]
     line.fault = line.fault if line.sent else ""

@@ -52,11 +52,13 @@ def turned(byte: int) -> Iterator[int]:
 
 def poisson_line(expected: float, certainty: float = 0.999) -> int:
     """So many are chance where so many are expected; more is a fault of ours, but for one time in a thousand."""
+    if not expected:
+        return 0
     reached = 0.0
-    for number in count():
-        reached += exp(
-            number * log(expected) - expected - lgamma(number + 1)
-        )  # exp(-expected) alone may be too small
+    for (
+        number
+    ) in count():  # each by itself: where many are expected exp(-expected) cannot be told from nothing
+        reached += exp(number * log(expected) - expected - lgamma(number + 1))
         if reached >= certainty:
             return number
     raise AssertionError

@@ -70,7 +70,10 @@ def putting_away(frame: FrameType) -> bool:
 
 
 def returning(frame: FrameType) -> bool:
-    """Whether nothing is left but to return a constant: no signal is looked at there, nor is it within a `try`."""
+    """Whether nothing is left but to return a constant: no signal is looked at there, nor is it within a `try`.
+
+    One that comes with the end of a call falls behind it, in the line of the call: that is cut before it only.
+    """
     now, then = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]
     return now == opmap.get("RETURN_CONST") or (now, then) == (opmap["LOAD_CONST"], opmap["RETURN_VALUE"])
 

@@ -14,7 +14,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 from motorbus.bus.run import taken
-from motorbus.bus.straight import brought, fallen, fallen_again, found, is_sure, launched_now, noted, off
+from motorbus.bus.straight import brought, fallen, found, is_sure, launched_now, noted, off
 from motorbus.bus.volley import rides, volley
 from motorbus.core.operation import UNLIKE, Exchange
 from motorbus.errors import LinkError
@@ -117,7 +117,7 @@ def _loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None
     course: Course | None = exchange.course
     if (course is None or course.turns is not bus.turns) and (course := found(bus, exchange)) is None:
         return None
-    launched = None
+    launched, mine, dealt_with = None, None, False
     try:
         try:
             launched = launched_now(bus, course, ahead)
@@ -126,10 +126,13 @@ def _loose(bus: Bus, exchange: Exchange[Any], ahead: Exchange[Any] | None = None
                 bus.relay.pass_on()
             return launched
         except BaseException as error:
-            fallen(bus, _in_the_air(bus, launched), error)
+            mine = _in_the_air(bus, launched)
+            fallen(bus, mine, error)
+            dealt_with = True
             raise
     except BaseException as error:  # as in `fly`
-        fallen_again(bus, _in_the_air(bus, launched), error)
+        if not dealt_with:
+            fallen(bus, mine or _in_the_air(bus, launched), error)
         raise
 
 
@@ -157,6 +160,7 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
     """
     turns, relay, lock = bus.turns, bus.relay, bus.turns.lock
     then = None if behind is None else partial(_follow, bus, course, behind)
+    mine, dealt_with = None, False
     try:
         try:
             lock.acquire()
@@ -170,11 +174,13 @@ def _land(bus: Bus, course: Course, behind: Behind | None = None) -> Any:
             while not course.done:  # others have made a usual flight of it
                 relay.turn()
         except BaseException as error:
-            new = None if behind is None else behind.course
-            fallen(bus, _in_the_air(bus, new, course), error)
+            mine = _in_the_air(bus, behind.course if behind else None, course)
+            fallen(bus, mine, error)
+            dealt_with = True
             raise
     except BaseException as error:  # as in `fly`
-        fallen_again(bus, _in_the_air(bus, course, None if behind is None else behind.course), error)
+        if not dealt_with:
+            fallen(bus, mine or _in_the_air(bus, behind.course if behind else None, course), error)
         raise
     return taken(turns, course.exchange, course.result())
 
@@ -197,6 +203,7 @@ def _follow(bus: Bus, last: Course, behind: Behind, value: Any) -> None:
 def _left(bus: Bus, last: Course, behind: Behind) -> bool:
     """Has this left now, a while after the answer to the `last` question? Raises LinkError."""
     relay, lock = bus.relay, bus.turns.lock
+    mine, dealt_with = None, False
     try:
         try:
             lock.acquire()
@@ -205,10 +212,13 @@ def _left(bus: Bus, last: Course, behind: Behind) -> bool:
                 relay.pumper = None
             lock.release()
         except BaseException as error:
-            fallen(bus, _in_the_air(bus, behind.course), error)
+            mine = _in_the_air(bus, behind.course)
+            fallen(bus, mine, error)
+            dealt_with = True
             raise
     except BaseException as error:  # as in `fly`
-        fallen_again(bus, _in_the_air(bus, behind.course), error)
+        if not dealt_with:
+            fallen(bus, mine or _in_the_air(bus, behind.course), error)
         raise
     return behind.at is not None
 

@@ -54,7 +54,7 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
     course: Course | None = exchange.course
     if (course is None or course.turns is not turns) and (course := found(bus, exchange)) is None:
         return UNLIKE
-    launched = None
+    launched, mine, dealt_with = None, None, False
     try:
         try:
             launched = launched_now(bus, course, ahead)
@@ -65,10 +65,13 @@ def fly(bus: Bus, exchange: Exchange[T], ahead: Exchange[Any] | None = None) -> 
             if value is not UNLIKE:
                 return value
         except BaseException as error:
-            fallen(bus, _mine(bus, launched), error)
+            mine = _mine(bus, launched)
+            fallen(bus, mine, error)
+            dealt_with = True
             raise
     except BaseException as error:  # a second interrupt may fall into what the first one has brought about
-        fallen_again(bus, _mine(bus, launched), error)
+        if not dealt_with:  # else others may have it in the air again by now
+            fallen(bus, mine or _mine(bus, launched), error)
         raise
     answer: Any = course.result()
     return taken(turns, course.exchange, answer)  # type: ignore[no-any-return]
@@ -168,7 +171,7 @@ def off(
 
 def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
     """Send what nobody answers; `UNLIKE` when nothing was sent, and it must go the usual way. Raises as `Bus.run`."""
-    lock = bus.turns.lock
+    lock, mine, dealt_with = bus.turns.lock, None, False
     if exchange.replies != ():
         return UNLIKE
     try:
@@ -177,10 +180,13 @@ def cast(bus: Bus, exchange: Exchange[T]) -> T | Unlike:
             moment = _thrown(bus, exchange)
             lock.release()
         except BaseException as error:
-            fallen(bus, _mine(bus, None), error)
+            mine = _mine(bus, None)
+            fallen(bus, mine, error)
+            dealt_with = True
             raise
     except BaseException as error:  # as in `fly`
-        fallen_again(bus, _mine(bus, None), error)
+        if not dealt_with:
+            fallen(bus, mine or _mine(bus, None), error)
         raise
     if moment is None:
         return UNLIKE
@@ -306,11 +312,6 @@ def fallen(bus: Bus, course: Course | None, error: BaseException) -> None:
             mine = []  # settled like all the others
     finally:
         given_up(bus, *mine)
-
-
-def fallen_again(bus: Bus, course: Course | None, error: BaseException) -> None:
-    """The same once more, for one more interrupt may have fallen into it."""
-    given_up(bus, *([] if course is None or isinstance(error, LinkError) else [course]))
 
 
 def given_up(bus: Bus, *flights: Flight) -> None:
