@@ -74,8 +74,8 @@ def returning(frame: FrameType) -> bool:
 
     One that comes with the end of a call falls behind it, in the line of the call: that is cut before it only.
     """
-    now, then = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]
-    return now == opmap.get("RETURN_CONST") or (now, then) == (opmap["LOAD_CONST"], opmap["RETURN_VALUE"])
+    rest = [*frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]]
+    return rest[0] == opmap.get("RETURN_CONST") or rest == [opmap["LOAD_CONST"], opmap["RETURN_VALUE"]]
 
 
 class Scissors:
