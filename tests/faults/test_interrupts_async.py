@@ -49,15 +49,21 @@ def cut_in_loop(
     return came
 
 
+def walk(kind: str, error: type[BaseException]) -> Outcome:
+    """A task that carries this kind out and is not cut, line by line."""
+    with looped(kind) as (there, loop):
+        KINDS[kind].prepare(there)
+        return cut_in_loop(there, loop, kind, NEVER, error)
+
+
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", KINDS)
 def test_l17_an_interrupt_at_any_line_of_a_task(kind: str, rounds: Rounds, figures: Figures) -> None:
     cuts, wrong = 0, list[str]()
+    walk(kind, KeyboardInterrupt)  # what is made at the first time and kept is no line of those that follow
     for error in ERRORS:
-        with looped(kind) as (there, loop):
-            KINDS[kind].prepare(there)
-            whole = cut_in_loop(there, loop, kind, NEVER, error)
-            assert whole.error is None
+        whole = walk(kind, error)
+        assert whole.error is None
         for at in places(whole.walked, VISITS, rounds(NEVER, 4)):
             wrong += faults_of_task(kind, at, error)
             cuts += 1
