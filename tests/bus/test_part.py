@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from time import sleep
 from typing import Any
 
 import pytest
 
-from motorbus.bus.crank import IDLE
+from motorbus.bus.crank import IDLE, push
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
+from motorbus.bus.ticket import Flight
 from motorbus.core.operation import Listen, Operation, Pause
 from motorbus.errors import LinkLost, NoReply
-from tests.bus.responder import DELAY
+from tests.bus.responder import DELAY, position
 from tests.bus.several import Several, single
 
 
@@ -79,6 +81,24 @@ def test_a_real_clock_sets_the_pace() -> None:
         assert follow(parts["a"], clock) <= 0.01
         assert parts["a"].time <= clock.time
     assert follow(parts["a"], clock) == float("inf"), "nothing to wait for any more"
+    several.close()
+
+
+def test_what_waits_leaves_as_soon_as_an_answer_that_nobody_wants_is_overdue_beside_a_real_clock() -> None:
+    several = Several(True, False)
+    bus, several.responders["a"].dead = several.buses["a"], {1}
+    unwanted = Flight(position(1))
+    bus.turns.submit(unwanted, bus.link.now())
+    push(bus.link, bus.turns)
+    bus.turns.abandon(unwanted)
+    parts = parts_of(several, {"a": single(2), "b": iter(Pause(100.0))})
+    clock = clock_of([*parts.values()])
+    assert clock is parts["b"]
+    while advance([parts["a"]]):
+        left = follow(parts["a"], clock)
+        assert left < 0.1, "it sleeps, and what waits could go"
+        sleep(left)
+    assert parts["a"].run.result() == 2
     several.close()
 
 

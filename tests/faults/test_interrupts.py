@@ -39,6 +39,8 @@ from tests.simulation.served import served
 
 ERRORS = (KeyboardInterrupt, MemoryError)
 VISITS = 3
+OFTEN_CUT = ("feetech guarded write", "kst run", "stepper home")
+"""The kinds of transactions that are cut twice, too: one of each family, and each has much to clean up."""
 UNSENT_STOP = ("it ended with", "it was latched, and something moves", "the stop did not go out")
 
 
@@ -142,19 +144,21 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
     assert cuts
 
 
+def laters(number: int) -> tuple[int, ...]:
+    """How many lines after this many-th first interrupt the second ones fall: at once, soon, and much later."""
+    return 1 + number % 6, 1 + number * 7 % 23, 1 + number * 37 % 400
+
+
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("kind", ["feetech guarded write", "kst run", "stepper home"])
+@pytest.mark.parametrize("kind", OFTEN_CUT)
 def test_l17_a_second_interrupt_at_any_line_of_the_clean_up(
     kind: str, rounds: Rounds, figures: Figures
 ) -> None:
-    """On one blocking bus. On an event loop, or on several buses at once, it may fall between the first one and what
-    deals with it, and so may it with a single exchange in `usual`: something that waits may be left then.
-    """
     carried_out(kind)  # what is kept from a first time on walks fewer lines
     _, whole, _ = carried_out(kind)
     cuts, twice, wrong = 0, 0, list[str]()
     for number, at in enumerate(places(whole.walked, 2, rounds(NEVER, 18))):
-        for later in (1 + number * 7 % 23, 1 + number * 37 % 400):
+        for later in laters(number):
             there, came, _ = carried_out(kind, at, KeyboardInterrupt, later, Twice)
             found = [] if isinstance(came.error, KeyboardInterrupt) else [f"it ended with {came.error!r}"]
             found += afterwards(there, there.bus.run)

@@ -15,10 +15,10 @@ import pytest
 
 from motorbus.bus.aio import AsyncBus
 from tests.conftest import Figures, Rounds
-from tests.faults.cutting import NEVER, Outcome, afterwards, cut, places, stuck
+from tests.faults.cutting import NEVER, Outcome, Scissors, Twice, afterwards, cut, places, stuck
 from tests.faults.off import are_off
 from tests.faults.scenes import KINDS, Scene
-from tests.faults.test_interrupts import ERRORS, VISITS
+from tests.faults.test_interrupts import ERRORS, OFTEN_CUT, VISITS, laters
 
 
 @contextmanager
@@ -34,16 +34,22 @@ def looped(kind: str) -> Iterator[tuple[Scene, asyncio.AbstractEventLoop]]:
 
 
 def cut_in_loop(
-    there: Scene, loop: asyncio.AbstractEventLoop, kind: str, at: int, error: type[BaseException]
+    there: Scene,
+    loop: asyncio.AbstractEventLoop,
+    kind: str,
+    at: int,
+    error: type[BaseException],
+    later: int = 0,
+    scissors: type[Scissors] = Scissors,
 ) -> Outcome:
-    """The operation in a task, cut at a line; a task that outlived that is awaited to its end."""
+    """The operation in a task, cut at a line or two; a task that outlived that is awaited to its end."""
     tasks: list[asyncio.Task[Any]] = []
 
     def act() -> Any:
         tasks.append(loop.create_task(there.bus.run(KINDS[kind].act(there))))
         return loop.run_until_complete(tasks[0])
 
-    came = cut(act, at, error)
+    came = cut(act, at, error, later, scissors)
     if tasks and not tasks[0].done():
         loop.run_until_complete(asyncio.wait(tasks))
     return came
@@ -82,6 +88,36 @@ def faults_of_task(kind: str, at: int, error: type[BaseException]) -> list[str]:
         wrong += [] if isinstance(came.error, error) else [f"it ended with {came.error!r}, {came.value!r}"]
         wrong += afterwards(there, there.run)
         return [f"{one}, cut at {came.where}" for one in wrong]
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("kind", OFTEN_CUT)
+def test_l17_a_second_interrupt_at_any_line_of_the_clean_up_of_a_task(
+    kind: str, rounds: Rounds, figures: Figures
+) -> None:
+    walk(kind, KeyboardInterrupt)  # what is kept from a first time on walks fewer lines
+    whole = walk(kind, KeyboardInterrupt)
+    cuts, twice, wrong = 0, 0, list[str]()
+    for number, at in enumerate(places(whole.walked, 2, rounds(NEVER, 18))):
+        for later in laters(number):
+            came, found = cut_twice(kind, at, later)
+            wrong += [f"{one}, cut at {came.where} and at {came.again}" for one in found]
+            cuts += 1
+            twice += came.again is not None
+    family, left = KINDS[kind].family, stuck(wrong)
+    what = f"L17 interrupted twice: {kind}, in a task"
+    figures(what, family=family, cuts=cuts, twice=twice, stuck=left, wrong=len(wrong))
+    assert wrong == []
+    assert twice >= cuts / 2 > 0  # the others were over by then
+
+
+def cut_twice(kind: str, at: int, later: int) -> tuple[Outcome, list[str]]:
+    """What came of a task of this kind that was cut there and so many lines later, and what is wrong then."""
+    with looped(kind) as (there, loop):
+        KINDS[kind].prepare(there)
+        came = cut_in_loop(there, loop, kind, at, KeyboardInterrupt, later, Twice)
+        wrong = [] if isinstance(came.error, KeyboardInterrupt) else [f"it ended with {came.error!r}"]
+        return came, wrong + afterwards(there, there.run)
 
 
 @pytest.mark.timeout(1800)

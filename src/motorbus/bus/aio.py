@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 from functools import cached_property
 from math import inf
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
@@ -39,23 +39,32 @@ class AsyncBus(BusFace):
                 loop.call_soon_threadsafe(news.set)
 
         run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=wake)
-        caught: BaseException | None = None
-        while True:
+        try:
             try:
-                if caught is not None:
-                    let_go(self.turns.lock)
-                    run.interrupt(caught)
                 while not run.advance():
                     await self._turn(news)
-                break
-            except GeneratorExit:  # nobody will await us again: clean up here and now
-                run.interrupt(asyncio.CancelledError())
+            except BaseException as interruption:
+                await self._clean_up(run, news, interruption)
+        except BaseException as interruption:  # a second one fell between the first and what deals with it
+            await self._clean_up(run, news, interruption)
+        return run.result()
+
+    async def _clean_up(self, run: Run[Any], news: asyncio.Event, caught: BaseException) -> None:
+        """Let what was interrupted come to its end; one more interrupt meanwhile makes it hurry."""
+        closed = False
+        while True:
+            try:
+                let_go(self.turns.lock)
+                if isinstance(caught, GeneratorExit):  # nobody will await us again: clean up here and now
+                    closed, caught = True, asyncio.CancelledError()
+                run.interrupt(caught)
                 while not run.advance():
-                    crank(self.link, self.turns, inf)
-                raise
+                    await self._turn(news) if not closed else crank(self.link, self.turns, inf)
+                break
             except BaseException as interruption:
                 caught = interruption
-        return run.result()
+        if closed:
+            raise GeneratorExit
 
     async def _turn(self, news: asyncio.Event) -> None:
         if self.link.virtual:

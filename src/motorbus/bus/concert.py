@@ -129,29 +129,38 @@ class Concert:
 
     def _play(self, parts: Sequence[_Pumped], bell: Bell) -> None:
         clock = clock_of(parts)
-        caught: BaseException | None = None
-        while True:
+        try:
             try:
-                if caught is not None:
-                    _interrupt(parts, caught)
-                else:
-                    for part in parts:
-                        part.bus.relay.bells.add(bell.ring)
-                    _bring_together(parts, bell)
-                while advance(parts):
-                    _turn(parts, bell, clock)
                 for part in parts:
-                    part.bus.relay.bells.discard(bell.ring)
-                return
-            except BaseException as interruption:  # dealt with above, where a second one is caught too
-                caught = interruption
+                    part.bus.relay.bells.add(bell.ring)
+                _bring_together(parts, bell)
+                _go_on(parts, bell, clock)
+            except BaseException as interruption:
+                _clean_up(parts, bell, clock, interruption)
+        except BaseException as interruption:  # a second one fell between the first and what deals with it
+            _clean_up(parts, bell, clock, interruption)
 
 
-def _interrupt(parts: Sequence[_Pumped], interruption: BaseException) -> None:
+def _go_on(parts: Sequence[_Pumped], bell: Bell, clock: Part[Any] | None) -> None:
+    """To the end of them all; nobody rings for us then."""
+    while advance(parts):
+        _turn(parts, bell, clock)
     for part in parts:
-        part.bus.relay.recover()
-    for part in parts:
-        part.run.interrupt(interruption)
+        part.bus.relay.bells.discard(bell.ring)
+
+
+def _clean_up(parts: Sequence[_Pumped], bell: Bell, clock: Part[Any] | None, caught: BaseException) -> None:
+    """Let them all come to their end; one more interrupt meanwhile makes them hurry."""
+    while True:
+        try:
+            for part in parts:
+                part.bus.relay.recover()
+            for part in parts:
+                part.run.interrupt(caught)
+            _go_on(parts, bell, clock)
+            return
+        except BaseException as interruption:
+            caught = interruption
 
 
 def _bring_together(parts: Sequence[_Pumped], bell: Bell) -> None:

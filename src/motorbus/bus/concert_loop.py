@@ -14,6 +14,7 @@ from typing import Any
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.crank import crank
+from motorbus.bus.glide import let_go
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
 from motorbus.bus.watch import NAP
 from motorbus.core.operation import Runnable
@@ -44,30 +45,43 @@ class LoopConcert:
 
 async def _play(parts: Sequence[Part[AsyncBus]], news: asyncio.Event) -> None:
     clock = clock_of(parts)
-    caught: BaseException | None = None
-    while True:
+    try:
         try:
-            if caught is not None:
-                _cut(parts, caught)
-            else:
-                await _gather(parts)
+            await _gather(parts)
             while advance(parts):
                 await _look(parts, news, clock)
-            return
-        except GeneratorExit:  # nobody will await us again: clean up here and now
-            _cut(parts, asyncio.CancelledError())
+        except BaseException as interruption:
+            await _clean_up(parts, news, clock, interruption)
+    except BaseException as interruption:  # a second one fell between the first and what deals with it
+        await _clean_up(parts, news, clock, interruption)
+
+
+async def _clean_up(
+    parts: Sequence[Part[AsyncBus]], news: asyncio.Event, clock: Part[Any] | None, caught: BaseException
+) -> None:
+    """Let them all come to their end; one more interrupt meanwhile makes them hurry."""
+    closed = False
+    while True:
+        try:
+            if isinstance(caught, GeneratorExit):  # nobody will await us again: clean up here and now
+                closed, caught = True, asyncio.CancelledError()
+            for part in parts:
+                let_go(part.turns.lock)
+            for part in parts:
+                part.run.interrupt(caught)
             while advance(parts):
-                for part in parts:
-                    if part.going:
-                        crank(part.link, part.turns, inf)
-            raise
+                await _look(parts, news, clock) if not closed else _crank(parts)
+            break
         except BaseException as interruption:
             caught = interruption
+    if closed:
+        raise GeneratorExit
 
 
-def _cut(parts: Sequence[Part[Any]], interruption: BaseException) -> None:
+def _crank(parts: Sequence[Part[AsyncBus]]) -> None:
     for part in parts:
-        part.run.interrupt(interruption)
+        if part.going:
+            crank(part.link, part.turns, inf)
 
 
 async def _gather(parts: Sequence[Part[AsyncBus]]) -> None:

@@ -127,6 +127,8 @@ def follow(part: Part[Any], clock: Part[Any]) -> float:
         part.push()
     until = clock.time + part.origin
     reached = not part.reach(until) or part.link.now() >= until
+    if part.going:  # an exchange that nobody wants any more may have ended, and made way for the next one
+        part.push()
     if part.turns.settled != settled or not reached:
         return 0.0
     return part.next() - part.link.now() if part.going else inf

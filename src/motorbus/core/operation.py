@@ -153,8 +153,7 @@ class Exchange(Generic[T_co]):
     `tells_position`  the replies begin with the present position, so stop can hold it. As a function it says where that
                   is (rad, by node; none for whom nobody can tell), so the gate can judge by it
     `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
-                  must not, None when it may. It can ask how many stops have left for a node by now. So an order that
-                  was made under other settings, or before a stop, does not leave the queue
+                  must not, None when it may. So what was ordered under other settings, or before a stop, never leaves
     `whole`       of one that is kept: what `read` makes of the answer, straight from all the bytes of the replies due,
                   when each is sound and tells no alarm; else `UNLIKE`. `course` is what a bus keeps of it
     `other`       makes one that says the same and has replies of another length: where replies carry no number, taking
@@ -224,7 +223,8 @@ class Exchange(Generic[T_co]):
 
     def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:
         """The same request, whose answer is read in another way."""
-        rest = [name for name in Exchange.__slots__ if name not in _ITS_OWN]
+        own = ("request", "replies", "read", "other", "whole", "course")
+        rest = [name for name in Exchange.__slots__ if name not in own]
         return Exchange(self.request, self.replies, read, **{name: getattr(self, name) for name in rest})
 
     def __iter__(self) -> Generator[Step, Any, T_co]:
@@ -234,9 +234,6 @@ class Exchange(Generic[T_co]):
     def __repr__(self) -> str:
         shown = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
         return f"<Exchange {shown}>"
-
-
-_ITS_OWN: Final = ("request", "replies", "read", "other", "whole", "course")
 
 
 class Together(Generic[T_co]):
@@ -373,17 +370,20 @@ def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
 def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> Operation[T]:
     """Carry out `runnable`, then `clean_up()`, whatever happens: an unlock is always followed by a lock.
 
-    An error or an interruption, at any line and even in the middle of the clean-up, is raised when the clean-up
-    has been carried out. Cleaning up must be harmless to repeat.
+    An error, or an interruption or two at any line, is raised when that is over. It must be harmless to repeat.
     """
     tries: list[str] = []
     try:
         try:
-            return (yield from runnable)
+            try:
+                return (yield from runnable)
+            finally:
+                yield from _insist(clean_up, tries)
         finally:
-            yield from _insist(clean_up, tries)
+            if not tries:  # an interruption fell between the lines above
+                yield from _insist(clean_up, tries)
     finally:
-        if not tries:  # an interruption fell between the lines above
+        if not tries:  # and a second one
             yield from _insist(clean_up, tries)
 
 
