@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
 from motorbus.bus.run import Branch, Run
@@ -185,3 +187,27 @@ def test_an_interrupt_in_who_listens_to_a_clean_up_leaves_the_rest_of_it_its_tim
         bus.run(afterwards(both(), lambda: write(4, 20, 1)), report=listens)
     assert [packet.id for packet in responder.heard] == [3, 4]
     assert bus.link.now() < 1.1
+
+
+@pytest.mark.parametrize("within", [False, True])
+def test_ctrl_c_while_a_cancelled_one_cleans_up_is_what_is_raised(within: bool) -> None:
+    """Where it falls into the operation as well as where it falls between its steps."""
+    bus, _ = memory_bus()
+
+    def waits() -> Operation[None]:
+        try:
+            yield from Pause(1.0)
+        finally:
+            yield from position(2)
+            if within:
+                raise KeyboardInterrupt("once")
+
+    run = Run(bus.turns, waits(), now=bus.link.now, report=None, wake=lambda: None)
+    run.advance()
+    run.interrupt(asyncio.CancelledError())
+    if not within:
+        run.interrupt(KeyboardInterrupt("once"))
+    while not run.advance():
+        bus.relay.turn()
+    with pytest.raises(KeyboardInterrupt, match="once"):
+        run.result()

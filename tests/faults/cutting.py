@@ -84,6 +84,9 @@ class Scissors:
     `where` is the first of the two and `second` the other, None when there were fewer lines.
     """
 
+    gives_back = True
+    """Whether those who deal with it give back what a `with` that was being left has kept."""
+
     def __init__(self, at: int, error: type[BaseException], later: int = 0) -> None:
         self.at = at
         self.again = at + later
@@ -111,7 +114,9 @@ class Scissors:
 
     def _line(self, frame: FrameType, event: str, argument: object) -> Any:
         if event == "line" and not (
-            putting_away(frame) or returning(frame) or (self.error is MemoryError and leaving(frame))
+            putting_away(frame)
+            or returning(frame)
+            or (leaving(frame) and (self.error is MemoryError or not self.gives_back))
         ):
             self.count += 1
             if self.at == NEVER:

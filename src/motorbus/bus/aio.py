@@ -14,6 +14,7 @@ from typing import Any, Self, TypeVar
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
 from motorbus.bus.glide import glide, let_go
+from motorbus.bus.interruption import closed, foremost
 from motorbus.bus.run import Notify, Run
 from motorbus.bus.watch import Watch
 from motorbus.core.operation import UNLIKE, Exchange, Runnable
@@ -51,20 +52,20 @@ class AsyncBus(BusFace):
 
     async def _clean_up(self, run: Run[Any], news: asyncio.Event, caught: BaseException) -> None:
         """Let what was interrupted come to its end; one more interrupt meanwhile makes it hurry."""
-        closed = False
+        at_once = False
         while True:
             try:
-                let_go(self.turns.lock)
-                if isinstance(caught, GeneratorExit):  # nobody will await us again: clean up here and now
-                    closed, caught = True, asyncio.CancelledError()
-                run.interrupt(caught)
+                at_once = at_once or closed(caught)
+                if not at_once:
+                    let_go(self.turns.lock)
+                run.interrupt(asyncio.CancelledError() if at_once else caught)
                 while not run.advance():
-                    await self._turn(news) if not closed else crank(self.link, self.turns, inf)
+                    await self._turn(news) if not at_once else crank(self.link, self.turns, inf)
                 break
             except BaseException as interruption:
                 caught = interruption
-        if closed:
-            raise GeneratorExit
+        if at_once:
+            raise foremost(caught, run.root.error)
 
     async def _turn(self, news: asyncio.Event) -> None:
         if self.link.virtual:

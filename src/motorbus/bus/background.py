@@ -13,7 +13,8 @@ from typing import Generic, TypeVar
 
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
-from motorbus.bus.run import Run, interrupts
+from motorbus.bus.interruption import interrupts
+from motorbus.bus.run import Run
 from motorbus.bus.ticket import Timer
 from motorbus.core.operation import Operation, Pause
 

@@ -15,6 +15,7 @@ from typing import Any
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.crank import crank
 from motorbus.bus.glide import let_go
+from motorbus.bus.interruption import closed, foremost
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
 from motorbus.bus.watch import NAP
 from motorbus.core.operation import Runnable
@@ -60,22 +61,21 @@ async def _clean_up(
     parts: Sequence[Part[AsyncBus]], news: asyncio.Event, clock: Part[Any] | None, caught: BaseException
 ) -> None:
     """Let them all come to their end; one more interrupt meanwhile makes them hurry."""
-    closed = False
+    at_once = False
     while True:
         try:
-            if isinstance(caught, GeneratorExit):  # nobody will await us again: clean up here and now
-                closed, caught = True, asyncio.CancelledError()
-            for part in parts:
+            at_once = at_once or closed(caught)
+            for part in parts if not at_once else ():
                 let_go(part.turns.lock)
             for part in parts:
-                part.run.interrupt(caught)
+                part.run.interrupt(asyncio.CancelledError() if at_once else caught)
             while advance(parts):
-                await _look(parts, news, clock) if not closed else _crank(parts)
+                await _look(parts, news, clock) if not at_once else _crank(parts)
             break
         except BaseException as interruption:
             caught = interruption
-    if closed:
-        raise GeneratorExit
+    if at_once:
+        raise foremost(caught, *(part.run.root.error for part in parts))
 
 
 def _crank(parts: Sequence[Part[AsyncBus]]) -> None:

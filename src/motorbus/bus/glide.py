@@ -14,6 +14,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus.bus.course import Course, TurnsLock
+from motorbus.bus.interruption import closed
 from motorbus.bus.run import taken
 from motorbus.bus.straight import charted
 from motorbus.core.operation import UNLIKE, Data, Exchange, Unlike
@@ -46,11 +47,12 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
                 return UNLIKE
             watch.expect(course, news)
             value = await news
-        except BaseException:
-            _cut_short(turns, exchange)
+        except BaseException as interruption:
+            _cut_short(turns, exchange, held=not closed(interruption))
             raise
-    except BaseException:  # a second interrupt may fall into what the first one has brought about
-        let_go(turns.lock)
+    except BaseException as interruption:  # a second one may fall into what the first has brought about
+        if not closed(interruption):
+            let_go(turns.lock)
         raise
     if (
         value is UNLIKE
@@ -59,9 +61,10 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
     return value  # type: ignore[no-any-return]
 
 
-def _cut_short(turns: Turns, exchange: Exchange[Any]) -> None:
+def _cut_short(turns: Turns, exchange: Exchange[Any], held: bool) -> None:
     """Whoever waits for this waits no more; in the air it stays until it lands, or its time is over."""
-    let_go(turns.lock)
+    if held:
+        let_go(turns.lock)
     try:
         with turns.lock:
             for flight in turns.flying.values():
@@ -69,7 +72,8 @@ def _cut_short(turns: Turns, exchange: Exchange[Any]) -> None:
                     turns.abandon(flight)
                     return
     finally:  # a task is cancelled, and the interrupt falls in here
-        let_go(turns.lock)
+        if held:
+            let_go(turns.lock)
 
 
 def let_go(lock: TurnsLock) -> None:

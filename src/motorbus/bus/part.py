@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 from motorbus.bus.absence import back
 from motorbus.bus.crank import IDLE, push, reach
 from motorbus.bus.face import BusFace
+from motorbus.bus.interruption import foremost
 from motorbus.bus.run import Run
 from motorbus.core.operation import Runnable
 from motorbus.errors import MotorbusError
@@ -87,7 +88,7 @@ def results(parts: Mapping[str, Part[Any]]) -> dict[str, Any]:
         except MotorbusError as error:
             told[name] = error
         except BaseException as error:  # each part notes there what its cleaning up failed with
-            cut = cut or error
+            cut = error if cut is None else foremost(cut, error)
     if cut is not None:
         raise cut
     return told
@@ -127,8 +128,9 @@ def follow(part: Part[Any], clock: Part[Any]) -> float:
         part.push()
     until = clock.time + part.origin
     reached = not part.reach(until) or part.link.now() >= until
-    if part.going:  # an exchange that nobody wants any more may have ended, and made way for the next one
-        part.push()
     if part.turns.settled != settled or not reached:
         return 0.0
-    return part.next() - part.link.now() if part.going else inf
+    if not part.going:
+        return inf
+    # an exchange that nobody wants any more may have ended, and made way for the next one
+    return 0.0 if part.push() else part.next() - part.link.now()

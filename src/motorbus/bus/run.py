@@ -12,6 +12,7 @@ from math import inf
 from typing import Any, Generic, TypeVar
 
 from motorbus.bus import verdict
+from motorbus.bus.interruption import foremost, interrupts
 from motorbus.bus.known import moves
 from motorbus.bus.look import questions
 from motorbus.bus.ticket import Claim, Flight, Listener, Retune, Ticket, Timer
@@ -274,6 +275,7 @@ class Run(Generic[T]):
             self.deadline = self.now() + CLEAN_UP
             self.patience = PATIENCE
         else:
+            self.interruption = foremost(self.interruption, interruption)
             self.patience = 0.0
             self.deadline = min(self.deadline, self.now() + HURRY)
         if not self.thrown:  # or a second interruption fell into the throwing of the first
@@ -337,8 +339,9 @@ class Run(Generic[T]):
         What the cleaning up failed with goes along as a note, for it may be that a motor still turns.
         """
         if self.interruption is not None:
-            self._note(self.interruption, self.root.error)
-            raise self.interruption
+            told = foremost(self.interruption, self.root.error)
+            self._note(told, self.root.error)
+            raise told
         if self.root.error is not None:
             raise self.root.error
         value: T = self.root.value
@@ -360,11 +363,6 @@ def _looked(turns: Turns, wish: Exchange[T]) -> Operation[T]:
         for question in questions(turns, wish):
             yield from outcome(question)
     return (yield from wish)
-
-
-def interrupts(error: BaseException | None) -> bool:
-    """Whether this is nobody's failure, and may fall on any line: Ctrl-C, the end of a program, want of memory."""
-    return error is not None and (not isinstance(error, Exception) or isinstance(error, MemoryError))
 
 
 def _heed(children: list[Branch]) -> None:

@@ -1,0 +1,153 @@
+"""Which interruption is raised, and a coroutine that is closed: it cleans up at once, whatever falls into that."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Iterator
+from typing import Any
+
+import pytest
+
+from motorbus.bus.interruption import closed, foremost, interrupts
+from motorbus.bus.ticket import Ticket
+from motorbus.errors import NoReply
+from tests.bus.responder import LOCK, guarded
+from tests.bus.several import SeveralAsync, single
+from tests.conftest import Rounds
+from tests.faults.cutting import NEVER, Outcome, Scissors, cut
+
+ERRORS = (KeyboardInterrupt, MemoryError)
+
+
+@pytest.mark.parametrize(
+    ("error", "is_one"),
+    [
+        (KeyboardInterrupt(), True),
+        (asyncio.CancelledError(), True),
+        (GeneratorExit(), True),
+        (MemoryError(), True),
+        (NoReply("silent"), False),
+        (ValueError("a bug"), False),
+        (None, False),
+    ],
+)
+def test_an_interruption_is_nobodys_failure(error: BaseException | None, is_one: bool) -> None:
+    assert interrupts(error) is is_one
+
+
+def test_what_ends_a_program_is_raised_before_what_ends_a_task() -> None:
+    cancelled, stopped, other = asyncio.CancelledError(), KeyboardInterrupt(), MemoryError()
+    assert foremost(cancelled) is cancelled
+    assert foremost(cancelled, None, ValueError("a bug")) is cancelled
+    assert foremost(cancelled, None, stopped, other) is stopped
+    assert foremost(ValueError("a bug"), stopped) is stopped
+    assert foremost(other, stopped) is other
+
+
+def test_what_falls_into_a_closing_is_known_by_it() -> None:
+    def awaits() -> Iterator[None]:
+        try:
+            yield
+        except GeneratorExit:
+            raise KeyboardInterrupt from ValueError("a cause is no context")
+
+    suspended = awaits()
+    next(suspended)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        suspended.close()  # type: ignore[attr-defined]
+    assert closed(caught.value)
+    assert closed(GeneratorExit())
+    assert not closed(KeyboardInterrupt())
+    assert not closed(None)
+
+
+class Closing(Scissors):
+    """Within a closing nobody gives back a lock, for another may hold it."""
+
+    gives_back = False
+
+
+def work(several: SeveralAsync, alone: bool) -> Coroutine[Any, Any, object]:
+    """A guarded change on one bus by itself, or on all of them."""
+    if alone:
+        return several.buses["a"].run(guarded(1, 9))
+    return several.concert.run({name: guarded(1, 9) for name in several.buses})
+
+
+def left(several: SeveralAsync) -> list[str]:
+    wrong = []
+    for name, bus in several.buses.items():
+        turns = bus.turns
+        found = {
+            "the lock": turns.lock._is_owned(),  # type: ignore[attr-defined]
+            "a claim": turns._claims.held or turns._claims.waiting,
+            "something queued": any(not ticket.done for queue in turns._queues for ticket in queue),
+            "a timer": turns._timers,
+            "an open device": several.responders[name].memory[1][LOCK] != 1,
+        }
+        wrong += [f"{name}: {what}" for what, is_there in found.items() if is_there]
+    return wrong
+
+
+async def closed_after(alone: bool, awaits: int, at: int, error: type[BaseException]) -> Outcome | None:
+    """What came of a closing that was cut there; None when all had ended before. Nothing may be left of it."""
+    several = SeveralAsync(True, True)
+    coroutine = work(several, alone)
+    for _ in range(awaits):
+        try:
+            coroutine.send(None)
+        except StopIteration:
+            return None
+    came = cut(coroutine.close, at, error, scissors=Closing)
+    assert left(several) == [], came.where
+    told = await several.concert.run({name: single(2) for name in several.buses})
+    assert set(told.values()) == {2}, came.where
+    await several.close()
+    return came
+
+
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("alone", [True, False], ids=["one bus", "several"])
+def test_an_interruption_at_any_line_of_a_closing_is_raised_and_everyone_has_cleaned_up(
+    alone: bool, error: type[BaseException], rounds: Rounds
+) -> None:
+    async def main() -> int:
+        cuts = awaits = 0
+        while (whole := await closed_after(alone, awaits + 1, NEVER, error)) is not None:
+            awaits += 1
+            assert whole.error is None, "nothing but the closing itself, which Python takes back"
+            lines = len(whole.walked)
+            for at in range(1, lines + 1, -(-lines // rounds(NEVER, 40))):
+                came = await closed_after(alone, awaits, at, error)
+                assert came is not None
+                assert came.where is None or isinstance(came.error, error), (came.where, came.error)
+                cuts += came.where is not None
+        return cuts
+
+    assert asyncio.run(main()) >= 100
+
+
+@pytest.mark.parametrize("alone", [True, False], ids=["one bus", "several"])
+def test_one_that_is_closed_within_the_lock_of_another_call_takes_nothing_from_it(alone: bool) -> None:
+    """As the garbage collector does, who may come by at any line of the same thread."""
+
+    async def main() -> None:
+        several = SeveralAsync(True, True)
+        coroutine = work(several, alone)
+        coroutine.send(None)
+        turns, closings = several.buses["a"].turns, list[bool]()
+        submit = turns.submit
+
+        def close_and_submit(ticket: Ticket, now: float) -> None:
+            turns.submit = submit  # type: ignore[method-assign]
+            coroutine.close()
+            closings.append(turns.lock._is_owned())  # type: ignore[attr-defined]
+            submit(ticket, now)
+
+        turns.submit = close_and_submit  # type: ignore[method-assign]
+        assert await several.buses["a"].run(single(2)) == 2
+        assert closings == [True]
+        assert left(several) == []
+        await several.close()
+
+    asyncio.run(main())
