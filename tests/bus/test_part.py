@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from time import sleep
 from typing import Any
@@ -113,7 +114,12 @@ def test_results_are_values_and_errors_unless_something_else_was_raised() -> Non
     assert told["b"] == 2
 
 
-def test_what_is_no_error_of_ours_is_raised_once_by_advancing_and_in_the_end() -> None:
+@pytest.mark.parametrize("later", [LookupError, asyncio.CancelledError, KeyboardInterrupt])
+def test_what_is_no_error_of_ours_is_raised_once_by_advancing_and_in_the_end(
+    later: type[BaseException],
+) -> None:
+    """The first of them, but rather one that ends the program."""
+
     def stumble() -> Operation[None]:
         yield from Pause(0)
         raise LookupError("no such thing")
@@ -125,7 +131,7 @@ def test_what_is_no_error_of_ours_is_raised_once_by_advancing_and_in_the_end() -
         advance(parts.values())
     assert parts["b"].going
     assert advance(parts.values())
-    parts["b"].run.interrupt(KeyboardInterrupt())
+    parts["b"].run.interrupt(later())
     assert not advance(parts.values())
-    with pytest.raises(LookupError):
+    with pytest.raises(KeyboardInterrupt if later is KeyboardInterrupt else LookupError):
         results(parts)

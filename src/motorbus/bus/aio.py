@@ -6,7 +6,6 @@ Over a link with virtual time whoever awaits turns the crank; elsewhere `watch` 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from functools import cached_property
 from math import inf
 from typing import Any, Self, TypeVar
@@ -16,7 +15,7 @@ from motorbus.bus.face import BusFace
 from motorbus.bus.glide import glide, let_go
 from motorbus.bus.interruption import closed, foremost
 from motorbus.bus.run import Notify, Run
-from motorbus.bus.watch import Watch
+from motorbus.bus.watch import Watch, ringer
 from motorbus.core.operation import UNLIKE, Exchange, Runnable
 
 T = TypeVar("T")
@@ -33,13 +32,8 @@ class AsyncBus(BusFace):
         """Carry out an operation as `Bus.run` does. A cancelled task first cleans up, then raises CancelledError."""
         if isinstance(operation, Exchange) and (value := await glide(self, operation)) is not UNLIKE:
             return value
-        news, loop = asyncio.Event(), asyncio.get_running_loop()
-
-        def wake() -> None:
-            with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
-                loop.call_soon_threadsafe(news.set)
-
-        run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=wake)
+        news = asyncio.Event()
+        run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=ringer(news))
         try:
             try:
                 while not run.advance():
@@ -55,8 +49,7 @@ class AsyncBus(BusFace):
         at_once = False
         while True:
             try:
-                at_once = at_once or closed(caught)
-                if not at_once:
+                if not (at_once := at_once or closed(caught)):
                     let_go(self.turns.lock)
                 run.interrupt(asyncio.CancelledError() if at_once else caught)
                 while not run.advance():

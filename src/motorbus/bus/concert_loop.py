@@ -17,7 +17,7 @@ from motorbus.bus.crank import crank
 from motorbus.bus.glide import let_go
 from motorbus.bus.interruption import closed, foremost
 from motorbus.bus.part import Part, advance, clock_of, follow, results, step
-from motorbus.bus.watch import NAP
+from motorbus.bus.watch import NAP, ringer
 from motorbus.core.operation import Runnable
 
 
@@ -30,12 +30,8 @@ class LoopConcert:
 
     async def run(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
         """As `Concert.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
-        news, loop = asyncio.Event(), asyncio.get_running_loop()
-
-        def wake() -> None:
-            with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
-                loop.call_soon_threadsafe(news.set)
-
+        news = asyncio.Event()
+        wake = ringer(news)
         parts = {
             name: Part(self._buses[name], wanted, self._origins[name], wake)
             for name, wanted in operations.items()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Callable
 from math import inf
 from threading import Thread
 from typing import Any
@@ -18,6 +19,17 @@ from motorbus.link.base import Link
 
 NAP = 0.05  # s; a waiting task looks at its own tickets at least this often
 LOOK = 0.05  # s; how long the reader thread of a link without descriptor waits at a time
+
+
+def ringer(news: asyncio.Event) -> Callable[[], None]:
+    """Sets this on the running loop, from whatever thread."""
+    loop = asyncio.get_running_loop()
+
+    def ring() -> None:
+        with contextlib.suppress(RuntimeError):  # its loop is closed: nobody waits any more
+            loop.call_soon_threadsafe(news.set)
+
+    return ring
 
 
 class Watch:
