@@ -20,6 +20,13 @@ from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 PATIENCE = 20.0  # s; by then what was interrupted has long cleaned up, or never will
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a second interrupt a quarter of a second is left; a process that gets no processor may miss that."""
+    monkeypatch.setattr("motorbus.bus.run.HURRY", PATIENCE)
+    monkeypatch.setattr("motorbus.bus.run.CLEAN_UP", PATIENCE)
+
+
 class Cut(NamedTuple):
     """What came of a guarded change on every bus that was cut, and what is wrong afterwards."""
 
