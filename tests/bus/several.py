@@ -14,7 +14,7 @@ from motorbus.bus.pump import Bus
 from motorbus.core.operation import Exchange, Operation, Pause, Report
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
-from tests.bus.responder import Responder, position
+from tests.bus.responder import LOCK, Responder, position
 from tests.bus.script import admit_all
 
 
@@ -63,6 +63,24 @@ class SeveralAsync:
 def origins(buses: Mapping[str, BusFace]) -> dict[str, float]:
     """What the clock of each shows now."""
     return {name: bus.link.now() for name, bus in buses.items()}
+
+
+def left(buses: Mapping[str, BusFace], responders: Mapping[str, Responder]) -> list[str]:
+    """What of a run that is over is still there, by bus. What has ended leaves the queue when the next is sent."""
+    wrong = []
+    for name, bus in buses.items():
+        turns, relay = bus.turns, getattr(bus, "relay", None)
+        found = {
+            "the lock": turns.lock._is_owned(),  # type: ignore[attr-defined]
+            "a claim": turns._claims.held or turns._claims.waiting,
+            "something queued": any(not one.done for queue in turns._queues for one in queue),
+            "a timer": turns._timers,
+            "somebody who pumps": relay is not None and relay.pumper is not None,
+            "a bell": relay is not None and relay.bells,
+            "an open device": responders[name].memory[1][LOCK] != 1,
+        }
+        wrong += [f"{name}: {what}" for what, is_there in found.items() if is_there]
+    return wrong
 
 
 def single(node: int) -> Operation[int]:

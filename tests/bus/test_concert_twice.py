@@ -6,14 +6,13 @@ On an event loop and without one, where all clocks are virtual, where none is, a
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import pytest
 
-from motorbus.bus.face import BusFace
-from tests.bus.responder import LOCK, Responder, guarded
-from tests.bus.several import Several, SeveralAsync, single
+from tests.bus.responder import guarded
+from tests.bus.several import Several, SeveralAsync, left, single
 from tests.conftest import Figures, Rounds
 from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
 
@@ -32,24 +31,6 @@ class Cut(NamedTuple):
 
     came: Outcome
     wrong: list[str]
-
-
-def left(buses: Mapping[str, BusFace], responders: Mapping[str, Responder]) -> list[str]:
-    """What of a run that is over is still there, by bus."""
-    wrong = []
-    for name, bus in buses.items():
-        turns, relay = bus.turns, getattr(bus, "relay", None)
-        found = {
-            "the lock": turns.lock._is_owned(),  # type: ignore[attr-defined]
-            "a claim": turns._claims.held or turns._claims.waiting,
-            "something queued": turns.waiting,
-            "a timer": turns._timers,
-            "somebody who pumps": relay is not None and relay.pumper is not None,
-            "a bell": relay is not None and relay.bells,
-            "an open device": responders[name].memory[1][LOCK] != 1,
-        }
-        wrong += [f"{name}: {what}" for what, is_there in found.items() if is_there]
-    return wrong
 
 
 def blocking(virtual: tuple[bool, ...], at: int, later: int) -> Cut:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Iterator
+from collections.abc import AsyncGenerator, Coroutine, Iterator
 from typing import Any
 
 import pytest
 
 from motorbus.bus.interruption import closed, foremost, interrupts
 from motorbus.bus.ticket import Ticket
+from motorbus.core.operation import Operation, Pause
 from motorbus.errors import NoReply
-from tests.bus.responder import LOCK, guarded
-from tests.bus.several import SeveralAsync, single
+from tests.bus.responder import guarded, position
+from tests.bus.several import SeveralAsync, left, single
+from tests.bus.test_concert_interrupted import stumble
 from tests.conftest import Rounds
 from tests.faults.cutting import NEVER, Outcome, Scissors, cut
 
@@ -44,6 +46,13 @@ def test_what_ends_a_program_is_raised_before_what_ends_a_task() -> None:
     assert foremost(other, stopped) is other
 
 
+def test_its_notes_go_along() -> None:
+    cancelled, stopped = asyncio.CancelledError(), KeyboardInterrupt()
+    cancelled.add_note("a motor may still turn")
+    assert foremost(cancelled, stopped).__notes__ == ["a motor may still turn"]
+    assert foremost(stopped, KeyboardInterrupt()).__notes__ == ["a motor may still turn"], "once"
+
+
 def test_what_falls_into_a_closing_is_known_by_it() -> None:
     def awaits() -> Iterator[None]:
         try:
@@ -55,10 +64,13 @@ def test_what_falls_into_a_closing_is_known_by_it() -> None:
     next(suspended)
     with pytest.raises(KeyboardInterrupt) as caught:
         suspended.close()  # type: ignore[attr-defined]
-    assert closed(caught.value)
-    assert closed(GeneratorExit())
-    assert not closed(KeyboardInterrupt())
-    assert not closed(None)
+    around = caught.value.__context__
+    assert isinstance(around, GeneratorExit)
+    assert closed(caught.value, None)
+    assert closed(GeneratorExit(), around)
+    assert not closed(caught.value, around), "that was closed by which this has been awaited"
+    assert not closed(KeyboardInterrupt(), None)
+    assert not closed(None, None)
 
 
 class Closing(Scissors):
@@ -74,21 +86,6 @@ def work(several: SeveralAsync, alone: bool) -> Coroutine[Any, Any, object]:
     return several.concert.run({name: guarded(1, 9) for name in several.buses})
 
 
-def left(several: SeveralAsync) -> list[str]:
-    wrong = []
-    for name, bus in several.buses.items():
-        turns = bus.turns
-        found = {
-            "the lock": turns.lock._is_owned(),  # type: ignore[attr-defined]
-            "a claim": turns._claims.held or turns._claims.waiting,
-            "something queued": any(not ticket.done for queue in turns._queues for ticket in queue),
-            "a timer": turns._timers,
-            "an open device": several.responders[name].memory[1][LOCK] != 1,
-        }
-        wrong += [f"{name}: {what}" for what, is_there in found.items() if is_there]
-    return wrong
-
-
 async def closed_after(alone: bool, awaits: int, at: int, error: type[BaseException]) -> Outcome | None:
     """What came of a closing that was cut there; None when all had ended before. Nothing may be left of it."""
     several = SeveralAsync(True, True)
@@ -99,7 +96,7 @@ async def closed_after(alone: bool, awaits: int, at: int, error: type[BaseExcept
         except StopIteration:
             return None
     came = cut(coroutine.close, at, error, scissors=Closing)
-    assert left(several) == [], came.where
+    assert left(several.buses, several.responders) == [], came.where
     told = await several.concert.run({name: single(2) for name in several.buses})
     assert set(told.values()) == {2}, came.where
     await several.close()
@@ -147,7 +144,46 @@ def test_one_that_is_closed_within_the_lock_of_another_call_takes_nothing_from_i
         turns.submit = close_and_submit  # type: ignore[method-assign]
         assert await several.buses["a"].run(single(2)) == 2
         assert closings == [True]
-        assert left(several) == []
+        assert left(several.buses, several.responders) == []
         await several.close()
 
     asyncio.run(main())
+
+
+def test_who_is_awaited_while_another_is_closed_is_not_closed_by_that() -> None:
+    """The end of an async generator may await: others go on while what was cut off there cleans up."""
+    ticks = [0]
+    between: list[int] = []
+
+    async def others() -> None:
+        while True:
+            ticks[0] += 1
+            await asyncio.sleep(0)
+
+    def cleans_up() -> Operation[None]:
+        try:
+            yield from Pause(1000.0)
+        finally:
+            before = ticks[0]
+            yield from position(1)
+            between.append(ticks[0] - before)
+
+    async def ends(several: SeveralAsync) -> AsyncGenerator[None, None]:
+        try:
+            yield
+        finally:
+            with pytest.raises(LookupError):
+                await several.concert.run({"a": cleans_up(), "b": stumble()})
+
+    async def main() -> None:
+        several = SeveralAsync(True, True)
+        beside = asyncio.create_task(others())
+        generator = ends(several)
+        await anext(generator)
+        await generator.aclose()
+        beside.cancel()
+        await several.close()
+
+    asyncio.run(main())
+    assert len(between) == 1
+    assert between[0] > 0

@@ -49,16 +49,16 @@ class AsyncBus(BusFace):
         at_once = False
         while True:
             try:
-                if not (at_once := at_once or closed(caught)):
+                if not (at_once := at_once or closed(caught, run.around)):
                     let_go(self.turns.lock)
-                run.interrupt(asyncio.CancelledError() if at_once else caught)
+                run.interrupt(asyncio.CancelledError() if isinstance(caught, GeneratorExit) else caught)
                 while not run.advance():
                     await self._turn(news) if not at_once else crank(self.link, self.turns, inf)
                 break
             except BaseException as interruption:
                 caught = interruption
         if at_once:
-            raise foremost(caught, run.root.error)
+            raise foremost(caught, run.told())
 
     async def _turn(self, news: asyncio.Event) -> None:
         if self.link.virtual:

@@ -60,18 +60,18 @@ async def _clean_up(
     at_once = False
     while True:
         try:
-            at_once = at_once or closed(caught)
+            at_once = at_once or any(closed(caught, part.run.around) for part in parts)
             for part in parts if not at_once else ():
                 let_go(part.turns.lock)
             for part in parts:
-                part.run.interrupt(asyncio.CancelledError() if at_once else caught)
+                part.run.interrupt(asyncio.CancelledError() if isinstance(caught, GeneratorExit) else caught)
             while advance(parts):
                 await _look(parts, news, clock) if not at_once else _crank(parts)
             break
         except BaseException as interruption:
             caught = interruption
     if at_once:
-        raise foremost(caught, *(part.run.root.error for part in parts))
+        raise foremost(caught, *(part.run.told() for part in parts))
 
 
 def _crank(parts: Sequence[Part[AsyncBus]]) -> None:

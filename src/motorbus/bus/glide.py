@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 from collections.abc import Callable
 from math import inf
 from threading import get_ident
@@ -40,6 +41,7 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
     if not watch.sees(loop):
         return UNLIKE
     news: asyncio.Future[Any] = loop.create_future()
+    around = sys.exception()
     try:
         try:
             course = rise(turns, bus.link, exchange, _bell(loop, news))
@@ -48,10 +50,10 @@ async def glide(bus: AsyncBus, exchange: Exchange[T]) -> T | Unlike:
             watch.expect(course, news)
             value = await news
         except BaseException as interruption:
-            _cut_short(turns, exchange, held=not closed(interruption))
+            _cut_short(turns, exchange, held=not closed(interruption, around))
             raise
     except BaseException as interruption:  # a second one may fall into what the first has brought about
-        if not closed(interruption):
+        if not closed(interruption, around):
             let_go(turns.lock)
         raise
     if (

@@ -11,20 +11,25 @@ def interrupts(error: BaseException | None) -> bool:
 
 
 def foremost(first: BaseException, *others: BaseException | None) -> BaseException:
-    """Which of them is raised: the first; but one that ends a program counts for more than one that ends a task."""
-    if not isinstance(first, HARD):
-        for other in others:
-            if isinstance(other, HARD):
-                return other
-    return first
+    """Which of them is raised: the first; but one that ends a program counts for more than one that ends a task.
+
+    The notes of the first go along.
+    """
+    told = next((one for one in (first, *others) if isinstance(one, HARD)), first)
+    for note in getattr(first, "__notes__", ()) if told is not first else ():
+        told.add_note(note)
+    return told
 
 
-def closed(error: BaseException | None) -> bool:
+def closed(error: BaseException | None, around: BaseException | None) -> bool:
     """Whether this has closed a coroutine, or has fallen into what deals with that: nobody will await it any more.
 
     That is done by hand or by the garbage collector, which may come by within any call of the same thread, one that
     holds the lock of the bus included. What is closed was awaiting and held nothing, so it lets go of nothing.
+    `around` is what whoever awaits it was dealing with from the beginning, which may be a closing of his own.
     """
-    while error is not None and not isinstance(error, GeneratorExit):
+    while error is not None and error is not around:
+        if isinstance(error, GeneratorExit):
+            return True
         error = error.__context__
-    return error is not None
+    return False

@@ -7,6 +7,7 @@ steps the operation then yields are carried out under a deadline of their own, a
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from math import inf
 from typing import Any, Generic, TypeVar
@@ -98,6 +99,7 @@ class Run(Generic[T]):
         self.report = report
         self.wake = wake
         self.losses = turns.losses
+        self.around = sys.exception()  # what its caller was dealing with already is no interruption of this
         self.interruption: BaseException | None = None
         self.noted: set[str] = set()
         self.thrown = False
@@ -334,18 +336,19 @@ class Run(Generic[T]):
                     self.turns.abandon(branch.ticket)
 
     def result(self) -> T:
-        """What the operation returned; raises what it raised, or the interruption it was cut by.
-
-        What the cleaning up failed with goes along as a note, for it may be that a motor still turns.
-        """
-        if self.interruption is not None:
-            told = foremost(self.interruption, self.root.error)
-            self._note(told, self.root.error)
+        """What the operation returned; raises what it raised, or the interruption it was cut by."""
+        if (told := self.told()) is not None:
             raise told
-        if self.root.error is not None:
-            raise self.root.error
         value: T = self.root.value
         return value
+
+    def told(self) -> BaseException | None:
+        """What that will raise; what the cleaning up failed with goes along as a note: a motor may still turn."""
+        if self.interruption is None:
+            return self.root.error
+        told = foremost(self.interruption, self.root.error)
+        self._note(told, self.root.error)
+        return told
 
 
 def taken(turns: Turns, exchange: Exchange[T], answer: Any) -> Any:
