@@ -34,6 +34,7 @@ LEFT = (
     "somebody who pumps",
 )
 """What may be left on a bus of a call that is over."""
+TAKING_UP = [opmap[name] for name in ("PUSH_EXC_INFO", "CLEANUP_THROW") if name in opmap]
 UNSENT = re.compile("nothing was sent(?! to stop)")
 
 _ours: dict[str, bool] = {}
@@ -60,13 +61,13 @@ def leaving(frame: FrameType) -> bool:
 
 
 def putting_away(frame: FrameType) -> bool:
-    """Whether an error is about to be taken up by a `with` or `except`, or to be put away by it.
+    """Whether an error is about to be taken up by a `with`, `except` or `await`, or to be put away by it.
 
     No signal is looked at there either; and what a tracer throws there leaves that error behind for good as the one
-    that is dealt with, and with it every bus and thread of its frames.
+    that is dealt with, and with it every bus and thread of its frames, or takes its place.
     """
     now, *later = frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 4 : 2]
-    return now == opmap["PUSH_EXC_INFO"] or opmap["POP_EXCEPT"] in later
+    return now in TAKING_UP or opmap["POP_EXCEPT"] in later
 
 
 def returning(frame: FrameType) -> bool:
