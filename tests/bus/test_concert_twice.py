@@ -14,7 +14,7 @@ import pytest
 from tests.bus.responder import guarded
 from tests.bus.several import Several, SeveralAsync, left, single
 from tests.conftest import Figures, Rounds
-from tests.faults.cutting import NEVER, Outcome, Twice, cut, places
+from tests.faults.cutting import NEVER, Outcome, Twice, cut, laters, places
 
 PATIENCE = 20.0  # s; by then what was interrupted has long cleaned up, or never will
 
@@ -89,7 +89,7 @@ def test_l17_a_second_interrupt_while_the_first_is_dealt_with_on_several_buses(
     walked = run(virtual, NEVER, 0).came.walked
     cuts, twice, wrong = 0, 0, list[str]()
     for number, at in enumerate(places(walked, 1, rounds(600, 12))):
-        for later in (1 + number % 6, 1 + number * 7 % 23, 1 + number * 37 % 400):
+        for later in laters(number):
             came, found = run(virtual, at, later)
             ended = came.where is None or isinstance(came.error, KeyboardInterrupt)
             found += [] if ended else [f"it ended with {came.error!r}"]

@@ -50,7 +50,8 @@ def test_its_notes_go_along() -> None:
     cancelled, stopped = asyncio.CancelledError(), KeyboardInterrupt()
     cancelled.add_note("a motor may still turn")
     assert foremost(cancelled, stopped).__notes__ == ["a motor may still turn"]
-    assert foremost(stopped, KeyboardInterrupt()).__notes__ == ["a motor may still turn"], "once"
+    assert foremost(cancelled, stopped).__notes__ == ["a motor may still turn"], "once"
+    assert foremost(stopped, KeyboardInterrupt()) is stopped
 
 
 def test_what_falls_into_a_closing_is_known_by_it() -> None:

@@ -205,6 +205,11 @@ def places(walked: list[tuple[object, int]], visits: int, most: int) -> list[int
     return found[:: -(-len(found) // most)] if len(found) > most else found
 
 
+def laters(number: int) -> tuple[int, ...]:
+    """How many lines after this many-th first interrupt the second ones fall: at once, soon, and much later."""
+    return 1 + number % 6, 1 + number * 7 % 23, 1 + number * 37 % 400
+
+
 def told(error: BaseException | None) -> str:
     """Everything an error says."""
     return "\n".join([str(error), *getattr(error, "__notes__", ())])

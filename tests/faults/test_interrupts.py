@@ -29,6 +29,7 @@ from tests.faults.cutting import (
     Twice,
     afterwards,
     cut,
+    laters,
     left_behind,
     places,
     stuck,
@@ -142,11 +143,6 @@ def test_l17_an_interrupt_at_any_line_of_an_emergency_stop(
     figures("L17 interrupts: emergency stop", family=family, lines=len(lines), cuts=cuts, unsent=unsent)
     assert wrong == []
     assert cuts
-
-
-def laters(number: int) -> tuple[int, ...]:
-    """How many lines after this many-th first interrupt the second ones fall: at once, soon, and much later."""
-    return 1 + number % 6, 1 + number * 7 % 23, 1 + number * 37 % 400
 
 
 @pytest.mark.timeout(1800)

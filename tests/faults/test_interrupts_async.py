@@ -15,10 +15,10 @@ import pytest
 
 from motorbus.bus.aio import AsyncBus
 from tests.conftest import Figures, Rounds
-from tests.faults.cutting import NEVER, Outcome, Scissors, Twice, afterwards, cut, places, stuck
+from tests.faults.cutting import NEVER, Outcome, Scissors, Twice, afterwards, cut, laters, places, stuck
 from tests.faults.off import are_off
 from tests.faults.scenes import KINDS, Scene
-from tests.faults.test_interrupts import ERRORS, OFTEN_CUT, VISITS, laters
+from tests.faults.test_interrupts import ERRORS, OFTEN_CUT, VISITS
 
 
 @contextmanager

@@ -13,10 +13,11 @@ def interrupts(error: BaseException | None) -> bool:
 def foremost(first: BaseException, *others: BaseException | None) -> BaseException:
     """Which of them is raised: the first; but one that ends a program counts for more than one that ends a task.
 
-    The notes of the first go along.
+    The notes of the first go along, once.
     """
     told = next((one for one in (first, *others) if isinstance(one, HARD)), first)
-    for note in getattr(first, "__notes__", ()) if told is not first else ():
+    known = getattr(told, "__notes__", ())
+    for note in [note for note in getattr(first, "__notes__", ()) if note not in known]:
         told.add_note(note)
     return told
 
