@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -87,6 +88,19 @@ def _is_usual(item: pytest.Item) -> bool:
 def _is_quick(item: pytest.Item) -> bool:
     inside = item.path.is_relative_to(HERE) and item.path.relative_to(HERE).parts[0] in QUICK_FOLDERS
     return _is_usual(item) and (inside or item.get_closest_marker("quick") is not None)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def user_folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Redirect state, configuration and cache of this process and its children away from the user's own.
+
+    Without this, `motorbus estop` in a test would stop real buses of the user who runs the tests.
+    """
+    root = tmp_path_factory.mktemp("xdg")
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("STATE", "CONFIG", "CACHE"):
+            patch.setenv(f"XDG_{name}_HOME", str(root / name.lower()))
+        yield root
 
 
 class Rounds(Protocol):
