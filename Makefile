@@ -14,8 +14,7 @@ help:
 	@echo "make demo    nine simulated axes of three families are found and moved together; picture in build/demo.png"
 	@echo "make test    every test but the long ones"
 	@echo "make check   lint, types, import contracts, strict docs, a few tests on every other Python found"
-	@echo "make soak    the long runs; their figures go into docs/reliability.md, those of files that differ from their"
-	@echo "             commit only with TAKE=--dirty"
+	@echo "make soak    the long runs; their figures are printed"
 	@echo "make bench   side by side with other libraries"
 	@echo "make docs    the documentation, into build/site"
 	@echo "make lock    resolve the dependencies anew (needs the network)"
@@ -32,20 +31,14 @@ test: $(READY) $(PEERS)
 	$(BIN)/python -m pytest -n auto --dist loadgroup $(ARGS)
 
 soak: $(READY) $(PEERS)
-	@$(BIN)/python -m scripts.soaked $(TAKE)
-	@failed=0; $(BIN)/python -m pytest --soak -s --durations=0 $(ARGS) || failed=1; \
-	$(BIN)/python -m scripts.reliability --take $(TAKE) || [ $$? = 2 ] || failed=1; exit $$failed
+	$(BIN)/python -m pytest --soak -s --durations=0 $(ARGS)
 
 bench: $(READY) $(PEERS)
 	$(BIN)/python -m bench $(ARGS)
 
 docs: $(READY)
-	$(BIN)/python -m scripts.coverage
 	$(BIN)/python -m scripts.feetech_registers
-	$(BIN)/python -m scripts.feetech_peers
 	$(BIN)/python -m scripts.machine_file
-	$(BIN)/python -m scripts.mutants --write
-	$(BIN)/python -m scripts.reliability
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters

@@ -16,7 +16,6 @@ import pytest
 from hypothesis import settings
 
 from motorbus.link import adapters
-from scripts import soaked
 
 HERE = Path(__file__).parent
 USUAL_ROUNDS = 10_000
@@ -35,7 +34,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("motorbus")
     group.addoption("--soak", action="store_true", help="only the long runs, with their full counts")
     group.addoption("--quick", action="store_true", help="only a small subset, with small counts")
-    group.addoption("--faults-off", action="store_true", help="nothing goes wrong; tests of faults must fail")
 
 
 def _profile(config: pytest.Config) -> str:
@@ -48,11 +46,7 @@ def _profile(config: pytest.Config) -> str:
 def pytest_configure(config: pytest.Config) -> None:
     if _profile(config) == "soak" and config.option.timeout is None:
         config.option.timeout = LONG_RUN
-    settings.load_profile("quick" if config.getoption("--faults-off") else _profile(config))
-    if config.getoption("--faults-off"):
-        from tests.faults.off import switch_off
-
-        switch_off(pytest.MonkeyPatch())
+    settings.load_profile(_profile(config))
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -115,7 +109,7 @@ def rounds(pytestconfig: pytest.Config) -> Rounds:
 
     What takes long may say that fewer are usual: `rounds(100_000, 2_500)`.
     """
-    few = pytestconfig.getoption("--faults-off") or _profile(pytestconfig) == "quick"
+    few = _profile(pytestconfig) == "quick"
 
     def count(full: int, usual: int = USUAL_ROUNDS) -> int:
         most = full if _profile(pytestconfig) == "soak" else usual
@@ -127,9 +121,7 @@ def rounds(pytestconfig: pytest.Config) -> Rounds:
 class Figures(Protocol):
     """Tells the figures of a run: what it was, then numbers and short words by name."""
 
-    def __call__(
-        self, what: str, *, family: str = "", promise: int = 0, **figures: int | float | str
-    ) -> None: ...
+    def __call__(self, what: str, *, family: str = "", **figures: int | float | str) -> None: ...
 
 
 @pytest.fixture
@@ -139,17 +131,11 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def figures(request: pytest.FixtureRequest) -> Figures:
-    """`figures("L7 late replies", family="kst", promise=3, reads=n, wrong=count)`: printed, and kept by `make soak`.
+def figures() -> Figures:
+    """`figures("L7 late replies", family="kst", reads=n, wrong=count)`: print the counts of a long run."""
 
-    `promise` is the number of the promise of docs/reliability.md that the run proves. A figure is what was counted;
-    what ends the run at the first one, as an error does, is none.
-    """
-
-    def tell(what: str, *, family: str = "", promise: int = 0, **figures: int | float | str) -> None:
+    def show(what: str, *, family: str = "", **figures: int | float | str) -> None:
         shown = ", ".join(f"{name} {value}" for name, value in figures.items())
         print(f"\n{what}{f' ({family})' if family else ''}: {shown}")
-        if _profile(request.config) == "soak":
-            soaked.record(what, family=family, promise=promise, test=request.node.nodeid, **figures)
 
-    return tell
+    return show

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import threading
-from itertools import chain
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -12,12 +11,9 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import Exchange, Operation
 from motorbus.errors import LinkLost, NoReply
-from tests.bus.responder import LOCK, Responder, async_bus, guarded, memory_bus, position, positions
-from tests.conftest import Rounds
-from tests.faults.cutting import Outcome, Twice, cut
+from tests.bus.responder import async_bus, memory_bus, position, positions
 
 PACKAGE = Path(motorbus.__file__).parent
 BUS_FILES = {str(path) for path in (PACKAGE / "bus").glob("*.py")} | {str(PACKAGE / "core" / "operation.py")}
@@ -119,71 +115,6 @@ def run_interrupted(bus: Any, operation: Any, at: int) -> bool:
     return tracer.count >= at
 
 
-def check_usable(bus: Any, responder: Responder, at: int) -> None:
-    """The next exchanges are right, from this thread and from another."""
-    assert bus.run(position(1)) == 1, f"interrupted at line {at}"
-    assert bus.run(single(2)) == 2, f"interrupted at line {at}"
-    others: list[int] = []
-    thread = threading.Thread(target=lambda: others.append(bus.run(position(3))))
-    thread.start()
-    thread.join(20)
-    assert others == [3], f"interrupted at line {at}: the lock is still held"
-    assert responder.memory[1][LOCK] == 1, f"interrupted at line {at}: the lock register is open"
-
-
-@pytest.mark.parametrize("make", [lambda: position(1), lambda: single(1), lambda: guarded(1, 9)])
-def test_an_interrupt_at_any_line_leaves_the_bus_usable(make: Any) -> None:
-    at = 0
-    while True:
-        at += 1
-        bus, responder = memory_bus()
-        inside = run_interrupted(bus, make(), at)
-        check_usable(bus, responder, at)
-        if not inside:
-            break
-    assert at > 100, "the whole path was walked"
-
-
-class InterruptTwice(Interrupt):
-    """Once more, some lines after the first; but Python puts away a tracer that raises, so `Twice` is what strikes."""
-
-    def __init__(self, at: int, later: int) -> None:
-        super().__init__(at)
-        self.later = later
-
-    def __call__(self, frame: FrameType, event: str, argument: object) -> Any:
-        again = super().__call__(frame, event, argument)
-        if event == "line" and again is not None and self.count == self.at + self.later:
-            raise KeyboardInterrupt
-        return again
-
-
-@pytest.mark.timeout(1800)
-@pytest.mark.parametrize("later", [1, 2, 3, 5, 8, 13, 21, 34, 55, 89])
-def test_a_second_interrupt_shortens_the_clean_up_and_never_skips_it(later: int, rounds: Rounds) -> None:
-    cuts, twice = 0, 0
-    for at in range(1, 600, 600 // rounds(600, 86)):
-        bus, responder = memory_bus()
-        came = twice_cut(bus, at, later)
-        assert isinstance(came.error, KeyboardInterrupt), (came.where, came.again)
-        assert left_over(bus) == [], (came.where, came.again)
-        check_usable(bus, responder, at)
-        cuts += 1
-        twice += came.again is not None
-    assert twice >= cuts * 2 / 3  # the others were over by then
-
-
-def twice_cut(bus: Bus, at: int, later: int) -> Outcome:
-    """A guarded change on this bus, cut there and so many lines later."""
-    return cut(lambda: bus.run(guarded(1, 9)), at, KeyboardInterrupt, later, Twice)
-
-
-def left_over(bus: Bus) -> list[object]:
-    """What still waits on this bus."""
-    turns = bus.turns
-    return [*chain(*turns._queues), *turns._timers, *turns._claims.waiting, *turns._claims.held]
-
-
 def test_a_dead_node_among_threads_fails_only_its_own() -> None:
     bus, responder = memory_bus(virtual=False)
     responder.dead = {7}
@@ -212,9 +143,3 @@ def test_the_blocking_and_the_async_bus_share_everything_but_waiting() -> None:
     assert type(blocking).__mro__[1] is type(awaiting).__mro__[1]
     exchange: Exchange[int] = position(1)
     assert blocking.run(exchange) == 1
-
-
-@pytest.mark.parametrize("name", ["pump.py", "aio.py"])
-def test_the_pumps_stay_small(name: str) -> None:
-    """Under 80 lines with everything in them: whoever waits for bytes has no business with policy."""
-    assert len((PACKAGE / "bus" / name).read_text().splitlines()) < 80

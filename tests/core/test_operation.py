@@ -24,7 +24,6 @@ from motorbus.core.operation import (
     outcome,
 )
 from motorbus.errors import MotorbusError, NoReply
-from tests.faults.cutting import Outcome, Twice, cut
 
 
 def number(value: int) -> Exchange[int]:
@@ -135,33 +134,6 @@ def test_an_interruption_of_the_clean_up_repeats_it() -> None:
     assert log == ["lock", "lock"]
     with pytest.raises(KeyboardInterrupt):
         operation.send(None)
-
-
-def test_two_interruptions_at_any_lines_leave_nothing_open() -> None:
-    at, twice, came = 0, 0, cut(list)
-    while not at or came.where is not None:
-        at += 1
-        for later in range(1, 40):
-            log, came = cut_twice(at, later)
-            assert "closed" in log or "open" not in log, (came.where, came.again)
-            assert came.where is None or isinstance(came.error, KeyboardInterrupt), (came.where, came.again)
-            twice += came.again is not None
-    assert twice > 100
-
-
-def cut_twice(at: int, later: int) -> tuple[list[str], Outcome]:
-    """Something is opened, and closed afterwards, whose steps are all granted: what was done, and what came of it."""
-    log: list[str] = []
-
-    def act() -> Operation[None]:
-        log.append("open")
-        yield from number(1)
-
-    def clean_up() -> Operation[None]:
-        yield from number(9)
-        log.append("closed")
-
-    return log, cut(lambda: list(afterwards(act(), clean_up)), at, later=later, scissors=Twice)
 
 
 def test_a_clean_up_that_fails_is_not_repeated_for_ever() -> None:

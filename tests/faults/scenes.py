@@ -42,8 +42,6 @@ COUNTS = {"feetech": 4096, "kst": 3600}
 class Wire(PerfectLine):
     """A perfect line that keeps what the host has sent."""
 
-    asks_by_itself = True  # there is no harm in it
-
     def __init__(self) -> None:
         self.sent: list[Data] = []
 

@@ -94,7 +94,6 @@ ANSWERED: dict[str, Callable[[Rig, Servo], Any]] = {
 }
 
 
-@pytest.mark.faultless("the fault is in the servo: that it was told is what is asserted")
 @pytest.mark.parametrize("what", ANSWERED)
 def test_d4_alarm_bits_spoil_no_answer_and_are_told(what: str) -> None:
     rig = Rig()
@@ -113,7 +112,6 @@ def test_d4_alarm_bits_spoil_no_answer_and_are_told(what: str) -> None:
     )
 
 
-@pytest.mark.faultless("the fault is in the servos: that they told it is what is asserted")
 def test_d4_a_stop_visits_all_whatever_they_have_to_say() -> None:
     rig = Rig()
     servos = [Servo(rig.bus, id) for id in IDS]
@@ -154,7 +152,6 @@ def _at_level(level: int) -> tuple[Rig, Servo]:
     return rig, servo
 
 
-@pytest.mark.faultless("what it does not answer is a setting of the servo")
 @pytest.mark.parametrize("level", [0, ACKNOWLEDGED_TOO])
 @pytest.mark.parametrize("what", ANSWERED)
 def test_d5_what_is_not_acknowledged_is_done_all_the_same(what: str, level: int) -> None:

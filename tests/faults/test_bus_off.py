@@ -18,7 +18,6 @@ from motorbus.simulation.clients import Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
 from tests.conformance.world import said
-from tests.faults.off import are_off
 from tests.faults.scenes import Scene
 from tests.faults.test_reconnect import again, free_port
 from tests.simulation.served import served
@@ -43,7 +42,7 @@ class Failing:
 
     def receive(self, data: Data, at: float) -> None:
         assert isinstance(data, CanFrame)
-        if self.off and not are_off():
+        if self.off:
             self.refused += 1
             self._says.append((at, CanFrame(ERROR_FLAG | BUS_OFF, bytes(8))))
         else:

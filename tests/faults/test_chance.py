@@ -106,7 +106,7 @@ def test_l3_one_byte_in_a_hundred_is_another_one(rounds: Rounds, figures: Figure
     assert ledger.wrong <= 8
     figures(
         "L3 two-byte reads, 1 % of bytes changed, unconfirmed",
-        family="feetech", promise=2, seed=11, reads=total, expected=round(expected * total, 2), **ledger.told(),
+        family="feetech", seed=11, reads=total, expected=round(expected * total, 2), **ledger.told(),
     )  # fmt: skip
 
 
@@ -119,7 +119,7 @@ def test_l4_one_bit_in_eight_hundred_is_turned(rounds: Rounds, figures: Figures)
     assert ledger.wrong <= 57
     figures(
         "L4 two-byte reads, bits turned at a rate of 0.125 %, unconfirmed",
-        family="feetech", promise=2, seed=11, reads=total, expected=round(expected * total, 2), **ledger.told(),
+        family="feetech", seed=11, reads=total, expected=round(expected * total, 2), **ledger.told(),
     )  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def test_l3_l4_confirmed_nothing_is_wrong(row: str, what: str, rounds: Rounds, f
     sent = rig.bus.statistics.of(1).sent - before
     figures(
         f"{row} positions confirmed by two readings, 1 % of bytes struck ({what})",
-        family="feetech", promise=2, seed=12, positions=total, exchanges=sent, **ledger.told(),
+        family="feetech", seed=12, positions=total, exchanges=sent, **ledger.told(),
     )  # fmt: skip
     assert ledger.line.count > 0.1 * total
     assert sent >= 2 * total
@@ -168,9 +168,7 @@ def test_l7_late_replies_give_no_stale_value(family: str, rounds: Rounds, figure
         "while the line is held up, a few reads find it silent"
     )
     assert rig.bus.statistics.other["late"] > 0
-    figures(
-        "L7 late replies", family=family, promise=3, seed=7, reads=total, stale=ledger.wrong, **ledger.told()
-    )
+    figures("L7 late replies", family=family, seed=7, reads=total, stale=ledger.wrong, **ledger.told())
 
 
 def read_position(rig: KstRig) -> None:
@@ -178,7 +176,6 @@ def read_position(rig: KstRig) -> None:
     assert rig.servo.read_raw("present_position") == {"present_position": raw}
 
 
-@pytest.mark.faultless("it is about arithmetic, and no line carries anything")
 def test_the_line_between_chance_and_a_fault_is_that_of_poisson() -> None:
     """For 2.2 and 37 expected, the figures that tables of that distribution have for 99.9 %."""
     assert (poisson_line(2.2), poisson_line(37.0)) == (8, 57)

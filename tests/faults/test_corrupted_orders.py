@@ -125,7 +125,6 @@ def test_l5_how_often_a_changed_order_passes_the_sum(rounds: Callable[[int], int
     assert passed <= expected + 4 * expected**0.5 + 1
 
 
-@pytest.mark.faultless("it is the same without the forger, which shows that it is he who is found out")
 def test_l5_whoever_writes_by_name_reads_back_what_lasts() -> None:
     """Without the forger the same writes succeed: it is the change that is found, and not something else."""
     line = Forger(lambda packet: False, 6, servo_mended)

@@ -178,7 +178,6 @@ def at_the_end_of(port: bool, device: Counting) -> Iterator[Link]:
         master.close()
 
 
-@pytest.mark.faultless("the line is perfect: what goes wrong would be the crowd's own doing")
 @pytest.mark.timeout(3600)
 @pytest.mark.usefixtures("restless")
 @pytest.mark.parametrize("port", [False, True], ids=["virtual", "pseudo-terminal"])
@@ -211,7 +210,6 @@ def test_l16_a_crowd_on_one_bus(kind: str, port: bool, rounds: Rounds, figures: 
     )
 
 
-@pytest.mark.faultless("the line is perfect: what goes wrong would be the crowd's own doing")
 @pytest.mark.timeout(3600)
 @pytest.mark.usefixtures("restless")
 def test_l16_a_crowd_where_several_fly_at_once(rounds: Rounds, figures: Figures) -> None:

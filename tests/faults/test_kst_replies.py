@@ -19,7 +19,6 @@ ABORTS = ("abort instead", "swapped instead", "swapped before")
 ALL = ("lost", "late", "twice", *WRONG, *ABORTS)
 
 
-@pytest.mark.faultless("reports are no fault: a servo sends them unasked")
 @pytest.mark.timeout(900)
 def test_reports_500_times_a_second_on_the_reply_identifier_fail_no_read(
     rounds: Callable[[int], int],
@@ -37,7 +36,6 @@ def test_reports_500_times_a_second_on_the_reply_identifier_fail_no_read(
     assert ledger.sent - total == (total - 1) // EQUAL_RUN, "a run of equal answers ends in a probe"
 
 
-@pytest.mark.faultless("reports are no fault: servos send them unasked")
 @pytest.mark.timeout(900)
 def test_reports_of_many_nodes_with_many_reads_in_flight_fail_none(rounds: Callable[[int], int]) -> None:
     total = rounds(100_000)

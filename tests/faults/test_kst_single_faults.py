@@ -71,7 +71,7 @@ def test_l1_l2_each_fault_of_each_frame_tells_nothing_false(
         assert tally.succeeded >= tally.faults - late, (
             "what may be said again gets over any but the longest wait"
         )
-    figures(f"L1 L2 single frame faults, {name}", family="kst", promise=1, **tally.told)
+    figures(f"L1 L2 single frame faults, {name}", family="kst", **tally.told)
 
 
 @pytest.mark.parametrize("thinks", [0.0001, 0.001])

@@ -50,7 +50,6 @@ def test_a_long_walk_among_faults(family: str, rounds: Callable[[int], int], fig
     figures(
         "L1-L11, L15, D3 stateful machine, every verb among faults of every kind",
         family=family,
-        promise=2,
         seed=7,
         exchanges=rig.line.exchange,
         calls=sum(rig.calls.values()),
@@ -119,7 +118,6 @@ def test_every_fault_of_a_machine_fires(family: str) -> None:
         rig.rest()
 
 
-@pytest.mark.faultless("the judge is tried by what it is told")
 def test_a_value_that_is_old_is_found_out() -> None:
     """The judge itself: what the servo held before the call, and holds no more, is no answer."""
     rig = FeetechRig()

@@ -26,8 +26,6 @@ from motorbus.motion.safety import Gate
 from motorbus.simulation.history import History
 from tests.faults.oracle import SAYS, FalseWord, Oracle, Outcome, outcome
 
-pytestmark = pytest.mark.faultless("the judge is tried by what it is told, and no line carries it")
-
 
 class Bench:
     """A servo whose acceleration is written as a test likes, and its judge."""

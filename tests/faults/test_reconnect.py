@@ -28,7 +28,6 @@ from motorbus.session.opening import prepare
 from motorbus.session.robot import Robot
 from motorbus.simulation.mount import Mount
 from tests.conftest import Figures
-from tests.faults.off import are_off
 from tests.simulation.served import served
 
 TRIES = 1_000
@@ -64,8 +63,6 @@ def pause(seconds: float = LOOK) -> Operation[None]:
 
 def kill(simulated: Simulated, **place: Any) -> None:
     """Kill it, and remove the link that it leaves behind: its number may be another terminal's by now."""
-    if are_off():
-        return
     simulated.process.kill()
     simulated.process.communicate()
     if "link" in place:

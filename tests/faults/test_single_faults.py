@@ -118,8 +118,7 @@ def test_l1_l2_every_fault_of_every_exchange(model: str, name: str, figures: Fig
         how = f"toward the {to.value}{', byte by byte' if bytewise else ''}"
         figures(
             f"L1 L2 single byte faults, {model}, {name}, {how}",
-            family="feetech",
-            promise=1 if to is Side.HOST else 0,
+            family="feetech" if to is Side.HOST else "",
             **tally.told,
         )
 
@@ -133,7 +132,6 @@ def test_l1_l5_a_write_that_is_read_back_is_never_called_done_when_it_is_not(rou
     assert tally.misled > 0, "the servo heard another request, and reading back told so"
 
 
-@pytest.mark.faultless("it is about bytes, and no line carries them")
 def test_l2_a_byte_too_many_can_make_another_request() -> None:
     """A changed byte never gets past the sum. One too many can, behind the id, where it passes for a shorter length.
 

@@ -47,7 +47,6 @@ def told(make: Callable[[], Any], pieces: list[bytes]) -> list[Event]:
     return events + (list(receiver.flush()) if hasattr(receiver, "flush") else [])
 
 
-@pytest.mark.faultless("it is about bytes, and no line carries them")
 @pytest.mark.parametrize("name", REPLIES)
 def test_l10_every_way_to_cut_a_reply_gives_the_same_events(name: str) -> None:
     make, data = REPLIES[name]
@@ -94,7 +93,6 @@ def test_l10_every_way_to_cut_a_reply_is_the_same_reply_to_a_bus(
     assert tried_again(rig.bus) == 0
 
 
-@pytest.mark.faultless("it is about bytes, and no line carries them")
 def test_l11_answers_in_one_piece_with_noise_between_are_each_heard_once() -> None:
     replies = [feetech.encode_status(id, 0, bytes((id, 2 * id))) for id in range(1, 20)]
     noise = (b"", b"\xff", b"\xff\xff", b"\x00", b"\xff\xff\xfe", b"\xff\x55\xaa")

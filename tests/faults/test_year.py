@@ -84,7 +84,6 @@ def test_d9_l15_a_year(rounds: Rounds, figures: Figures) -> None:
     assert counts["unplugged"] == sum(UNPLUGS.values()) * 24 * days
     figures(
         "A year in virtual time" if days == DAYS else "A day in virtual time",
-        promise=5,
         days=days,
         wraps_of_a_32_bit_millisecond=int(wraps),
         eeprom_writes=worn,

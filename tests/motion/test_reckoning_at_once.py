@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from contextlib import suppress
-from functools import partial
 from typing import Any
 
 import pytest
 
-from motorbus import AsyncRobot, Interrupted, NotHomed, RequestError, Robot
+from motorbus import AsyncRobot, Interrupted, NotHomed, RequestError
 from motorbus.motion.axis import AsyncAxis
 from motorbus.simulation.named import Simulation
 from tests.motion.machines import machine
-from tests.motion.tracing import Line, interrupted
+
+"""For one turn of 5 mm, as project 1 of the simulated controller says."""
+
 
 PULSES = 1600
 """For one turn of 5 mm, as project 1 of the simulated controller says."""
-FILES = ("motion/capabilities.py", "motion/reckoning.py", "motion/moving/parts.py", "motion/command.py")
 
 
 def stands(sims: dict[str, Simulation]) -> float:
@@ -116,30 +115,3 @@ def test_behind_a_stop_it_is_not_known_where_the_next_movement_begins() -> None:
                 assert lift.estimated == pytest.approx(0.055, abs=1e-5)
 
     asyncio.run(main())
-
-
-def _by_a_way(robot: Robot) -> None:
-    robot["lift"].move_by(0.01)
-
-
-def _to_a_place(robot: Robot) -> None:
-    robot.move({"lift": 0.01 if robot["lift"].estimated is None else robot["lift"].estimated + 0.01})
-
-
-@pytest.mark.parametrize("order", [_by_a_way, _to_a_place])
-def test_ctrl_c_at_any_line_never_makes_the_estimate_wrong(order: Callable[[Robot], None]) -> None:
-    tried: set[Line] = set()
-    ended = False
-    while not ended:
-        with machine(lift=True) as (made, sims), Robot.of(made) as robot:
-            lift = robot["lift"]
-            lift.declare(0.0)
-            where = interrupted(partial(order, robot), FILES, tried)
-            ended = where is None
-            if lift.estimated is not None:
-                assert lift.estimated == pytest.approx(stands(sims), abs=1e-5), where
-            with suppress(NotHomed):
-                order(robot)
-            if lift.estimated is not None:
-                assert lift.estimated == pytest.approx(stands(sims), abs=1e-5), where
-    assert len(tried) > 40

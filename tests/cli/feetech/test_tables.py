@@ -6,7 +6,7 @@ import pytest
 
 from motorbus.families.feetech.table import MODELS, TABLES
 from tests.cli.conftest import Run
-from tests.families.feetech.typed_rows import IN_DOUBT
+from tests.protocol.feetech.typed_rows import IN_DOUBT
 
 
 def test_one_map_is_shown_with_the_source_of_each_row(run: Run) -> None:

@@ -21,7 +21,6 @@ from motorbus.families.feetech.simulator import FeetechBus, Servo, simulate
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.faults.off import are_off
 
 OLD, NEW, STRANGER = 3, 7, 9
 """Ids: of the servo that changes, what it shall become, and of another one that nobody may touch."""
@@ -98,8 +97,6 @@ class Doomed(MemoryLink):
 
     def strike(self) -> None:
         """Now it happens."""
-        if are_off():
-            return
         self.struck = True
         self.dead = self.cut.host
         if self.cut.supply:

@@ -25,7 +25,6 @@ from motorbus.core.operation import (
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech.driver import Node
 from tests.families.player import played
-from tests.faults.off import are_off
 
 T = TypeVar("T")
 
@@ -123,7 +122,7 @@ class Played:
         self, script: Sequence[Line], interrupt_at: int | None = None, *, rate: int = 1_000_000
     ) -> None:
         self.script = list(script)
-        self.interrupt_at = None if are_off() else interrupt_at
+        self.interrupt_at = interrupt_at
         self.exchanges: list[Exchange[Any]] = []
         self.events: list[object] = []
         self.rate = rate

@@ -146,7 +146,6 @@ def test_d6_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
     assert played.sent[-2:] == [LOCK.sent, LOCKED.sent]
 
 
-@pytest.mark.faultless("the fault is a line of the script, all of which has to be used up")
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
 def test_d6_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:

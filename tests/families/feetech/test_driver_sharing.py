@@ -17,7 +17,6 @@ from motorbus.link.base import Side
 from motorbus.link.memory import NoisyLine
 from motorbus.simulation.named import Simulation
 from tests.families.feetech.driver_script import Line, play, reads, watch
-from tests.faults.off import shared
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 LATE = 254
@@ -30,7 +29,7 @@ def asked(simulation: Simulation, polls: int = POLLS) -> Suspicion:
 
 
 def twins(model: str = "", **options: Any) -> Simulation:
-    return motorbus.simulate("feetech", ids=shared(3), model=model, **options)
+    return motorbus.simulate("feetech", ids=(3, 3), model=model, **options)
 
 
 def twice(line: Line) -> Line:

@@ -21,7 +21,7 @@ from motorbus.families.feetech.table import MODELS as NUMBERS
 from tests.conformance.world import samples
 from tests.families.feetech.maps import MODELS
 from tests.families.feetech.quirk_bus import Bench, bench
-from tests.families.feetech.simulator.host import (
+from tests.simulators.feetech.host import (
     ACTION,
     ALL,
     READ,

@@ -37,7 +37,6 @@ from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from tests.families.player import played
-from tests.faults.off import are_off
 
 T = TypeVar("T")
 
@@ -57,8 +56,6 @@ class Bench:
         **options: Any,
     ) -> None:
         self.family: Kst = FAMILY.configured(profile=profile, **(settings or {}))
-        if are_off():
-            options.pop("duplicate", None)
         simulator = FAMILY.simulator(tuple(ids), profile=profile, **options)
         assert isinstance(simulator, KstBus)
         self.simulator = simulator

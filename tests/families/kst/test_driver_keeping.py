@@ -22,7 +22,6 @@ TOLD = "4b0a30000cfe0000"
 OTHER = "4b0a300018fc0000"
 
 
-@pytest.mark.faultless("the fault is a line of the script, all of which has to be used up")
 def test_d11_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
     for back in (None, "6010100100000000", ["6010100100000000"] * 2):
         play(driver.save(node()), (SAVE, back))

@@ -14,7 +14,6 @@ from motorbus.families.kst.table import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import bench
 from tests.families.kst.test_driver_presence import NoErrors
-from tests.faults.off import are_off
 
 EVERYONE = "600#4000300000000000"
 
@@ -80,7 +79,7 @@ def test_d2_two_servos_with_one_id_are_told(ids: tuple[int, ...]) -> None:
 def test_d2_bus_errors_are_told() -> None:
     with bench(ids=(5, 6)) as there:
         there.sim(6).values["node_id"] = 7
-        there.sim(6).node = 6 if are_off() else 5
+        there.sim(6).node = 5
         found = there.run(there.family.scan((5,)))
         assert [one.node for one in found] in ([], [5])
         assert any("bus errors during the scan" in one.what for one in there.of(Suspicion))

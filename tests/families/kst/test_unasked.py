@@ -10,7 +10,7 @@ from motorbus.families.kst import wire
 from motorbus.families.kst.phrases import Told
 from motorbus.families.kst.table import PROFILES
 from motorbus.families.kst.unasked import unasked
-from tests.families.kst.test_wire import FRAMES
+from tests.protocol.kst.test_wire import FRAMES
 
 
 def told(frame: CanFrame, profile: str = "kst") -> Told:

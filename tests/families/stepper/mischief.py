@@ -13,7 +13,6 @@ from random import Random
 from motorbus.core.operation import Data
 from motorbus.families.stepper import wire
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.faults.off import are_off
 
 BYTE = 10 / 9600
 """s for one byte on the wire."""
@@ -48,8 +47,6 @@ class Mischief(PerfectLine):
     A reply that is `late` is so by at most `late_by` (s); a copy of one comes `copy_after` it (s), or as soon as the
     wire can carry it. `cut` takes the supply away for a moment, with the reply that is about to be said.
     """
-
-    asks_by_itself = True
 
     def __init__(
         self, seed: int, share: float, *kinds: str, late_by: float = 1.5, copy_after: float | None = None
@@ -98,7 +95,7 @@ class Mischief(PerfectLine):
         return [Delivery(at, Side.DEVICE, harmed)] if harmed else []
 
     def _kind(self, kinds: list[str], at: float) -> str:
-        if not kinds or are_off() or self.random.random() >= self.share:
+        if not kinds or self.random.random() >= self.share:
             return ""
         kind = self.random.choice(kinds)
         self.fired[kind] += 1

@@ -20,8 +20,8 @@ from motorbus.families.stepper.table import (
     refusals,
 )
 from tests.families.stepper.bench import Bench, Tampering, bench
-from tests.families.stepper.program.projects import projects
 from tests.families.stepper.written import KINDS, LONGER, PICK, cut_at, named, program, stored
+from tests.protocol.stepper.program.projects import projects
 
 SELECT = "FF AA 6E"
 kinds = pytest.mark.parametrize("kind", KINDS, ids=named)

@@ -17,8 +17,8 @@ from motorbus.families.stepper.program import plan
 from motorbus.families.stepper.table import Project, decode_image
 from tests.families.stepper.behaviours import short_projects, switches
 from tests.families.stepper.bench import Bench, bench
-from tests.families.stepper.execution.course import project, step
 from tests.families.stepper.vectors import DUMP_B
+from tests.protocol.stepper.execution.course import project, step
 
 B = decode_image(DUMP_B[6:])
 ENDS = ("zero_distance",)  # a step that never ends has no fraction

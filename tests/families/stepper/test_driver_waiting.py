@@ -14,7 +14,7 @@ from motorbus.families.stepper.driver import Memory, Outcome
 from motorbus.families.stepper.driver.waiting import CLOCK, Wait
 from motorbus.families.stepper.program import plan
 from motorbus.families.stepper.program.earliest import earliest
-from tests.families.stepper.execution.course import project, step
+from tests.protocol.stepper.execution.course import project, step
 
 PAUSE = project(step(distance=0, delay=10_000))
 WAITS = project(step(distance=0, delay=10_000, start_input=1))

@@ -15,7 +15,6 @@ from motorbus.families.stepper import AsyncController, Controller, Program
 from motorbus.families.stepper.driver.writing import Planned, Proof, Written, write_project
 from motorbus.families.stepper.table import Project
 from tests.families.stepper.bench import Tampering, bench
-from tests.families.stepper.program.projects import projects
 from tests.families.stepper.written import (
     KINDS,
     LONGER,
@@ -24,6 +23,7 @@ from tests.families.stepper.written import (
     program,
     stored,
 )
+from tests.protocol.stepper.program.projects import projects
 
 kinds = pytest.mark.parametrize("kind", KINDS, ids=named)
 READ_2 = "FF AA 3E 02 00 00 00 00 00 00 E9"

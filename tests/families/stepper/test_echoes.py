@@ -28,8 +28,6 @@ class Echoing(Mischief):
     does, and the bus cannot know it. A late echo comes by `lateness` later, in s, or by lot.
     """
 
-    asks_by_itself = False
-
     def __init__(self, mode: str, *, piece: int = 1, pace: bool = True, deaf: bool = False) -> None:
         super().__init__(1, 0.02, "unheard", "lost")
         self.share = 0.0

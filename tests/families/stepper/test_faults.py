@@ -12,7 +12,6 @@ from motorbus.families.stepper.table import ORDERS
 from tests.conftest import Rounds
 from tests.families.stepper.fault_rig import KEPT, MOTIONS, FalseWord, Rig
 from tests.families.stepper.mischief import EVERYTHING, NOTICES, REPLIES, REQUESTS, Mischief
-from tests.faults.off import are_off
 
 
 class Ledger:
@@ -59,7 +58,7 @@ def test_everything_at_once_tells_nothing_false_and_nothing_hangs(
     line = Mischief(11, share, *EVERYTHING, copy_after=None if pace else 0.0)
     ledger = Ledger(Rig(line, 12, pace=pace), line)
     ledger.rig.open()
-    total = max(rounds(100_000, ENOUGH), 0 if are_off() else ENOUGH)
+    total = max(rounds(100_000, ENOUGH), ENOUGH)
     for _ in range(total):
         ledger.call()
     print(ledger.told(f"{share:.0%} of all that is said" + (", at 9600 baud" if pace else ", without pace")))

@@ -18,7 +18,6 @@ from motorbus.families.stepper.table import Project, Step, decode_image, with_st
 from tests.conftest import Figures, Rounds
 from tests.families.stepper.fault_rig import UNMOVED, FalseWord, Rig
 from tests.families.stepper.mischief import NOTICES, REPLIES, REQUESTS, Mischief
-from tests.faults.off import are_off
 
 FAULTS = (*REQUESTS, *(kind for kind in REPLIES if not kind.startswith("notice")), *NOTICES)
 """All but notices out of nothing: one at a moment at which it may be true is undistinguishable from a true one."""
@@ -157,7 +156,7 @@ ENOUGH = 5_000
 def test_l7_jobs_among_all_faults_are_as_they_are_told(
     share: float, rounds: Rounds, figures: Figures
 ) -> None:
-    total = max(rounds(100_000, ENOUGH), 0 if are_off() else ENOUGH) // 10
+    total = max(rounds(100_000, ENOUGH), ENOUGH) // 10
     line = Mischief(31, share, *FAULTS)
     jobs = Jobs(line)
     jobs.open()

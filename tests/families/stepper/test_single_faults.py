@@ -145,7 +145,7 @@ def test_every_single_byte_fault_of_every_command(bytewise: bool, figures: Figur
     total, succeeded = sum(tally.total for tally in tallies), sum(tally.succeeded for tally in tallies)
     how = "byte by byte" if bytewise else "in one piece"
     what = f"L1 L2 single byte faults in replies to {len(names)} commands, {how}"
-    figures(what, family="stepper", promise=1, faults=total, wrong=len(false), succeeded=succeeded)
+    figures(what, family="stepper", faults=total, wrong=len(false), succeeded=succeeded)
     assert false == []
     assert total == 26 * (6 * 257 + 7 * 256)
 
@@ -157,7 +157,7 @@ def test_every_single_byte_fault_of_a_dump(part: int, figures: Figures) -> None:
     places = range(part * 57, min(227, (part + 1) * 57))
     total, succeeded, false = suffer("read_project", every_fault(226, range(256), places))
     what = f"L1 L2 single byte faults in a dump, bytes {places[0]} to {places[-1]}"
-    figures(what, family="stepper", promise=1, faults=total, wrong=len(false), succeeded=succeeded)
+    figures(what, family="stepper", faults=total, wrong=len(false), succeeded=succeeded)
     assert false == []
     assert succeeded == total
 

@@ -14,7 +14,6 @@ from motorbus.families.stepper.simulator import Controller as Simulated
 from motorbus.families.stepper.simulator import StepperBus
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
 from tests.families.stepper.bench import Bench
-from tests.faults.off import are_off
 
 KINDS: Final[list[dict[str, Any]]] = [
     {"select": select, "read_view": view, "flags_scope": scope, "dump_order": order}
@@ -64,7 +63,7 @@ class Supply:
 
     def __init__(self, bus: StepperBus, at: float) -> None:
         self.bus = bus
-        self.at = inf if are_off() else at
+        self.at = at
         self.usual_rate = None
 
     @property

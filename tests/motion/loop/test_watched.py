@@ -12,7 +12,7 @@ from motorbus.motion.safety.watch import OVERDUE
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.motion.machines import Heard, machine
-from tests.motion.safety.test_canary import Drops
+from tests.safety.test_canary import Drops
 
 BOTH = pytest.mark.parametrize("ahead", [False, True])
 

@@ -1,0 +1,97 @@
+"""The pages are true: their Python runs, their commands parse, their links lead somewhere, their tables are whole."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from motorbus import errors
+from motorbus.cli import build, parse
+from tests.docs.test_readme import LINES as README
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("changelog.d/*.md")])
+WITHOUT_HARDWARE = re.compile(
+    r"(feetech|kst|stepper):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$"
+    r"|^motorbus feetech (registers|models)|^motorbus stepper \w+ \S+\.toml$"
+)
+
+CHANGED = re.compile(r"^motorbus set-(id|baud) ")
+"""Commands that ask every id, most of which nobody has, unless they are told among which."""
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def blocks(language: str) -> list[tuple[str, str]]:
+    """Every fenced block of this language: where it stands, and its text."""
+    pattern = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
+    return [
+        (f"{name_of(page)}-{number}", text)
+        for page in PAGES
+        for number, text in enumerate(pattern.findall(page.read_text(encoding="utf-8")))
+    ]
+
+
+def commands() -> list[str]:
+    lines = [line for _, text in blocks("console") for line in text.splitlines()]
+    shown = {line[2:].partition("  #")[0].strip() for line in lines if line.startswith("$ motorbus ")}
+    return sorted(shown)
+
+
+@pytest.mark.parametrize("text", [pytest.param(text, id=where) for where, text in blocks("python")])
+def test_python_runs(text: str) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-W", "error", "-c", text], capture_output=True, text=True, timeout=60
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_there_are_commands_to_judge() -> None:
+    assert len(commands()) > 15
+
+
+@pytest.mark.parametrize("line", commands())
+def test_a_command_parses(line: str) -> None:
+    words = shlex.split(line)[1:]
+    command, _, _ = parse(build(), words)
+    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0].replace('-', '_')}.")
+
+
+@pytest.mark.parametrize(
+    "line", [line for line in commands() if WITHOUT_HARDWARE.search(line) and line not in README]
+)
+def test_a_command_that_needs_no_hardware_succeeds(line: str) -> None:
+    """Those of the README are run by its own tests."""
+    among = ["--among", "1-9"] if CHANGED.search(line) else []
+    command = [sys.executable, "-m", "motorbus.cli", *shlex.split(line)[1:], *among]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 0, ended.stderr
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_every_error_is_explained() -> None:
+    text = (ROOT / "docs" / "reference" / "errors.md").read_text(encoding="utf-8")
+    explained = re.findall(r"^\| `(\w+)` \| (?:`(\w+)`)? ?\|", text, re.MULTILINE)
+    tree = [
+        kind
+        for kind in vars(errors).values()
+        if isinstance(kind, type) and kind.__module__ == errors.__name__
+    ]
+    parents = {
+        kind.__name__: kind.__bases__[-1].__name__ for kind in tree if kind is not errors.MotorbusError
+    }
+    assert dict(explained) == {
+        name: "" if parent == "MotorbusError" else parent for name, parent in parents.items()
+    }

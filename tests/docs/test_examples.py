@@ -1,0 +1,47 @@
+"""Every example runs as a user would run it, in its own process, and says what it should."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXPECTED = {
+    "one_servo.py": ["STS3215 simulated", "3.142 rad, 7.4 V", "now at 3.44"],
+    "async_servos.py": ["1: 3.142 rad", "6: 3.142 rad", "7: no reply"],
+    "can_servo.py": ["simulated", "at 10.9°", "at -0.8°", "at 0.0°"],
+    "control_loop.py": ["cycles/s, simulated"],
+    "fleet.py": ["30 axes within 0.000 rad of their goals, simulated", "times faster than real time"],
+    "robot.py": [
+        "bench: 9 axes, simulated",
+        "3 axes moved in 1.00",
+        "shoulder at -0.30",
+        "slide at 0.020, estimated",
+    ],
+    "async_robot.py": ["2 axes moved", "held up: True", "tilt 0.20 rad"],
+    "test_of_my_robot.py": ["1 passed"],
+}
+
+
+def test_every_example_is_run() -> None:
+    assert {path.name for path in (ROOT / "examples").glob("*.py")} == set(EXPECTED)
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_an_example_runs(name: str) -> None:
+    how = ["-m", "pytest", "-q", "-p", "no:cacheprovider"] if name.startswith("test_") else []
+    done = subprocess.run(
+        [sys.executable, *how, str(ROOT / "examples" / name)],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    for text in EXPECTED[name]:
+        assert text in done.stdout

@@ -1,0 +1,96 @@
+"""The tutorial of the first machine, done: every command in it as it is written, in order, in an empty folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from motorbus.motion.machine import Machine
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tutorial" / "first-machine.md").read_text(
+    encoding="utf-8"
+)
+CONSOLE = "\n".join(re.findall(r"^```console\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
+LINES = [line[2:].partition("  #")[0] for line in CONSOLE.splitlines() if line.startswith("$ motorbus ")]
+SERVED = [line for line in LINES if line.startswith("motorbus simulate ")]
+TYPED = [line for line in LINES if line not in SERVED]
+PROGRAMS = re.findall(r"^```py\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def words(line: str) -> list[str]:
+    """The program that a line of the page starts."""
+    return [sys.executable, "-m", "motorbus.cli", *shlex.split(line)[1:]]
+
+
+@contextmanager
+def terminal(line: str, folder: Path) -> Iterator[None]:
+    """A command that goes on in a terminal of its own, from its first line of output on."""
+    with subprocess.Popen(
+        words(line), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            assert "ready" in process.stdout.readline()
+            yield
+        finally:
+            process.terminate()
+            process.communicate(timeout=30)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty folder in which the simulators of the page are running."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.delenv("MOTORBUS_MACHINE", raising=False)
+    work = tmp_path / "work"
+    work.mkdir()
+    first, second = SERVED
+    with terminal(first, work), terminal(second, work):
+        yield work
+
+
+def ran(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """A command that ends, with nobody at the keyboard."""
+    return subprocess.run(
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ},
+    )
+
+
+def test_from_init_to_the_first_move_in_five_commands() -> None:
+    first = next(place for place, line in enumerate(TYPED) if line.startswith("motorbus move "))
+    assert TYPED[0].startswith("motorbus init ")
+    assert first + 1 == 5
+
+
+def test_the_page_does_what_it_says(folder: Path) -> None:
+    for line in TYPED:
+        ended = ran(words(line), folder)
+        assert (ended.returncode, ended.stdout != "") == (0, True), f"{line}: {ended.stderr}"
+    made = Machine.load(folder / "motorbus.toml")
+    assert list(made.axes) == ["arm_1", "arm_2", "arm_3", "lift_1"]
+    assert list(made.poses["rest"]) == ["arm_1", "arm_2", "arm_3"]
+    for program in PROGRAMS:
+        ended = ran([sys.executable, "-W", "error", "-c", program], folder)
+        assert (ended.returncode, ended.stderr) == (0, "")
+        assert "arm_1" in ended.stdout
+
+
+def test_there_are_commands_and_a_program_to_judge() -> None:
+    assert len(TYPED) > 9
+    assert len(SERVED) == 2
+    assert len(PROGRAMS) == 1

@@ -1,0 +1,224 @@
+"""Frames through a port that behaves as it likes, and through back ends that raise what they like."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+from types import SimpleNamespace
+from typing import Any
+
+import can
+import pytest
+
+from motorbus.core.operation import ERROR_FLAG, CanFrame
+from motorbus.errors import LinkError, LinkLost
+from motorbus.link.can_text import SlcanReader, slcan_line
+from motorbus.link.can_wire import (
+    BUS_OFF,
+    MOST,
+    BusWire,
+    TextWire,
+    build,
+    frame_of,
+    quietly,
+    refuse_bus_off,
+)
+from tests.links.can_peer import PING
+
+
+class Narrow:
+    """A port with room for so many bytes."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        self.written = b""
+        self.coming = b""
+
+    def fileno(self) -> int | None:
+        return None
+
+    def read(self) -> bytes:
+        data, self.coming = self.coming, b""
+        return data
+
+    def write(self, data: bytes) -> int:
+        count = min(self.room, len(data))
+        self.room -= count
+        self.written += data[:count]
+        return count
+
+
+class Bus:
+    """A back end of python-can that does as it is told."""
+
+    def __init__(self, *messages: object, error: Exception | None = None) -> None:
+        self.messages = list(messages)
+        self.error = error
+        self.sent: list[Any] = []
+        self.ended = 0
+
+    def recv(self, timeout: float) -> object:
+        assert timeout >= 0
+        if self.error:
+            raise self.error
+        return self.messages.pop(0) if self.messages else None
+
+    def send(self, message: object, timeout: float) -> None:
+        assert timeout == 0
+        if self.error:
+            raise self.error
+        self.sent.append(message)
+
+    def shutdown(self) -> None:
+        self.ended += 1
+        raise OSError("dead already")
+
+
+def text_wire(port: Narrow) -> TextWire:
+    return TextWire("adapter", port, SlcanReader(), slcan_line, b"?\r", lambda: None)
+
+
+def bus_wire(bus: Bus, descriptor: int | None = None) -> BusWire:
+    return BusWire("adapter", bus, can.Message, descriptor)
+
+
+def message(id: int = 5, **more: Any) -> can.Message:
+    return can.Message(arbitration_id=id, is_extended_id=False, **more)
+
+
+def test_what_went_out_in_part_is_made_void() -> None:
+    port = Narrow(room=9)
+    wire = text_wire(port)
+    for _ in range(2):
+        with pytest.raises(LinkError, match="takes no more bytes"):
+            wire.write(PING)
+    port.room = 100
+    wire.write(CanFrame(1, b""))
+    assert port.written == b"t62584002?\rt0010\r"
+
+
+def test_what_did_not_go_out_at_all_leaves_nothing() -> None:
+    port = Narrow(room=0)
+    wire = text_wire(port)
+    with pytest.raises(LinkError, match="0 of 22"):
+        wire.write(PING)
+    port.room = 100
+    wire.write(PING)
+    assert port.written == slcan_line(PING)
+
+
+def test_a_port_without_descriptor_is_looked_at_again_and_again() -> None:
+    port = Narrow(room=100)
+    wire = text_wire(port)
+    assert wire.fileno() is None
+    port.coming = b"\r" + slcan_line(PING)
+    assert wire.read(float("inf")) == [PING]
+    assert wire.read(0) == []
+    wire.close()
+    with pytest.raises(LinkLost, match="it is closed"):
+        wire.read(0)
+
+
+def test_all_that_has_come_is_taken_at_once() -> None:
+    bus = Bus(*[message(id) for id in range(MOST + 5)])
+    wire = bus_wire(bus)
+    assert len(wire.read(0)) == MOST
+    assert len(wire.read(0)) == 5
+
+
+def test_a_descriptor_is_waited_at() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        bus = Bus(message(1))
+        wire = bus_wire(bus, ours.fileno())
+        theirs.send(b"!")
+        assert wire.fileno() == ours.fileno()
+        assert wire.read(float("inf")) == [CanFrame(1, b"")]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        can.CanOperationError("Transmit buffer full"),
+        can.CanOperationError("Failed to transmit: No buffer space available", errno.ENOBUFS),
+        can.CanTimeoutError("no room"),
+        can.CanOperationError("Transmit buffer overflow"),
+        OSError(errno.EAGAIN, "again"),
+    ],
+)
+def test_no_room(error: Exception) -> None:
+    with pytest.raises(LinkError, match="takes no more frames") as caught:
+        bus_wire(Bus(error=error)).write(PING)
+    assert not isinstance(caught.value, LinkLost)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        can.CanOperationError("Failed to transmit: Network is down", errno.ENETDOWN),
+        OSError(errno.ENODEV, "No such device"),
+        RuntimeError("driver says 17"),
+    ],
+)
+def test_an_adapter_that_is_gone(error: Exception) -> None:
+    wire = bus_wire(Bus(error=error))
+    for use in (lambda: wire.write(PING), lambda: wire.read(0)):
+        with pytest.raises(LinkLost, match="adapter is gone"):
+            use()
+
+
+def test_it_is_closed_quietly_and_once() -> None:
+    bus = Bus()
+    wire = bus_wire(bus)
+    wire.close()
+    wire.close()
+    assert bus.ended == 1
+    with pytest.raises(LinkLost):
+        wire.read(0)
+
+
+def test_what_is_left_out() -> None:
+    assert frame_of(message(is_fd=True)) is None
+    assert frame_of(message(is_rx=False)) is None
+    wire = bus_wire(Bus(message(is_fd=True), message(3), message(is_rx=False)))
+    assert (wire.read(0), wire.dropped) == ([CanFrame(3, b"")], 2)
+
+
+def test_what_fails_to_open_is_closed() -> None:
+    ended = []
+
+    class Failing:
+        def __init__(self, channel: str, bitrate: int) -> None:
+            raise ValueError(f"{channel} {bitrate}")
+
+        def shutdown(self) -> None:
+            ended.append(self)
+            raise RuntimeError
+
+    with pytest.raises(ValueError, match="can0 20000"):
+        build(Failing, "can0", {"bitrate": 20_000})
+    assert len(ended) == 1
+
+
+def test_a_channel_that_was_not_said_is_the_back_ends_own() -> None:
+    made = build(SimpleNamespace, None, {"a": 1})
+    assert made.a == 1
+    quietly(lambda: os.stat("/no/such/file"))
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENETDOWN, "Network is down"), can.CanOperationError("gone")])
+def test_d13_an_adapter_that_is_down_is_a_lost_link(error: Exception) -> None:
+    wire = bus_wire(Bus(error=error))
+    with pytest.raises(LinkLost):
+        wire.read(0.0)
+    with pytest.raises(LinkLost):
+        wire.write(PING)
+
+
+def test_d13_bus_off_is_a_lost_link_and_no_other_error_is() -> None:
+    for bits in (0x88, 0x04, 0x100):
+        refuse_bus_off("can0", [CanFrame(ERROR_FLAG | bits, bytes(8)), PING])
+    refuse_bus_off("can0", [CanFrame(BUS_OFF, bytes(8))])
+    with pytest.raises(LinkLost, match="can0 is off the bus"):
+        refuse_bus_off("can0", [PING, CanFrame(ERROR_FLAG | BUS_OFF | 0x04, bytes(8))])

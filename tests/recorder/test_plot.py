@@ -1,0 +1,254 @@
+"""Pictures: they show what they were given, in the format that was asked for, and disturb nobody's figures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import accumulate, pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motorbus import plot
+from motorbus.errors import MotorbusError, RequestError
+
+TIMES = [0.0, 0.5, 1.0]
+GOALS: list[list[float]] = [[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]
+PRESENTS: list[list[float | None]] = [[0.0, 0.4, 0.9], [1.0, None, 0.1]]
+
+
+def draw(path: Path, *, title: str = "Two servos", simulated: bool = True) -> None:
+    plot.trajectory(path, TIMES, GOALS, PRESENTS, ["elbow", "wrist"], title=title, simulated=simulated)
+
+
+def test_a_png_is_wide_enough_for_a_page(tmp_path: Path) -> None:
+    draw(tmp_path / "moves.png")
+    data = (tmp_path / "moves.png").read_bytes()
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    assert int.from_bytes(data[16:20], "big") >= 1280
+
+
+def test_an_svg_names_axes_units_and_title(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    draw(tmp_path / "moves.svg")
+    text = (tmp_path / "moves.svg").read_text(encoding="utf-8")
+    for word in (
+        "elbow",
+        "wrist",
+        "goal",
+        "present",
+        "position (rad)",
+        "time (s)",
+        "Two servos",
+        "simulated",
+    ):
+        assert word in text
+
+
+def test_simulated_is_said_only_when_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    draw(tmp_path / "moves.svg", simulated=False)
+    assert "simulated" not in (tmp_path / "moves.svg").read_text(encoding="utf-8")
+
+
+def test_one_sample_is_enough(tmp_path: Path) -> None:
+    plot.trajectory(tmp_path / "one.png", [0.0], [[1.0]], [[1.0]], ["only"])
+    assert (tmp_path / "one.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("goals", "presents"), [(GOALS[:1], PRESENTS), (GOALS, PRESENTS[:1]), ([[0.0], [0.0]], PRESENTS)]
+)
+def test_data_that_do_not_fit_together_are_refused(
+    tmp_path: Path, goals: list[list[float]], presents: list[list[float | None]]
+) -> None:
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.trajectory(tmp_path / "x.png", TIMES, goals, presents, ["a", "b"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_matplotlib_is_named_with_its_install_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
+    with pytest.raises(MotorbusError, match=r"pip install 'motorbus\[plot\]'"):
+        draw(tmp_path / "moves.png")
+
+
+def test_no_global_state_is_touched(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom motorbus import plot\nassert 'matplotlib' not in sys.modules\n"
+        "plot.trajectory(sys.argv[1], [0.0, 1.0], [[0.0, 1.0]], [[0.0, 1.0]], ['a'])\n"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "x.png")]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert ended.stdout == "False\n"
+
+
+# --- a program over time -------------------------------------------------------------------------------------------
+
+CURVES = {"position (mm)": [0.0, 5.0, 5.0], "speed (rpm)": [0.0, 60.0, 0.0]}
+LANES = {"gripper": [False, True, True], "lamp": [True, True, False]}
+SPANS = [plot.Span(0.0, 0.5, "1"), plot.Span(0.5, 1.0, "wait", waiting=True)]
+
+
+def test_a_sequence_names_curves_lanes_and_spans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    plot.sequence(tmp_path / "p.svg", TIMES, CURVES, LANES, SPANS, title="Feed", remark="predicted")
+    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
+    for word in (*CURVES, *LANES, "wait", "Feed", "predicted", "time (s)"):
+        assert word in text
+
+
+def test_a_sequence_is_a_png_of_its_height(tmp_path: Path) -> None:
+    for name, lanes in (("few", {}), ("many", {f"input {n}": [True] * 3 for n in range(5)})):
+        plot.sequence(tmp_path / f"{name}.png", TIMES, CURVES, lanes)
+    few, many = ((tmp_path / f"{name}.png").read_bytes() for name in ("few", "many"))
+    assert few.startswith(b"\x89PNG\r\n\x1a\n")
+    assert int.from_bytes(few[20:24], "big") < int.from_bytes(many[20:24], "big")
+
+
+def test_one_sample_of_a_sequence_is_enough(tmp_path: Path) -> None:
+    plot.sequence(tmp_path / "one.png", [0.0], {"x": [1.0]}, {"on": [True]})
+    assert (tmp_path / "one.png").stat().st_size > 1000
+
+
+def drawn(monkeypatch: pytest.MonkeyPatch, draw: Callable[[], None]) -> Any:
+    """The figure that this saves."""
+    from matplotlib.figure import Figure
+
+    figures: list[Any] = []
+    save = Figure.savefig
+
+    def kept(figure: Figure, *arguments: Any, **more: Any) -> None:
+        save(figure, *arguments, **more)
+        figures.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    draw()
+    return figures[0]
+
+
+@pytest.mark.parametrize(
+    "lengths", [(1.0, 1.0, 1.0, 1.0, 50.0), (50.0, 2.0, 0.1, 2.0, 3.0), (1.0,), (1.0,) * 90]
+)
+def test_names_of_spans_never_run_into_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lengths: tuple[float, ...]
+) -> None:
+    ends = list(accumulate(lengths))
+    names = ("9", "wait", "10", "a long name")
+    spans = [
+        plot.Span(end - long, end, names[n % 4], n % 4 == 1)
+        for n, (end, long) in enumerate(zip(ends, lengths, strict=True))
+    ]
+    figure = drawn(
+        monkeypatch,
+        lambda: plot.sequence(tmp_path / "p.png", [0.0, ends[-1]], {"x": [0.0, 1.0]}, {}, spans),
+    )
+    boxes = [label.get_window_extent() for label in figure.axes[0].texts]
+    assert all(one.x1 + 2 < other.x0 for one, other in pairwise(boxes))
+    assert all(figure.axes[0].bbox.x0 <= box.x0 and box.x1 <= figure.axes[0].bbox.x1 for box in boxes)
+    assert "9" in [label.get_text() for label in figure.axes[0].texts] or len(lengths) > 50
+
+
+@pytest.mark.parametrize(("curves", "lanes"), [({}, LANES), ({"x": [1.0]}, {}), (CURVES, {"on": [True]})])
+def test_a_sequence_that_does_not_fit_together_is_refused(
+    tmp_path: Path, curves: dict[str, list[float]], lanes: dict[str, list[bool]]
+) -> None:
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.sequence(tmp_path / "x.png", TIMES, curves, lanes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_program_is_drawn_as_its_file_names_things(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    from motorbus.families.stepper import Program
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    program = Program.load(str(Path(__file__).parents[2] / "examples" / "pick_and_place.toml"))
+    picture = program.picture(wait=1.5)
+    spans = [plot.Span(*span) for span in picture.spans]
+    plot.sequence(tmp_path / "p.svg", picture.times, picture.curves, picture.lanes, spans, title=program.name)
+    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
+    for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "Pick and place"):
+        assert word in text
+
+
+# --- the axes of a machine --------------------------------------------------------------------------------------------
+
+NINE = {
+    f"axis-{number}": plot.Track(GOALS[0], PRESENTS[number % 2], "mm" if number == 8 else "deg")
+    for number in range(9)
+}
+
+
+def test_nine_axes_have_a_panel_each_with_its_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib as mpl
+
+    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
+    plot.tracks(tmp_path / "nine.svg", TIMES, NINE, title="Bench", remark="simulated")
+    text = (tmp_path / "nine.svg").read_text(encoding="utf-8")
+    for number in range(8):
+        assert f"axis-{number} (deg)" in text
+    for word in ("axis-8 (mm)", "goal", "present", "error: present − goal", "Bench", "simulated"):
+        assert word in text
+    assert text.count("time (s)") == 3  # below each column, and nowhere else
+
+
+def test_what_is_estimated_says_so_in_another_colour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {
+        "elbow": plot.Track(GOALS[0], PRESENTS[0], "deg"),
+        "slide": plot.Track(GOALS[0], PRESENTS[0], "mm", estimated=True),
+    }
+    figure = drawn(monkeypatch, lambda: plot.tracks(tmp_path / "x.png", TIMES, some))
+    elbow, slide, *_ = figure.axes
+    assert [one.get_title(loc="left") for one in (elbow, slide)] == ["elbow (deg)", "slide (mm), estimated"]
+    assert elbow.lines[0].get_color() != slide.lines[0].get_color()
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert said == ["goal", "present", "estimated: reckoned, not measured", "error: present − goal"]
+
+
+def test_a_track_may_have_times_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {
+        "elbow": plot.Track(GOALS[0], PRESENTS[0]),
+        "slide": plot.Track([0.0, 1.0], [0.0, 1.0], times=(0.2, 2.5)),
+    }
+    figure = drawn(monkeypatch, lambda: plot.tracks(tmp_path / "x.png", TIMES, some))
+    assert list(figure.axes[1].lines[0].get_xdata()) == [0.2, 2.5]
+    assert {one.get_xlim() for one in figure.axes[:4]} == {(0.0, 2.5)}
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.tracks(tmp_path / "y.png", TIMES, {"slide": plot.Track([0.0], [0.0], times=(0.2, 2.5))})
+
+
+@pytest.mark.parametrize(("count", "across", "down"), [(1, 1, 1), (2, 2, 1), (4, 2, 2), (5, 3, 2), (9, 3, 3)])
+def test_a_picture_grows_with_its_axes(tmp_path: Path, count: int, across: int, down: int) -> None:
+    plot.tracks(tmp_path / "some.png", TIMES, dict(list(NINE.items())[:count]))
+    data = (tmp_path / "some.png").read_bytes()
+    size = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    assert size == (round((1.5 + 3.6 * across) * 160), round((0.9 + 2.35 * down) * 160))
+
+
+def test_an_axis_that_never_answered_has_its_panel_too(tmp_path: Path) -> None:
+    plot.tracks(tmp_path / "mute.png", TIMES, {"mute": plot.Track(GOALS[0], [None, None, None])})
+    plot.tracks(tmp_path / "one.png", [0.0], {"one": plot.Track([1.0], [1.0], "")})
+    assert (tmp_path / "mute.png").stat().st_size > 1000
+    assert (tmp_path / "one.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "tracks", [{}, {"a": plot.Track([0.0], [0.0, 1.0, 2.0])}, {"a": plot.Track([0.0] * 3, [])}]
+)
+def test_tracks_that_do_not_fit_together_are_refused(tmp_path: Path, tracks: dict[str, plot.Track]) -> None:
+    with pytest.raises(RequestError, match="do not fit"):
+        plot.tracks(tmp_path / "x.png", TIMES, tracks)
+    assert list(tmp_path.iterdir()) == []

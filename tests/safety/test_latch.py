@@ -1,0 +1,233 @@
+"""An emergency stop stays in force until somebody says otherwise, whoever asks, by whatever spelling, on every bus.
+
+Nothing that moves or gives torque leaves: what is sent after it is looked at on the wire.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import pytest
+
+from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
+from motorbus.core.operation import CanFrame, Data, Effect, Exchange, Goal
+from motorbus.errors import MotorbusError
+from tests.motion.machines import listened, machine
+from tests.safety.points import asks, sent
+
+ROOT = Path(__file__).parents[2]
+
+
+def moves(data: Data) -> bool:
+    """Whether this could set something in motion or give it torque: not a question, torque off, a stop, or an edit of
+    a project, which moves nothing until that is started (4E, 03 0A to 0C, 03 0F)."""
+    if asks(data):
+        return False
+    if isinstance(data, CanFrame):
+        return True
+    if data[:2] == b"\xff\xff":
+        lets_go = data[4] in (3, 0x83) and data[5] == 40 and data[-2] == 0
+        takes_back = data[4] == 4 and data[5] == 55  # a REG WRITE of the lock in the place of one that waits
+        return not (lets_go or takes_back)
+    return data[2] == 0x4E or (data[2] == 3 and data[3] in (0x0A, 0x0B, 0x0C, 0x0F))
+
+
+def raw(bus: Any, node: int) -> object:
+    goal = Goal(node, "position", 3.1, 0.0, 6.0)
+    return bus.run(Exchange(bytes.fromhex("ffff01052a0008c7"), (), effect=Effect.MOTION, goals=(goal,)))
+
+
+FACES: dict[str, Callable[[Robot], object]] = {
+    "axis move": lambda robot: robot["a1"].move(0.1),
+    "axis move_by": lambda robot: robot["c1"].move_by(0.1),
+    "axis jog": lambda robot: robot["a2"].jog(0.2, 0.5),
+    "axis torque": lambda robot: robot["a1"].enable_torque(),
+    "axis hold": lambda robot: robot["a1"].hold(),
+    "lift jog": lambda robot: robot["lift"].jog(0.01, 0.5),
+    "lift move": lambda robot: robot["lift"].move(0.05),
+    "lift home": lambda robot: robot["lift"].home(deadline=1.0),
+    "lift program": lambda robot: robot["lift"].run(1),
+    "robot move": lambda robot: robot.move({"a1": 0.1, "c1": 0.1, "lift": 0.05}),
+    "robot torque": lambda robot: robot.enable_torque(),
+    "robot hold": lambda robot: robot.hold("arm"),
+    "robot home": lambda robot: robot.home(deadline=1.0),
+    "robot park": lambda robot: robot.park("a1"),
+    "robot pose": lambda robot: robot.pose("ready"),
+    "robot loop": lambda robot: _loop(robot),
+    "servo move": lambda robot: robot["a1"].device.move(3.0, velocity=0.5),
+    "servo torque": lambda robot: robot["a1"].device.enable_torque(),
+    "servo write": lambda robot: robot["a1"].device.write(goal_position=3.0),
+    "servo reg_write": lambda robot: robot["a1"].device.reg_write(goal_position=3.0),
+    "servo action": lambda robot: robot["a1"].device.action(),
+    "servo velocity": lambda robot: robot["a1"].device.set_velocity(0.1),
+    "can move": lambda robot: robot["c1"].device.move(0.1),
+    "sync write": lambda robot: _on(robot, "arm", feetech.sync_write_positions([_known(robot)], [3.14])),
+    "reg write all": lambda robot: _on(
+        robot, "arm", feetech.reg_write_all({_known(robot): {"goal_position": 3.1}})
+    ),
+    "action all": lambda robot: _on(robot, "arm", feetech.action_all([robot["a1"].device])),
+    "broadcast": lambda robot: _on(robot, "can", kst.broadcast_position(0.1, [robot["c1"].device])),
+    "start project": lambda robot: robot["lift"].device.start_project(1),
+    "stepper jog": lambda robot: robot["lift"].device.jog_forward(0.2),
+    "raw": lambda robot: raw(robot.buses["arm"], 1),
+}
+
+
+def _on(robot: Robot, bus: str, operation: Any) -> object:
+    return robot.buses[bus].run(operation)  # type: ignore[attr-defined]
+
+
+def _known(robot: Robot) -> Any:
+    robot["a1"].device.prepare() if hasattr(robot["a1"].device, "prepare") else None
+    return robot["a1"].device
+
+
+def _loop(robot: Robot) -> None:
+    with robot.loop(rate=50) as loop:
+        for number, _ in enumerate(loop):
+            loop.goal["a1"] = 0.1
+            if number > 5:
+                break
+
+
+READY = "[pose.ready]\na1 = 0.1\nc1 = 0.1\n"
+PARTS: dict[str, Any] = {
+    "arm": "1-2",
+    "can": "0x25",
+    "lift": True,
+    "extra": READY,
+    "axes": {"a1": {"park": "10 deg"}},
+}
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_06_nothing_moves_while_it_is_in_force_from_no_face(face: str) -> None:
+    with machine(**PARTS) as (made, sims), Robot.of(made) as robot:
+        with robot.attended():
+            robot["lift"].declare(0.02)
+            robot.enable_torque()
+            robot.estop()
+            listened(sims)
+            with pytest.raises(MotorbusError):
+                FACES[face](robot)
+            assert [data for data in sent(sims) if moves(data)] == []
+        assert [data for data in sent(sims) if moves(data)] == []
+
+
+@pytest.mark.parametrize(
+    "face", ["axis move", "lift jog", "servo move", "sync write", "start project", "raw"]
+)
+def test_06_each_of_these_would_have_moved_something(face: str) -> None:
+    with machine(**PARTS) as (made, sims), Robot.of(made) as robot, robot.attended():
+        robot["lift"].declare(0.02)
+        robot.enable_torque()
+        robot.estop()
+        robot.reset()
+        listened(sims)
+        with suppress(MotorbusError):
+            FACES[face](robot)
+        assert [data for data in sent(sims) if moves(data)]
+
+
+def test_06_it_outlives_the_machine_being_closed_and_opened_again() -> None:
+    async def main() -> None:
+        with machine(arm="1-2", can="0x25") as (made, sims):
+            robot = AsyncRobot.of(made)
+            async with robot:
+                await robot.enable_torque()
+                robot.estop()
+            async with robot:
+                assert all(bus.turns.latched for bus in robot.buses.values())
+                listened(sims)
+                for act in (robot.enable_torque, lambda: robot.move({"c1": 0.1})):
+                    with pytest.raises(Interrupted):
+                        await act()
+                assert [data for data in sent(sims) if not asks(data)] == []
+                robot.reset()
+                await robot.enable_torque()
+            async with robot:
+                assert not any(bus.turns.latched for bus in robot.buses.values())
+
+    asyncio.run(main())
+
+
+def test_06_once_more_is_as_good_as_once_and_from_several_threads() -> None:
+    with machine(arm="1-3", can="0x25", lift=True, options=_real()) as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+        found: list[Any] = []
+        threads = [Thread(target=lambda: found.append(robot.estop())) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(30.0)
+        assert len(found) == 4
+        assert all(bus.turns.latched for bus in robot.buses.values())
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2, 3)] == [0, 0, 0]
+        robot.reset()
+        robot.enable_torque()
+
+
+def _real() -> dict[str, dict[str, str]]:
+    return {bus: {"clock": "real"} for bus in ("arm", "can", "stage")}
+
+
+def test_06_without_a_thread_to_be_had_every_bus_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
+        robot.enable_torque()
+
+        def exhausted(self: Thread) -> None:
+            raise RuntimeError("can't start new thread")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Thread, "start", exhausted)
+            found = robot.estop()
+        assert found["arm"].acknowledged == (1, 2)
+        assert found["can"].acknowledged == (0x25,)
+        assert sims["arm"][1].memory["torque_enable"] == 0
+
+
+PROGRAM = """
+import signal, sys
+from motorbus import Interrupted, Robot
+from tests.motion.machines import machine
+
+real = {"arm": {"clock": "real"}, "can": {"clock": "real"}}
+with machine(arm="1-2", can="0x25", options=real) as (made, sims), Robot.of(made) as robot:
+    signal.signal(signal.SIGUSR1, lambda *_: robot.trigger_estop())
+    robot.enable_torque()
+    robot.hold()
+    print("ready", flush=True)
+    try:
+        robot.move({"a1": 2.0, "c1": 0.8}, duration=60.0)
+    except Interrupted:
+        print("interrupted")
+    for again in range(2):
+        try:
+            robot.move({"a1": 0.1})
+        except Interrupted:
+            print("latched")
+    print([sims["arm"][node].memory["torque_enable"] for node in (1, 2)])
+"""
+
+
+def test_06_a_signal_handler_may_ask_for_it_in_the_middle_of_a_movement() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")])},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "ready\n"
+        program.send_signal(signal.SIGUSR1)
+        told, _ = program.communicate(timeout=60)
+    assert told == "interrupted\nlatched\nlatched\n[0, 0]\n"
