@@ -2,7 +2,7 @@
 
 Every family that discovery finds, and the template, which is out of tree and is loaded from its folder as its own
 pyproject says, without being installed. So whoever installs a family beside motorbus has it judged as well. A family
-that has several register maps and a simulated device of each (tests/coverage/FAMILY.toml says which) is a subject once
+that has several register maps and a simulated device of each (subjects.toml says which) is a subject once
 for each of them: what is true of one map only is not true of the family.
 """
 
@@ -24,7 +24,7 @@ from motorbus.core.operation import CanFrame, Data
 ROOT = Path(__file__).resolve().parents[2]
 TEMPLATE = ROOT / "examples" / "family_template"
 VECTORS = ROOT / "tests" / "vectors"
-KINDS = ROOT / "tests" / "coverage"
+KINDS = tomllib.loads(Path(__file__).with_name("subjects.toml").read_text(encoding="utf-8"))
 
 
 class Vector(NamedTuple):
@@ -63,7 +63,7 @@ PACKAGES: dict[str, str] = {name: package for name, (_, package) in _FOUND.items
 
 
 class Line(NamedTuple):
-    """What is peculiar to the line of a family, as [line] of tests/coverage/FAMILY.toml says; else it is as here.
+    """What is peculiar to the line of a family, as subjects.toml says; else it is as here.
 
     `devices`   how many a line can hold; 0: as many as there are ids
     `probes`    how many probes there are whose replies differ
@@ -78,9 +78,7 @@ class Line(NamedTuple):
 
 
 def _line(name: str) -> Line:
-    file = KINDS / f"{name}.toml"
-    told = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    return Line(**told.get("line", {}))
+    return Line(**KINDS.get(name, {}).get("line", {}))
 
 
 LINES: dict[str, Line] = {name: _line(name) for name in FAMILIES}
@@ -120,8 +118,7 @@ class Kind:
 
 def _kinds(name: str, family: Family) -> dict[str, Family]:
     """One for each map that simulated devices have; the family itself where options make no difference."""
-    file = KINDS / f"{name}.toml"
-    maps = tomllib.loads(file.read_text(encoding="utf-8"))["maps"] if file.exists() else {}
+    maps = KINDS.get(name, {}).get("maps", {})
     if len(maps) < 2:
         return {name: family}
     told = {option.name for option in family.link.settings}

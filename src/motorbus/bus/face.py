@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from threading import Condition
 from typing import Any
 
+from motorbus.bus.look import questions
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop import StopOutcome, Stopper
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
 from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import Exchange, Journal, Notice
+from motorbus.core.operation import Answer, Exchange, Journal, Notice, Runnable
+from motorbus.errors import RequestError
 from motorbus.link.base import Link, Renewable
 
 Notify = Callable[[object], None]
@@ -117,8 +120,81 @@ class BusFace:
 
     @property
     def rate(self) -> int:
-        """Bit/s at present."""
+        """Present bit rate (bit/s)."""
         return self.turns.rate
+
+    @property
+    def latency(self) -> float:
+        """Time (s) that the adapter may hold data back; added to each reply deadline."""
+        return self.turns.latency
+
+    @latency.setter
+    def latency(self, seconds: float) -> None:
+        self.turns.latency = seconds
+
+    @property
+    def latched(self) -> bool:
+        """An emergency stop is latched: motion and torque are refused until `reset`."""
+        return self.turns.latched
+
+    @property
+    def lock(self) -> AbstractContextManager[object]:
+        """Held while the state of this bus is read or changed as a whole. Keep it for microseconds only."""
+        return self.turns.lock
+
+    @property
+    def positions(self) -> Mapping[int, tuple[Exchange[Any], Answer]]:
+        """The last request that read a position and its reply, by node."""
+        return self.turns.known.seen
+
+    def stop_count(self, node: int | None = None) -> int:
+        """Number of stops sent to this node, those for all nodes included; None: of all stops sent on this bus."""
+        known = self.turns.known
+        return known.stopping if node is None else known.stops(node)
+
+    @property
+    def loss_count(self) -> int:
+        """Number of times the port was lost."""
+        return self.turns.losses
+
+    @property
+    def reconnects(self) -> bool:
+        """A lost port is reopened on the next call. Can be set to False only."""
+        return self.turns.renewal is not None
+
+    @reconnects.setter
+    def reconnects(self, wanted: bool) -> None:
+        if wanted:
+            raise RequestError("a bus cannot begin to reconnect", advice="open it with reconnect=yes")
+        self.turns.renewal = None
+
+    def on_reconnect(self, function: Callable[[], None]) -> None:
+        """Call this function, with `lock` held, each time the lost port has been reopened."""
+        self.turns.anew += (function,)
+
+    def required_reads(self, exchange: Exchange[Any]) -> Sequence[Runnable[Any]]:
+        """The reads that the gate needs before it can check this request."""
+        return questions(self.turns, exchange)
+
+    def attach(self, gate: Any) -> None:
+        """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
+        known = self.turns.known
+        gate.watch(known.seen, self.link.now, known.stops, known.accepts, self.turns.tell)
+        self.turns.look = gate.look
+        self.on_reconnect(gate.forget)
+
+    def expect_echo(self, test: Exchange[Any]) -> None:
+        """Let the next reply to this request show whether the adapter echoes."""
+        self.turns.expect_echo(test)
+
+    @property
+    def echoes(self) -> bool:
+        """The adapter echoes what is sent."""
+        return bool(self.turns.echo.present)
+
+    def move_stop_socket(self, path: Path | None) -> None:
+        """Accept emergency stops of other processes at this socket from now on."""
+        self.stopper.move(path)
 
     def estop(self) -> StopOutcome:
         """Emergency stop: drop the queue, send the stop frames until acknowledged or five times, and latch.

@@ -10,7 +10,6 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from motorbus.bus.look import questions
 from motorbus.cli import faces
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
@@ -81,7 +80,6 @@ class DryBus:
     def __init__(self, bus: Bus) -> None:
         self.family = copy(bus.family)
         self.link = bus.link
-        self.turns = bus.turns
         self.frames: list[bytes] = []
         self._bus = bus
         self.admit = bus.admit.rehearsing() if isinstance(bus.admit, Gate) else bus.admit or Gate()
@@ -145,9 +143,9 @@ class DryBus:
     def _one(self, exchange: Exchange[Any]) -> object:
         if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
-        for question in questions(self.turns, exchange):
+        for question in self._bus.required_reads(exchange):
             self._bus.run(question)
-        with self.turns.lock:
+        with self._bus.lock:
             self.admit(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate

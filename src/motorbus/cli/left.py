@@ -57,7 +57,7 @@ def _patient(late: float) -> type[Robot]:
         def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
             super().__init__(machine, buses, axes)
             for bus in buses.values():
-                bus.turns.latency = max(late, bus.turns.latency)
+                bus.latency = max(late, bus.latency)
 
     return Patient
 
@@ -87,7 +87,7 @@ class _Told:
             return "does not tell where it stands"
         axis = self._robot.axes[name]
         where = f"at {place(self._robot, name, at)}"
-        latched = self._robot.buses[axis.spec.bus].turns.latched
+        latched = self._robot.buses[axis.spec.bus].latched
         if name not in self._concerned or name in leaving.errors or latched:
             return where
         return f"{self._how(axis, at)} {where}"

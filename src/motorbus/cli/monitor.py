@@ -173,7 +173,7 @@ def _sample(one: Any) -> State | Told | MotorbusError:
 
 def _later(bus: Bus) -> tuple[type[LinkLost], ...]:
     """What need not be raised at once: a port that is looked for, and may be there again at the next sample."""
-    return () if bus.turns.renewal is None else (LinkLost,)
+    return (LinkLost,) if bus.reconnects else ()
 
 
 class _Away:

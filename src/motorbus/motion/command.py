@@ -50,9 +50,8 @@ class Command:
 
     def __init__(self, axes: Iterable[AxisVerbs]) -> None:
         self.axes = tuple(axes)
-        self._turns = self.axes[0].bus.turns if self.axes else None
-        self._known = None if self._turns is None else self._turns.known
-        self._losses = 0 if self._turns is None else self._turns.losses
+        self._bus = self.axes[0].bus if self.axes else None
+        self._losses = 0 if self._bus is None else self._bus.loss_count
         self._stopping = self._stopped_by_now()
         self._stops = {axis.name: _stops(axis) for axis in self.axes}
         self._orders: dict[str, int] = {}
@@ -66,7 +65,7 @@ class Command:
 
     def _stopped_by_now(self) -> int:
         """How many stops have left on the bus, for whomever: while there are no more, nobody has to be looked at."""
-        return 0 if self._known is None else self._known.stopping
+        return 0 if self._bus is None else self._bus.stop_count()
 
     def depart(self, movement: Movement | None = None) -> None:
         """A movement begins: from here on it is known that they move. Raises Interrupted as `check`.
@@ -97,9 +96,9 @@ class Command:
         found._aim = None
         axes = {axis.name: axis for axis in (*self.axes, *other.axes)}
         found.axes = tuple(axes.values())
-        if other._turns is None:
-            found._turns, found._known, found._losses = self._turns, self._known, self._losses
-        elif self._turns is not None:
+        if other._bus is None:
+            found._bus, found._losses = self._bus, self._losses
+        elif self._bus is not None:
             found._losses = min(self._losses, other._losses)
         found._stopping = NEVER
         found._stops = self._stops | other._stops
@@ -122,8 +121,7 @@ class Command:
 
     def lost(self) -> MotorbusError | None:
         """The error for an axis that somebody else has told something since; None when there is none."""
-        turns = self._turns
-        if turns is not None and turns.losses != self._losses:
+        if self._bus is not None and self._bus.loss_count != self._losses:
             return verdict.outlived()
         stopping = self._stopped_by_now()
         if stopping == self._stopping:
@@ -236,5 +234,5 @@ def _lost(axis: AxisVerbs) -> Interrupted:
 
 def _stops(axis: AxisVerbs) -> int:
     """How many stops have left for it on its bus, whoever sent them."""
-    count: int = axis.bus.turns.known.stops(axis.spec.node)
+    count: int = axis.bus.stop_count(axis.spec.node)
     return count

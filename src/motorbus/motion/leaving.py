@@ -113,7 +113,7 @@ class Leaving:
         return [name for name in self._parked() if self._axes[name].under_way and not self._latched(name)]
 
     def _latched(self, name: str) -> bool:
-        return bool(self._body.buses[self._axes[name].spec.bus].turns.latched)
+        return bool(self._body.buses[self._axes[name].spec.bus].latched)
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
@@ -211,7 +211,7 @@ def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> Operation
     that would be a movement; who would be parked stays where it stops. After an emergency stop nothing is to be done.
     Those whose names are in `again` are stopped as well. Gives the errors by name; every axis is visited.
     """
-    there = [axis for axis in axes if not axis.bus.turns.latched]
+    there = [axis for axis in axes if not axis.bus.latched]
     told = yield from insisted([axis for axis in there if moves(axis) or axis.name in again], one.stop)
     limp = [axis for axis in there if axis.engaged and axis.spec.exit == "torque_off"]
     return errors_of(told) | errors_of((yield from insisted(limp, one.disable_torque)))
@@ -219,7 +219,7 @@ def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> Operation
 
 def stopped_going_on(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
     """Those axes of one bus that were told to go on without an end are told to stop. Gives the errors by name."""
-    there = [axis for axis in axes if goes_on(axis) and not axis.bus.turns.latched]
+    there = [axis for axis in axes if goes_on(axis) and not axis.bus.latched]
     return errors_of((yield from insisted(there, one.stop)))
 
 

@@ -126,9 +126,9 @@ def _link(opening: Opening) -> Link:
 def _look_for(bus: BusFace, opening: Opening) -> None:
     """A port that comes back under another name is to be reached by an emergency stop under that one."""
     if not opening.reconnect:
-        bus.turns.renewal = None
+        bus.reconnects = False
     elif isinstance(bus.link, Reconnecting):
-        bus.link.moved = lambda name: bus.stopper.move(socket_path(name) if name else None)
+        bus.link.moved = lambda name: bus.move_stop_socket(socket_path(name) if name else None)
 
 
 def _stop_socket(opening: Opening, link: Link) -> Path | None:
@@ -150,7 +150,7 @@ def echo_test(bus: BusFace) -> Exchange[Any] | None:
         LOG.warning("%s: %s", bus.link.name, warning)
     test = bus.family.echo_test()
     if test is not None:
-        bus.turns.expect_echo(test)
+        bus.expect_echo(test)
     return test
 
 
@@ -164,5 +164,5 @@ def _settled(bus: BusFace, run: Callable[[], object]) -> None:
 
 def tell_echo(bus: BusFace) -> None:
     """After the test: say that the adapter echoes, if it does."""
-    if bus.turns.echo.present:
+    if bus.echoes:
         LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

@@ -123,7 +123,7 @@ class Sentry:
         post, lost = self._posts[bus], self._lease.standing(self._body.now) is Standing.LOST or self.busy(bus)
         loss, axes = self._lease.losses, self._axes(bus)
         moving = {axis.name for axis in axes if moves(axis) or axis.name in post.failed}
-        failed = {axis.name for axis in axes if axis.name in moving and axis.bus.turns.latched}
+        failed = {axis.name for axis in axes if axis.name in moving and axis.bus.latched}
         anew = loss > post.loss
         again = () if anew else post.failed
         try:

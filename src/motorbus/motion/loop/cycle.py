@@ -316,7 +316,7 @@ class Part:
 
     def release_lost(self) -> list[str]:
         """Who was told something from elsewhere is led no more; their names. After an emergency stop all of them."""
-        self.command = command = Command(()) if self.bus.turns.latched else self.command.rest()
+        self.command = command = Command(()) if self.bus.latched else self.command.rest()
         lost = [place for place in self.places.values() if place.begun and place.axis not in command.axes]
         return self._release(lost)
 

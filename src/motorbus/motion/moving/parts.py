@@ -284,7 +284,7 @@ class OwnPart:
 
     def _overtaken(self) -> MotorbusError | None:
         """The error when somebody else has stopped it. Its driver looks for that more seldom, and stops it itself."""
-        ordered = not self.command.untold() or self._axis.bus.turns.latched
+        ordered = not self.command.untold() or self._axis.bus.latched
         return self.command.lost() if ordered else None
 
     def _stayed(self, stood: float) -> Gone:

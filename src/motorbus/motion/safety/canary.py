@@ -230,5 +230,5 @@ def _gate(axis: AxisVerbs) -> Gate | None:
 
 def _stops(axis: AxisVerbs) -> int:
     """How many stops have left for it on its bus, whoever sent them."""
-    count: int = axis.bus.turns.known.stops(axis.spec.node)
+    count: int = axis.bus.stop_count(axis.spec.node)
     return count

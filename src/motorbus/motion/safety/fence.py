@@ -33,7 +33,8 @@ def fence(body: Body) -> None:
         if isinstance(bus.admit, Gate):
             bus.admit.attended, bus.admit.origin = True, body.origins[name]
             here = [axis for axis in body.axes.values() if axis.spec.bus == name]
-            bus.turns.anew += tuple(partial(unknown, axis) for axis in here)
+            for axis in here:
+                bus.on_reconnect(partial(unknown, axis))
     for axis in body.axes.values():
         gate = body.buses[axis.spec.bus].admit
         if isinstance(gate, Gate):
@@ -57,10 +58,7 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
 
 
 def _watched(bus: BusFace, gate: Gate) -> None:
-    known = bus.turns.known
-    gate.watch(known.seen, bus.link.now, known.stops, known.accepts, bus.turns.tell)
-    bus.turns.look = gate.look
-    bus.turns.anew += (gate.forget,)
+    bus.attach(gate)
     bus.readdressed = partial(follow, bus, gate)
 
 
