@@ -10,7 +10,7 @@ import pytest
 
 from motorbus.core.operation import INTENT, OUTCOME, Journal, Operation, Report
 from motorbus.errors import Interrupted, LinkLost, RequestError
-from motorbus.families.stepper.driver import Experiment, characterise, experiments, recover
+from motorbus.families.stepper.driver import Experiment, characterise, recover
 from motorbus.families.stepper.driver.characterising import NOTE, VERB, likely_order
 from motorbus.families.stepper.table import Project, Step, encode_image, with_steps
 from tests.families.stepper.bench import Bench, bench
@@ -109,17 +109,6 @@ def test_one_lost_notice_takes_away_what_rests_on_silence_and_no_more() -> None:
     assert {"notice_on_stop", "motor_stop_ends_project", "notice_on_once"} <= gone
     assert {"rounding", "seg_loop", "proj_loop", "zero_distance", "busy"} <= set(found.settled)
     assert "rests on something that did not come" in found.open["notice_on_stop"]
-
-
-def test_the_plan_can_be_seen_without_a_controller_and_is_what_is_done() -> None:
-    plan = experiments()
-    with bench() as there:
-        there.device.characterise()
-        done = [one.name for one in there.events if isinstance(one, Experiment)]
-    assert set(done) <= {one.name for one in plan}
-    assert {name for one in plan for name in one.settles} >= {"ramp", "rounding", "clear_notice", "select"}
-    assert max(one.turns for one in plan) <= 1.0
-    assert all(one.what for one in plan)
 
 
 @pytest.mark.parametrize(
