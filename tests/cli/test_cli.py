@@ -50,23 +50,32 @@ def arguments(line: str) -> list[str]:
     return shlex.split(line.partition(" < ")[0].partition(" > ")[0])[1:]
 
 
-@pytest.mark.parametrize(
-    "words", [words for words in ALL if words[0] not in OF_ONE_FAMILY or words[1:]], ids="-".join
-)
-def test_every_command_shows_examples(words: tuple[str, ...]) -> None:
-    found = examples(words)
-    assert found
-    assert all(line.startswith(f"motorbus {' '.join(words)}") for line in found)
-    lines = [line.strip() for line in shown(words).splitlines()]
-    assert all(len(line) <= 76 for line in lines), "an example must fit a terminal"
+RULE = "Read as usual; show the frames that would change something, and send none of those."
+BOX = "\N{BOX DRAWINGS LIGHT VERTICAL}\N{BOX DRAWINGS LIGHT ARC DOWN AND RIGHT}\N{BOX DRAWINGS LIGHT ARC UP AND RIGHT}"
 
 
-@pytest.mark.parametrize("words", ALL, ids="-".join)
-def test_help_fits_a_terminal(words: tuple[str, ...]) -> None:
-    app = APP
-    for word in words:
-        app = app[word]
-    assert max(map(len, (app.help_epilogue or "").splitlines()), default=0) <= 79
+@pytest.mark.parametrize("words", [(), *ALL], ids=" ".join)
+def test_help_of_a_command(words: tuple[str, ...], run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It fits 80 columns, has the common flags and own examples, and says what --dry-run means."""
+    monkeypatch.setenv("COLUMNS", "80")
+    ran = run(*words, "--help")
+    assert ran.code == 0
+    lines = ran.out.splitlines()
+    assert [line for line in lines if len(line.rstrip()) > 79 + line.startswith(tuple(BOX))] == []
+    assert " ".join(("Usage: motorbus", *words)) in ran.out
+    if not words or words in {(family,) for family in OF_ONE_FAMILY}:
+        return
+    assert "--json" in ran.out
+    assert "--verbose" in ran.out
+    assert examples(words)
+    assert all(line.startswith(f"motorbus {' '.join(words)}") for line in examples(words))
+    if "--dry-run" in ran.out:
+        assert RULE in " ".join(ran.out.replace("│", " ").split())
+        return
+    refused = run(*words, "kst:sim#1", "--dry-run", "-vv")
+    assert (refused.code, refused.out) == (2, "")
+    assert f"`motorbus {' '.join(words)}` has no --dry-run" in refused.err
+    assert " tx " not in refused.err
 
 
 @pytest.mark.parametrize("line", EXAMPLES)
@@ -83,24 +92,6 @@ def test_an_example_with_simulated_devices_works(line: str, run: Run) -> None:
     assert ran.out
 
 
-RULE = "Read as usual; show the frames that would change something, and send none of those."
-
-
-@pytest.mark.parametrize(
-    "words", [words for words in ALL if words[0] not in OF_ONE_FAMILY or words[1:]], ids="-".join
-)
-def test_a_dry_run_means_the_same_everywhere(words: tuple[str, ...], run: Run) -> None:
-    """Who can change a device has one, by one rule; who cannot says so, with or without anything else."""
-    if "--dry-run" in (shown := run(*words, "--help").out):
-        assert RULE in " ".join(shown.replace("│", " ").split())
-        return
-    for more in ([], ["kst:sim#1"]):
-        ran = run(*words, *more, "--dry-run", "-vv")
-        assert (ran.code, ran.out) == (2, "")
-        assert f"`motorbus {' '.join(words)}` has no --dry-run" in ran.err
-        assert " tx " not in ran.err
-
-
 def test_everything_that_needs_consent_or_moves_has_a_dry_run() -> None:
     def takes(words: tuple[str, ...], option: str) -> bool:
         app = APP
@@ -110,15 +101,6 @@ def test_everything_that_needs_consent_or_moves_has_a_dry_run() -> None:
 
     assert [words for words in ALL if takes(words, "yes") and not takes(words, "dry_run")] == []
     assert all(takes((name,), "dry_run") for name in ("write", "move", "torque", "stop"))
-
-
-@pytest.mark.parametrize("words", ALL, ids="-".join)
-def test_every_command_has_help(words: tuple[str, ...], run: Run) -> None:
-    ran = run(*words, "--help")
-    assert ran.code == 0
-    assert f"Usage: motorbus {' '.join(words)}" in ran.out
-    assert "--json" in ran.out
-    assert "--verbose" in ran.out
 
 
 def test_help_names_every_command(run: Run) -> None:
