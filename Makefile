@@ -28,7 +28,7 @@ demo: $(READY)
 test soak bench: export PYTHONDONTWRITEBYTECODE =
 
 test: $(READY) $(PEERS)
-	$(BIN)/python -m pytest -n auto --dist loadgroup $(ARGS)
+	$(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
 
 soak: $(READY) $(PEERS)
 	$(BIN)/python -m pytest --soak -s --durations=0 $(ARGS)

@@ -61,8 +61,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """`-n auto`: three for every two cores, since tests of real ports and processes wait for most of their time."""
-    return max(2, 3 * (os.cpu_count() or 1) // 2)
+    """`-n auto`: two for each core, since tests of real ports and processes mostly wait."""
+    return 2 * (os.cpu_count() or 1)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -24,7 +24,7 @@ from tests.faults.machine_stepper import StepperRig, StepperSteps
 
 MACHINES = {"feetech": FeetechSteps, "kst": KstSteps, "stepper": StepperSteps}
 RIGS: dict[str, Callable[[], Any]] = {"feetech": FeetechRig, "kst": KstRig, "stepper": StepperRig}
-SHORT = settings(max_examples=10, stateful_step_count=30)
+SHORT = settings(max_examples=20, stateful_step_count=40)
 FEW = 1_200
 """Exchanges of a walk in which faults of nearly every kind strike."""
 
