@@ -1,0 +1,74 @@
+"""Every public command of every family sends the recorded bytes and returns the recorded result.
+
+A difference that is meant: `python -m tests.golden --write` records again; then read the diff of the traces.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import pytest
+
+import motorbus
+from tests.golden.catalogue import CASES, EXCLUDED, VARIANTS
+from tests.golden.traces import load
+from tests.support.golden import DEVICE, Case, collapsed, difference, public_commands, public_functions, trace
+
+recorded = cache(load)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
+def test_command_sends_the_recorded_bytes_and_returns_the_recorded_result(case: Case) -> None:
+    found = difference(recorded(case.family)[case.id], trace(case))
+    assert not found, f"{case.id}: {found}; if it is meant: python -m tests.golden --write {case.family}"
+
+
+@pytest.mark.parametrize("family", VARIANTS)
+def test_every_public_command_has_a_case_on_every_map_and_profile(family: str) -> None:
+    module: Any = getattr(motorbus, family)
+    commands = set(public_commands(getattr(module, DEVICE[family]))) | set(public_functions(module))
+    assert set(EXCLUDED[family]) <= commands, "an exclusion without a command"
+    for variant in VARIANTS[family]:
+        covered = {case.call.name for case in CASES if (case.family, case.variant) == (family, variant)}
+        assert covered == commands - set(EXCLUDED[family]), variant
+
+
+@pytest.mark.parametrize("family", VARIANTS)
+def test_traces_and_cases_are_the_same_in_number_and_order(family: str) -> None:
+    assert list(recorded(family)) == [case.id for case in CASES if case.family == family]
+
+
+@pytest.mark.parametrize(
+    ("frames", "short"),
+    [
+        ([[">", "a1"], ["<", "b1"], [">", "a2"]], [[">", "a1"], ["<", "b1"], [">", "a2"]]),
+        ([[">", "a1"], ["<", "b1"]] * 3, [["times", 3, ">a1", "<b1"]]),
+        ([[">", "a1"], ["<", "b1"], [">", "a1"], ["<", "b2"]], [["polls", ">a1"]]),
+        ([[">", "a1"], [">", "a2"], ["<", "b2"]] * 2, [["times", 2, ">a1", ">a2", "<b2"]]),
+        ([[">", "a1"], [">", "a2"], [">", "a1"], [">", "a2"], ["<", "b2"]], [["polls", ">a1", ">a2"]]),
+        (
+            [[">", "a1"], ["<", "b1"], [">", "a2"]] * 2 + [[">", "a1"], ["<", "b3"]],
+            [["times", 2, ">a1", "<b1", ">a2"], [">", "a1"], ["<", "b3"]],
+        ),
+        (
+            [[">", "a1"], [">", "a2"], [">", "a1"], [">", "a2"], ["<", "b2"], [">", "a1"]],
+            [["polls", ">a1", ">a2"]],
+        ),
+        (
+            [["<", "b0"], [">", "a1"], [">", "a1"], [">", "a3"]],
+            [["<", "b0"], ["times", 2, ">a1"], [">", "a3"]],
+        ),
+    ],
+)
+def test_repeated_requests_are_collapsed(frames: list[list[str]], short: list[list[Any]]) -> None:
+    assert collapsed(frames) == short
+
+
+def test_difference_names_the_first_entry_that_differs() -> None:
+    old: dict[str, Any] = {"frames": [[">", "01"], ["<", "02"]], "result": 1}
+    assert difference(old, old) == ""
+    assert "entry 1" in difference(old, {**old, "frames": [[">", "01"], ["<", "03"]]})
+    assert "entry 1 of the frames is missing now" in difference(old, {**old, "frames": [[">", "01"]]})
+    assert "entry 2 of the frames is new" in difference(old, {**old, "frames": [*old["frames"], [">", "04"]]})
+    assert "recorded 1, now 2" in difference(old, {**old, "result": 2})
