@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import tau
+from math import nan, tau
 from typing import Any
 
 from motorbus import stepper
@@ -152,17 +152,154 @@ FEETECH_GROUP: list[tuple[Call, str]] = [
 """On three prepared servos."""
 
 
+NARROW = (call("write", min_position_limit=1.9, max_position_limit=3.0), call("enable_torque"))
+AWAY = (call("write", min_position_limit=3.2, max_position_limit=3.5),)
+"""Limits that the servo stands outside of."""
+SILENT = (call("write", status_return_level=0),)
+"""From then on writes are not acknowledged."""
+TURNED = (call("calibrate", 1.0),)
+
+FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
+    (call("set_torque_limit", 0.5), "after_zero", (*TORQUE_ON, call("set_torque_limit", 0.0))),
+    (
+        call("set_torque_limit", 0.5),
+        "after_zero_in_velocity_mode",
+        (*VELOCITY, call("set_torque_limit", 0.0)),
+    ),
+    (call("set_mode", "position"), "after_current", (*CURRENT, call("set_current", 0.1))),
+    (call("move", 2.5, current=0.5, wait=False), "current", TORQUE_ON),
+    (call("action"), "unprepared", ()),
+    (call("reg_write", goal_position=2.5), "again", (*TORQUE_ON, call("reg_write", goal_position=2.4))),
+    (call("enable_torque"), "velocity_mode", VELOCITY[:1]),
+    (call("enable_torque"), "pwm_mode", PWM[:1]),
+    (call("enable_torque"), "step_mode", STEP[:1]),
+    (call("enable_torque"), "current_mode", CURRENT[:1]),
+    (call("stop"), "velocity_mode", VELOCITY),
+    (call("stop"), "pwm_mode", PWM),
+    (call("stop"), "step_mode", STEP),
+    (call("stop"), "current_mode", CURRENT),
+    (call("stop"), "unprepared", ()),
+    (call("stop"), "limp", PREPARED),
+    (call("disable_torque"), "unprepared", ()),
+    (call("write", acceleration=10.0), "not_acknowledged", SILENT),
+    (call("enable_torque"), "not_acknowledged", SILENT),
+    (call("move", 2.5, wait=False), "not_acknowledged", (*SILENT, call("enable_torque"))),
+    (call("disable_torque"), "not_acknowledged", SILENT),
+    (call("reg_write", goal_position=2.5), "not_acknowledged", (*SILENT, call("enable_torque"))),
+    (call("position"), "offset", TURNED),
+    (call("position"), "offset_in_velocity_mode", (*TURNED, *VELOCITY[:1])),
+    (call("move", 8.0, wait=False), "many_turns", (call("set_many_turns", True), call("enable_torque"))),
+    (call("position"), "resolution", (call("write", angular_resolution=2),)),
+    (
+        call("move", 5.0, wait=False),
+        "resolution",
+        (call("write", angular_resolution=2), call("enable_torque")),
+    ),
+]
+"""The same commands on a servo in another mode or with other settings."""
+FEETECH_REFUSED: list[tuple[Call, str, tuple[Call, ...]]] = [
+    (call("enable_torque"), "outside_limits", AWAY),
+    (call("move", 3.2), "outside_limits", NARROW),
+    (call("write", goal_position=3.2), "outside_limits", NARROW),
+    (call("reg_write", goal_position=3.2), "outside_limits", NARROW),
+    (call("move", nan), "nan", TORQUE_ON),
+    (call("move", 2.5, velocity=0.0), "no_velocity", TORQUE_ON),
+    (call("move", 2.5, velocity=-1.0), "negative_velocity", TORQUE_ON),
+    (call("move", 2.5, velocity=1e-9, wait=False), "tiny_velocity", TORQUE_ON),
+    (call("move", 2.5, velocity=1e9), "huge_velocity", TORQUE_ON),
+    (call("move", 2.5, current=0.0), "no_current", TORQUE_ON),
+    (call("move", 2.5), "wrong_mode", VELOCITY),
+    (call("set_velocity", nan), "nan", VELOCITY),
+    (call("set_velocity", 1e9), "huge", VELOCITY),
+    (call("set_velocity", -1.0), "negative", VELOCITY),
+    (call("set_duty", 1.5), "above_1", PWM),
+    (call("set_duty", -0.2), "negative", PWM),
+    (call("set_current", 1e9), "huge", CURRENT),
+    (call("step", 1e6), "huge", STEP),
+    (call("step", 0.2), "wrong_mode", TORQUE_ON),
+    (call("set_torque_limit", 1.5), "above_1", PREPARED),
+    (call("set_torque_limit", 0.0), "zero", PREPARED),
+    (call("write", goal_torque=0), "zero_torque", TORQUE_ON),
+    (call("set_gains"), "none", PREPARED),
+    (call("set_gains", p=999), "huge", PREPARED),
+    (call("set_protection", min_voltage=9.0, max_voltage=5.0), "crossed", PREPARED),
+    (call("set_protection", torque=2.0), "above_1", PREPARED),
+    (call("set_mode", "nonsense"), "unknown", PREPARED),
+    (call("set_mode", "position"), "back", (call("set_mode", "pwm"),)),
+    (call("set_mode", "position", limits=(1.0, 4.0)), "back_with_limits", (call("set_mode", "pwm"),)),
+    (call("write", nonsense=1), "unknown", PREPARED),
+    (call("write", id=7), "protected", PREPARED),
+    (call("write", goal_position=nan), "nan", TORQUE_ON),
+    (call("write", goal_position="2.5"), "text", TORQUE_ON),
+    (call("write", goal_position=2.5, max_position_limit=3.0), "goal_and_limit", TORQUE_ON),
+    (call("read", "nonsense"), "unknown", PREPARED),
+    (call("reg_write", max_temperature=60.0), "eeprom", PREPARED),
+    (call("duplicates", 0), "none", PREPARED),
+    (call("set_id", 254), "everyone", PREPARED),
+    (call("set_baud", 1234), "unknown", PREPARED),
+]
+"""What is refused, or must not be sent as it is asked."""
+FEETECH_STRANGER: list[tuple[Call, str]] = [
+    (call("identify"), "unknown_firmware"),
+    (call("read"), "unknown_firmware"),
+    (call("telemetry"), "unknown_firmware"),
+    (call("voltage"), "unknown_firmware"),
+    (call("alarms"), "unknown_firmware"),
+    (call("position"), "unknown_firmware"),
+    (call("write", acceleration=10.0), "unknown_firmware"),
+    (call("enable_torque"), "unknown_firmware"),
+    (call("disable_torque"), "unknown_firmware"),
+    (call("move", 2.5), "unknown_firmware"),
+    (call("set_id", 7), "unknown_firmware"),
+]
+"""On a servo whose firmware tells no register map."""
+FEETECH_GROUP_REFUSED: list[tuple[Call, str]] = [
+    (shared("sync_write", {1: {"goal_position": 2.5}, 9: {"goal_position": 2.5}}), "one_silent"),
+    (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": nan}}), "nan"),
+    (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": 99.0}}), "out_of_range"),
+    (shared("sync_write", {1: {"max_temperature": 60.0}}), "eeprom"),
+    (shared("sync_write_positions", DEVICES, (2.5, 2.6)), "too_few"),
+    (shared("sync_write_positions", DEVICES, (2.5, 2.6, nan)), "nan"),
+    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6)}, on="kept"), "too_few"),
+    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, nan)}, on="kept"), "nan"),
+    (
+        Call("sync_writer", (DEVICES, "goal_position"), {"values": {3: 2.5, 2: 2.6, 1: 2.7}}, on="kept"),
+        "no_order",
+    ),
+    (shared("reg_write_all", {1: {"goal_position": 2.5}, 9: {"goal_position": 2.5}}), "one_silent"),
+    (shared("sync_read", ("nonsense",), DEVICES), "unknown"),
+    (shared("disable_torque_all", (1, 9)), "one_silent"),
+]
+FEETECH_UNPREPARED: list[Call] = [
+    shared("read_positions", DEVICES),
+    shared("sync_read_positions", DEVICES),
+    shared("sync_read_states", DEVICES),
+    shared("sync_write_positions", DEVICES, (2.5, 2.6, 2.7)),
+    Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, 2.7)}, on="kept"),
+]
+
+
 def _feetech() -> list[Case]:
     cases = []
     for name, model in MODELS.items():
         options = {"model": model, "position": 400 if name.startswith("scs") else 1800}
-        for one, label, before in FEETECH:
+        for one, label, before in (*FEETECH, *FEETECH_STATES, *FEETECH_REFUSED):
             ids = (1,) if one.on == "device" else (1, 2, 3)
             cases.append(Case("feetech", name, one, label, before, ids, options))
         prepared = (shared("prepare_all", DEVICES),)
-        for one, label in FEETECH_GROUP:
+        for one, label in (*FEETECH_GROUP, *FEETECH_GROUP_REFUSED):
             before = () if one.name == "prepare_all" else prepared
             cases.append(Case("feetech", name, one, label, before, (1, 2, 3), options))
+        cases += [
+            Case("feetech", name, one, "unprepared", (), (1, 2, 3), options) for one in FEETECH_UNPREPARED
+        ]
+    cases += [
+        Case("feetech", "sts", one, label, options={"firmware": "9.99"}) for one, label in FEETECH_STRANGER
+    ]
+    mixed = {"model": "sts3215+scs0009+hls3925"}
+    for one, label in (*FEETECH_GROUP, (shared("sync_read", ("present_position",), DEVICES), "")):
+        before = () if one.name == "prepare_all" else (shared("prepare_all", DEVICES),)
+        cases.append(Case("feetech", "mixed", one, label, before, (1, 2, 3), mixed))
     cases.append(Case("feetech", "sts", shared("scan"), "all", ids=(1, 2, 200)))
     cases.append(Case("feetech", "sts", shared("scan", (1, 2), (1_000_000, 500_000)), "rates", ids=(1, 2)))
     return cases
@@ -187,6 +324,16 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("move", 0.2), "", ()),
     (call("move", 0.2, wait=False), "no_wait", ()),
     (call("move", 99.0), "beyond_limits", ()),
+    (call("move", nan), "nan", ()),
+    (call("move", 0.15), "travel_limits", (call("set_travel_limits", -0.2, 0.1),)),
+    (call("write", goal_position=0.15), "travel_limits", (call("set_travel_limits", -0.2, 0.1),)),
+    (call("set_travel_limits", 0.1, 0.5), "above_zero", ()),
+    (call("set_travel_limits", -9.0, 9.0), "huge", ()),
+    (call("write", node_id=9), "protected", ()),
+    (call("write", nonsense=1), "unknown", ()),
+    (call("read", "nonsense"), "unknown", ()),
+    (call("set_node_id", 0), "everyone", ()),
+    (call("set_bit_rate", 1234), "unknown", ()),
     (call("stop"), "", ()),
     (call("version"), "", ()),
     (call("node_id"), "", ()),
@@ -244,6 +391,12 @@ def _kst() -> list[Case]:
                 )
             )
     cases.append(Case("kst", "kst", shared("scan", (), (), DIALECT), "all", ids=(1, 2), lanes=True))
+    for one in (call("move", 0.2, wait=False), call("save"), call("set_node_id", 9)):
+        for form, value in (("sized_only", "accept_unsized"), ("unsized_only", "accept_sized")):
+            cases.append(Case("kst", "kst", one, form, options={"profile": "kst", value: False}))
+    cases.append(Case("kst", "kst", call("version"), "long", options={"firmware": "1.00 of 2024"}))
+    beyond = shared("broadcast_position", 99.0, (1, 2), DIALECT)
+    cases.append(Case("kst", "kst", beyond, "beyond_limits", ids=(1, 2), lanes=True))
     extended = {"profile": "kst-ext", "id_format": "ext"}
     cases.append(Case("kst", "kst-ext", call("position"), "extended_id", options=extended))
     return cases
@@ -321,6 +474,16 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("characterise"), "", ALIVE),
     (call("recover", "jog", NO_FACTS), "no_facts", ALIVE),
     (call("select_project", 2, 3), "", ALIVE),
+    (call("select_project", 5, 1), "impossible", ALIVE),
+    (call("set_microstep_and_angle", 0, 180), "impossible", SELECTED),
+    (call("set_turn_distance", 0), "impossible", SELECTED),
+    (call("set_step_distance", 11, 1), "impossible", SELECTED),
+    (call("set_step_accel_speed", 1, 100, 70_000), "impossible", SELECTED),
+    (call("set_output", 6, True), "impossible", ALIVE),
+    (call("jog", nan, 0.5), "nan", ALIVE),
+    (call("jog", 3.0, 61.0), "too_long", ALIVE),
+    (call("home", deadline=0.0), "no_deadline", ALIVE),
+    (call("run", 3), "empty", ALIVE),
     (call("set_microstep_and_angle", 8, 180), "", SELECTED),
     (call("set_turn_distance", 5000), "", SELECTED),
     (call("set_step_distance", 1, 1600), "", SELECTED),
