@@ -1,4 +1,4 @@
-"""A lost reply at any exchange of a command: success is only reported where the servo did it, and a step is made once."""
+"""A reply is lost at any exchange of a command: success means that the servo did it, and a step is made once."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ COMMANDS: dict[str, tuple[Callable[[Servo], object], Callable[[Servo], bool]]] =
 
 
 def near(read: dict[str, Any], value: float) -> bool:
-    return abs(next(iter(read.values())) - value) < 0.02
+    (held,) = read.values()
+    return abs(float(held) - value) < 0.02
 
 
 @pytest.mark.parametrize("model", MODELS)
