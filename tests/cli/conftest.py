@@ -19,7 +19,7 @@ from motorbus.core.operation import Data
 from motorbus.link import adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 class Ran(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 from motorbus.cli.estops import with_estops
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_fenced import bounded
-from tests.motion.machines import described
+from tests.support.machines import described
 
 HOLD = 'estop = "hold"'
 

@@ -16,8 +16,8 @@ import motorbus
 from motorbus import families
 from motorbus.core.operation import INTENT, CanFrame, Journal
 from tests.cli.conftest import Bench, Run
-from tests.conformance.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
-from tests.conformance.world import moves
+from tests.support.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
+from tests.support.world import moves
 
 pytestmark = pytest.mark.usefixtures("installed")
 

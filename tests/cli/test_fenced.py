@@ -9,7 +9,7 @@ import pytest
 
 from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Bench, Run
-from tests.motion.machines import described
+from tests.support.machines import described
 
 
 def bounded(bench: Bench, *lines: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.cli.conftest import Bench, Run
-from tests.motion.machines import listened, said
+from tests.support.machines import listened, said
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from motorbus.cli.output import Output
 from motorbus.cli.robot import InHand
 from motorbus.errors import MotorbusError
 from tests.cli.conftest import Bench
-from tests.motion.machines import Cut
+from tests.support.machines import Cut
 
 HOLD, EXITS = 'exit = "hold"', ('exit = "torque_off"', 'exit = "park"', 'exit = "leave"')
 

@@ -20,7 +20,7 @@ import pytest
 
 from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
-from tests.motion.machines import described
+from tests.support.machines import described
 
 NAMES = "arm", "can", "stage"
 EXTRA = '[pose.ready]\na1 = "10 deg"\nc1 = "5 deg"\n'

@@ -16,9 +16,9 @@ import pytest
 
 from motorbus.cli.exits import Exit
 from tests.cli.conftest import Run
-from tests.motion.machines import machine
 from tests.safety.calls import AXES, BOUNDS, SLACK, SURELY
 from tests.safety.decoders import COUNT, TENTH, FeetechWitness, KstWitness, Witness
+from tests.support.machines import machine
 
 SLOW = 100
 """A line of the shell takes so much longer than a call."""

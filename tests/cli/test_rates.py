@@ -11,7 +11,7 @@ from motorbus.cli import _COMMANDS
 from motorbus.cli.rates import check_rate
 from motorbus.core.units import GREATEST_RATE, LEAST_RATE
 from tests.cli.conftest import Bench, Run
-from tests.motion.machines import listened, said
+from tests.support.machines import listened, said
 
 TAKING = {
     "teach": "teach a1 --output w.csv --seconds 1",

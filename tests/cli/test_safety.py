@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.core.operation import Data
 from tests.cli.conftest import Bench, Run
-from tests.motion.machines import listened, said
+from tests.support.machines import listened, said
 
 STRANGE = (
     'format = 1\n[bus.arm]\naddress = "feetech:/dev/not-there"\n[axis.one]\ndevice = "arm#1"\nunit = "deg"\n'

@@ -12,7 +12,7 @@ import pytest
 from motorbus.cli.simulated import Simulated
 from motorbus.motion.trajectory import Trajectory
 from tests.cli.conftest import Bench, Run
-from tests.motion.machines import described
+from tests.support.machines import described
 
 HELD, LIMP = 1, 0
 

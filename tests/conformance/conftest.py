@@ -16,8 +16,8 @@ from collections.abc import Callable
 import pytest
 
 from motorbus.core.family import Family
-from tests.conformance.subjects import FAMILIES, SUBJECTS, Line, Vector, line_of, tables_of, vectors
-from tests.conformance.world import has, has_torque_switch, kept, leads, locks, moves, plain, reports
+from tests.support.subjects import FAMILIES, SUBJECTS, Line, Vector, line_of, tables_of, vectors
+from tests.support.world import has, has_torque_switch, kept, leads, locks, moves, plain, reports
 
 
 def _is_reply(vector: Vector) -> bool:

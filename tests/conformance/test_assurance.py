@@ -8,8 +8,8 @@ import pytest
 
 from motorbus.core.assurance import Assurance, Given
 from motorbus.core.family import Family
-from tests.conformance.subjects import FAMILIES
-from tests.conformance.world import abilities, world
+from tests.support.subjects import FAMILIES
+from tests.support.world import abilities, world
 
 DECLARED = {name: family for name, family in FAMILIES.items() if family.devices.assures is not None}
 

@@ -12,8 +12,8 @@ import pytest
 from motorbus.core.family import Family, Health, State, Train
 from motorbus.core.operation import Effect, Exchange, Operation, Runnable, Together, outcome
 from motorbus.errors import LimitExceeded, NoReply, RequestError
-from tests.conformance.subjects import line_of
-from tests.conformance.world import IDS, Steps, World, abilities, kept, sent, world
+from tests.support.subjects import line_of
+from tests.support.world import IDS, Steps, World, abilities, kept, sent, world
 
 DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(

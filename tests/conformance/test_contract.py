@@ -25,8 +25,8 @@ from motorbus.core.operation import (
     Together,
 )
 from motorbus.errors import MotorbusError, RequestError
-from tests.conformance.subjects import FAMILIES, PACKAGES, line_of, possible
-from tests.conformance.world import IDS, World, world
+from tests.support.subjects import FAMILIES, PACKAGES, line_of, possible
+from tests.support.world import IDS, World, world
 
 MOST_MEMBERS = 18
 ROOMS = ("wire", "table", "driver", "simulator")

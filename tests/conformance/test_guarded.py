@@ -17,7 +17,7 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.memory import MemoryLink
-from tests.conformance.world import IDS, Cut, Steps, World, closed, kept, locks, said, samples, world
+from tests.support.world import IDS, Cut, Steps, World, closed, kept, locks, said, samples, world
 
 NODE = IDS[0]
 MOST = 2000

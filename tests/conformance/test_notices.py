@@ -5,8 +5,8 @@ from __future__ import annotations
 from motorbus.core.family import Family
 from motorbus.core.operation import Data, Listen, Notice, Operation
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.conformance.subjects import vectors
-from tests.conformance.world import IDS, reports, said, sent, world
+from tests.support.subjects import vectors
+from tests.support.world import IDS, reports, said, sent, world
 
 NODE = IDS[0]
 

@@ -9,7 +9,7 @@ import pytest
 
 from motorbus.core.family import Family
 from motorbus.core.operation import Exchange
-from tests.conformance.world import IDS, World, abilities, world
+from tests.support.world import IDS, World, abilities, world
 
 NODE = IDS[0]
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from motorbus.core.family import Explanation, Family, Receiver
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice, Reply
-from tests.conformance.subjects import FAMILIES, Vector, line_of, payload, possible, vectors
+from tests.support.subjects import FAMILIES, Vector, line_of, payload, possible, vectors
 
 MOST_HELD = 4096
 HEAD = 6

@@ -10,7 +10,7 @@ import pytest
 from motorbus.core.entry import Entry, Storage
 from motorbus.core.family import Family
 from motorbus.errors import RequestError
-from tests.conformance.world import IDS, World, kept, plain, samples, sent, world
+from tests.support.world import IDS, World, kept, plain, samples, sent, world
 
 NODE = IDS[0]
 

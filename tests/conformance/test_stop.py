@@ -13,9 +13,9 @@ from motorbus.bus.stop import StopOutcome
 from motorbus.core.family import Family
 from motorbus.core.operation import Effect, Exchange
 from motorbus.errors import Interrupted, MotionError, NoReply
-from tests.conformance.subjects import possible
 from tests.conformance.test_guarded import Interrupting, guarded
-from tests.conformance.world import IDS, World, closed, kept, locks, said, sent, switch_on, world
+from tests.support.subjects import possible
+from tests.support.world import IDS, World, closed, kept, locks, said, sent, switch_on, world
 
 NODE = IDS[0]
 WAY = 0.6  # rad; some servos turn 44° to either side and no more

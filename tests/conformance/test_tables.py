@@ -13,7 +13,7 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Effect
 from motorbus.core.units import QUANTITIES
 from motorbus.errors import RequestError
-from tests.conformance.world import closed, kept, locks
+from tests.support.world import closed, kept, locks
 
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 

@@ -15,8 +15,8 @@ from motorbus.core.family import Family
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError, WireError
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.conformance.subjects import line_of, payload, vectors
-from tests.conformance.world import IDS, World, sent, world
+from tests.support.subjects import line_of, payload, vectors
+from tests.support.world import IDS, World, sent, world
 
 NODE, OTHER = IDS[:2]
 HEAD = 6

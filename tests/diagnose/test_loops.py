@@ -10,7 +10,7 @@ from motorbus.diagnose.budget import Transfer, budget
 from motorbus.diagnose.loops import Wanted, count
 from motorbus.errors import RequestError
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 def test_it_is_what_an_open_machine_says() -> None:

@@ -41,7 +41,7 @@ from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from motorbus.simulation.faults import FaultyLine, World, parse
 from motorbus.simulation.history import History
-from tests.faults.oracle import FalseWord, Oracle, Outcome, Window
+from tests.support.oracle import FalseWord, Oracle, Outcome, Window
 
 BUFFER: Final = 4096
 LOTS: Final = 1 << 16

@@ -12,7 +12,7 @@ from motorbus.families.feetech import FAMILY, Servo, sync_read, wire
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.table import TABLES
 from tests.faults.machine import Rig, machine
-from tests.faults.oracle import FalseWord, Window
+from tests.support.oracle import FalseWord, Window
 
 IDS = (1, 2, 3)
 TABLE = TABLES["sts"]

@@ -19,7 +19,7 @@ from motorbus.families.kst.wire import (
     encode_upload_reply,
 )
 from tests.faults.machine import Rig, machine
-from tests.faults.oracle import FalseWord, Window
+from tests.support.oracle import FalseWord, Window
 
 IDS = (0x25, 0x26)
 PROFILE = "kst-ext"

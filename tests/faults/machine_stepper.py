@@ -22,7 +22,7 @@ from motorbus.families.stepper.driver.stopping import STOPS
 from motorbus.families.stepper.execution import Phase
 from motorbus.families.stepper.table import ORDERS, Project, Step, with_steps
 from tests.faults.machine import Rig, machine
-from tests.faults.oracle import FalseWord, Outcome, Window
+from tests.support.oracle import FalseWord, Outcome, Window
 
 STEPS = (1, 2, 3)
 SWEEP: Final = with_steps(

@@ -21,7 +21,7 @@ from motorbus.families.stepper.table import Project, Step, with_steps
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.conformance.world import said
+from tests.support.world import said
 
 IDS = {"feetech": (1, 2, 3), "kst": (0x21, 0x22, 0x23), "stepper": (1,)}
 MADE: dict[str, dict[str, Any]] = {

@@ -17,8 +17,8 @@ from motorbus.link.can_slcan import LINE_BITS, USUAL_BAUD
 from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.memory import MemoryLink
 from motorbus.link.slcan import SlcanAdapter
-from tests.faults.kst_kinds import KstRig
-from tests.faults.single import Overheard
+from tests.support.catalogue.kst import KstRig
+from tests.support.single_faults import Overheard
 
 LINE = re.compile(rb"t[0-7][0-9A-Fa-f]{2}8[0-9A-Fa-f]{16}")
 """A frame of eight bytes as text, by the LAWICEL manual."""

@@ -15,7 +15,7 @@ from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech import Servo, sync_read, wire
 from motorbus.families.feetech.table import ALARM_BITS, alarms
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.faults.rig import IDS, Rig
+from tests.support.rigs.feetech import IDS, Rig
 
 ACKNOWLEDGED_TOO = 1
 """Status return level at which everything is answered; at 0 a PING and a READ are."""

@@ -28,7 +28,7 @@ from motorbus.simulation.mount import Mount
 from tests.bus.responder import Responder, position
 from tests.bus.script import admit_all
 from tests.faults.scenes import IDS, Scene, off
-from tests.simulation.served import served
+from tests.support.mounts import served
 
 CALLERS = 8
 

@@ -17,10 +17,10 @@ from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
-from tests.conformance.world import said
 from tests.faults.scenes import Scene
 from tests.faults.test_reconnect import again, free_port
-from tests.simulation.served import served
+from tests.support.mounts import served
+from tests.support.world import said
 
 IDS = (0x21, 0x22, 0x23)
 SOON = 1.0

@@ -17,9 +17,9 @@ from motorbus.families.feetech import Servo, wire
 from motorbus.simulation.faults import FaultyLine
 from tests.conftest import Figures, Rounds
 from tests.faults.chance import expected_of_bits, expected_of_bytes, poisson_line
-from tests.faults.kst_kinds import KstRig
-from tests.faults.rig import Rig, read_word
-from tests.faults.single import tried_again
+from tests.support.catalogue.kst import KstRig
+from tests.support.rigs.feetech import Rig, read_word
+from tests.support.single_faults import tried_again
 
 WORD = 2
 SHARE = 0.01

@@ -25,7 +25,7 @@ from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import Robot
 from tests.faults.scenes import IDS, KINDS, Scene, off
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 PACKAGE = Path(motorbus.__file__).parent
 WALL = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.ctime", "time.strftime"}

@@ -30,8 +30,8 @@ from motorbus.simulation.mount import Mount
 from tests.bus.responder import Responder
 from tests.bus.script import admit_all
 from tests.conftest import Figures, Rounds
-from tests.faults import kst_rig
-from tests.simulation.served import served
+from tests.support.mounts import served
+from tests.support.rigs import kst as kst_rig
 
 CROWD = 64
 NODES = range(1, 21)

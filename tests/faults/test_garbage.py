@@ -28,10 +28,10 @@ from motorbus.link import can_text
 from motorbus.link.base import PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.conftest import Figures, Rounds
-from tests.families.stepper.fault_rig import Rig as StepperRig
-from tests.faults.kst_kinds import KstRig, read_2
-from tests.faults.rig import Rig, read_word
 from tests.faults.slcan_rig import SlowSlcanRig
+from tests.support.catalogue.kst import KstRig, read_2
+from tests.support.rigs.feetech import Rig, read_word
+from tests.support.rigs.stepper import Rig as StepperRig
 
 MOST = 4096
 """Bytes that a reader may hold back, as is promised; what each of them says of itself is less, and that is asserted."""

@@ -11,7 +11,7 @@ from motorbus.bus.trust import EQUAL_RUN
 from motorbus.core.operation import Data
 from motorbus.errors import DeviceError
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.faults.kst_rig import Mischief, Rig
+from tests.support.rigs.kst import Mischief, Rig
 
 NODES = (0x25, 0x26, 0x27, 0x28)
 WRONG = ("index instead", "index before", "sub instead", "sub before", "kind instead", "kind before")

@@ -14,8 +14,8 @@ from motorbus.errors import MotorbusError
 from motorbus.link.base import Side
 from tests.conftest import Figures, Rounds
 from tests.faults.frames import LATE, FrameFault, FrameLine, every_fault
-from tests.faults.kst_kinds import KINDS, NODE, Kind, KstRig, read_segments
-from tests.faults.single import suffer
+from tests.support.catalogue.kst import KINDS, NODE, Kind, KstRig, read_segments
+from tests.support.single_faults import suffer
 
 LEFT_ALONE = 0.002
 """s after which a servo that was asked twice has said all that it has to say."""

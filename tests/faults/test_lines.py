@@ -13,7 +13,7 @@ from motorbus.errors import MotorbusError, NoReply
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from tests.conftest import Rounds
-from tests.faults.rig import KINDS, Rig, ping, read_word, sync_read, write_byte
+from tests.support.rigs.feetech import KINDS, Rig, ping, read_word, sync_read, write_byte
 
 
 def try_(exchange: Callable[[Rig], None], rig: Rig) -> bool:

@@ -21,11 +21,11 @@ from motorbus.families.kst.driver.exchanges import order
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import Gate
-from tests.families.stepper.fault_rig import Rig as StepperRig
-from tests.families.stepper.test_single_faults import COMMANDS, ask
-from tests.faults.kst_kinds import NODE, KstRig
-from tests.faults.rig import Rig
-from tests.faults.single import Struck
+from tests.faults.test_stepper_single_faults import COMMANDS, ask
+from tests.support.catalogue.kst import NODE, KstRig
+from tests.support.rigs.feetech import Rig
+from tests.support.rigs.stepper import Rig as StepperRig
+from tests.support.single_faults import Struck
 
 
 class Unanswered(PerfectLine):

@@ -24,7 +24,7 @@ from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from motorbus.simulation.history import History
-from tests.faults.oracle import SAYS, FalseWord, Oracle, Outcome, outcome
+from tests.support.oracle import SAYS, FalseWord, Oracle, Outcome, outcome
 
 
 class Bench:

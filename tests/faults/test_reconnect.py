@@ -28,7 +28,7 @@ from motorbus.session.opening import prepare
 from motorbus.session.robot import Robot
 from motorbus.simulation.mount import Mount
 from tests.conftest import Figures
-from tests.simulation.served import served
+from tests.support.mounts import served
 
 TRIES = 1_000
 """Looks at a port that is coming back, each behind a pause."""

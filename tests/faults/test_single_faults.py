@@ -15,9 +15,9 @@ from motorbus.families.feetech import wire
 from motorbus.link.base import Line, Side
 from motorbus.simulation.faults import Fault
 from tests.conftest import Figures, Rounds
-from tests.faults.feetech_kinds import KINDS, Kind, another_request
-from tests.faults.rig import Bytewise, Rig
-from tests.faults.single import EDGES, EVERY, LATE, Tally, every_fault, number_of, suffer
+from tests.support.catalogue.feetech import KINDS, Kind, another_request
+from tests.support.rigs.feetech import Bytewise, Rig
+from tests.support.single_faults import EDGES, EVERY, LATE, Tally, every_fault, number_of, suffer
 
 ALL = [(model, name) for model, kinds in KINDS.items() for name in kinds]
 TO_HOST = [(model, name) for model, name in ALL if KINDS[model][name].back]

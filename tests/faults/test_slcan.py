@@ -14,9 +14,9 @@ import pytest
 from motorbus.link.base import PerfectLine, Side
 from motorbus.simulation.faults import Fault
 from tests.conftest import Figures
-from tests.faults.kst_kinds import KINDS
-from tests.faults.single import EVERY, Overheard, Tally, every_fault, number_of, suffer
 from tests.faults.slcan_rig import VALUE, SlcanRig, another_frame, value_changed
+from tests.support.catalogue.kst import KINDS
+from tests.support.single_faults import EVERY, Overheard, Tally, every_fault, number_of, suffer
 
 NAMES = ("ping", "read 2 bytes", "refused read", "write 1 byte that is kept", "save that is acknowledged")
 ONE_EXCHANGE = (*NAMES, "read 1 byte", "read 4 bytes", "refused write", "write 1 byte", "save")

@@ -18,7 +18,7 @@ from motorbus.link.pty import PtyMaster
 from motorbus.simulation.mount import Mount
 from tests.conftest import Figures, Rounds
 from tests.faults.life import FAMILIES, Footprint, Life, footprint
-from tests.simulation.served import served
+from tests.support.mounts import served
 
 FULL = 10_000
 BLOCKS = 2_000

@@ -17,8 +17,8 @@ from motorbus.families.feetech import wire as feetech
 from motorbus.families.stepper import FAMILY as STEPPER
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.can_text import SlcanReader
-from tests.faults.rig import Rig, ping, read_word
-from tests.faults.single import tried_again
+from tests.support.rigs.feetech import Rig, ping, read_word
+from tests.support.single_faults import tried_again
 
 WORD = feetech.encode_status(1, 0, b"\x12\x34")
 REPLIES: dict[str, tuple[Callable[[], Any], bytes]] = {

@@ -16,9 +16,9 @@ from motorbus.core.operation import Data
 from motorbus.families.stepper import wire
 from motorbus.link.base import Delivery, Side
 from tests.conftest import Figures, Rounds
-from tests.families.stepper.fault_rig import Rig
-from tests.families.stepper.mischief import Mischief
 from tests.families.stepper.test_faults import Ledger
+from tests.support.lines import Mischief
+from tests.support.rigs.stepper import Rig
 
 SHARE = 0.01
 DOUBLES = 3

@@ -16,9 +16,9 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Line, PerfectLine, Side
 from tests.conftest import Figures
-from tests.families.stepper.fault_rig import MOTIONS, STOPS, Rig
-from tests.families.stepper.test_single_faults import COMMANDS, ask
-from tests.faults.single import EVERY, Overheard, Tally, every_fault, number_of, suffer
+from tests.faults.test_stepper_single_faults import COMMANDS, ask
+from tests.support.rigs.stepper import MOTIONS, STOPS, Rig
+from tests.support.single_faults import EVERY, Overheard, Tally, every_fault, number_of, suffer
 
 TELLING = (0x00, 0x5E)
 LONGEST = 12.0

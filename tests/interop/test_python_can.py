@@ -18,9 +18,9 @@ import pytest
 
 import motorbus
 from motorbus import kst
-from tests.families.kst.vectors import MANUAL
 from tests.interop.can_bus import WAYS, CanBus, Way, can_bus
 from tests.interop.canopen_peer import MODULES
+from tests.support.vectors.kst import MANUAL
 
 SCRIPT = Path(__file__).resolve().parent / "python_can_client.py"
 FRAMES = {vector.id: str(vector.frame) for vector in MANUAL}

@@ -10,7 +10,7 @@ import pytest
 from motorbus import AsyncRobot, LimitExceeded, NotHomed, Robot
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.capabilities import ability
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 VERBS = {
     *("state", "position", "velocity", "load", "current", "voltage", "temperature"),

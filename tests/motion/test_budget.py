@@ -10,7 +10,7 @@ import pytest
 from motorbus.errors import RequestError
 from motorbus.motion.budget import BusBudget, RobotBudget, check_figures, refuse_above
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import Heard, machine
+from tests.support.machines import Heard, machine
 
 FAST = BusBudget(("a",), 1_000_000, 2, 6, wire=0.001, turnaround=0.0, waits=0.0)
 SLOW = BusBudget(("b",), 500_000, 4, 4, wire=0.003, turnaround=0.00025, waits=0.001)

@@ -15,7 +15,7 @@ from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import ability
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import Heard, listened, machine, said
+from tests.support.machines import Heard, listened, machine, said
 
 TURNED = {"zero": "90 deg", "sign": -1, "gear": 2.0, "low": "-40 deg", "high": "40 deg"}
 

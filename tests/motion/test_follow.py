@@ -12,7 +12,7 @@ import pytest
 from motorbus.errors import RequestError
 from motorbus.motion.follow import Ending, Followed
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 STILL = 0.02
 

@@ -11,7 +11,7 @@ import pytest
 
 from motorbus import AsyncRobot, MotorbusError, NoReply, OutcomeUnknown, RequestError, Robot
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 
 @contextmanager

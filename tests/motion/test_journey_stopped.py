@@ -17,7 +17,7 @@ from motorbus.motion.meeting import Seat
 from motorbus.motion.moving.moved import Moved
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import Cut, Heard, machine
+from tests.support.machines import Cut, Heard, machine
 
 GOALS = {"a1": 1.0, "c1": 0.6, "lift": 0.05}
 STOPPED = 0.05

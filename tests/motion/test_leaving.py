@@ -13,7 +13,7 @@ from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
 from motorbus.motion.moving import verbs as moving
-from tests.motion.machines import Cut, listened, machine, said
+from tests.support.machines import Cut, listened, machine, said
 
 PARKED = {"exit": "park", "park": "10 deg"}
 LIMP = {"exit": "torque_off"}

@@ -9,7 +9,7 @@ from motorbus.motion.leaving import Leaving
 from motorbus.motion.machine import Machine
 from motorbus.motion.safety.standstill import READS
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import Cut, listened, machine, said
+from tests.support.machines import Cut, listened, machine, said
 
 
 def moving(robot: Robot, *names: str) -> None:

@@ -14,7 +14,7 @@ from motorbus.motion import limits
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 SHOULDER = AxisSpec(
     device="arm#1",

@@ -17,7 +17,7 @@ from motorbus.motion.capabilities import disable_torque
 from motorbus.motion.loop.faces import AsyncLoop
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.motion.machines import Heard, machine
+from tests.support.machines import Heard, machine
 
 ARM = "1-3"
 

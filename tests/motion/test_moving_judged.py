@@ -11,9 +11,9 @@ from motorbus.errors import LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import Robot
-from tests.motion.machines import Heard, listened, machine, said
 from tests.motion.moving.test_journey import Poke
 from tests.motion.moving.test_stream import Without
+from tests.support.machines import Heard, listened, machine, said
 
 THERE = Trajectory([0.0, 1.0, 2.0], {"a1": [0.4, 0.5, 0.4], "c1": [0.1, 0.2, 0.1]})
 

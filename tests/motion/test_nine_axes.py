@@ -16,7 +16,7 @@ from bench.truth import Truth, Went, watched
 from motorbus.link.memory import NoisyLine
 from motorbus.motion.moving.moved import Moved
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 APART = 0.005
 """s between the first start and the last, at most."""

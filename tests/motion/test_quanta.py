@@ -11,7 +11,7 @@ from motorbus import AsyncRobot, Robot
 from motorbus.core.operation import Pause
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError
 from motorbus.motion.quanta import LONGEST, QUANTUM
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 SPEED = radians(45)
 

@@ -16,7 +16,7 @@ from motorbus.motion.abreast import Abreast
 from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned
 from tests.families.stepper.runs import TURN
 from tests.families.stepper.runs import made as built
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 FAR = {"lift": {"low": "0 mm", "high": "2000 mm", "max_step": "500 mm"}}
 

@@ -11,7 +11,7 @@ import pytest
 from motorbus import AsyncRobot, Interrupted, NotHomed, RequestError
 from motorbus.motion.axis import AsyncAxis
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 """For one turn of 5 mm, as project 1 of the simulated controller says."""
 

@@ -13,7 +13,7 @@ from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Pause
 from motorbus.core.verbs import verb
 from motorbus.motion import recognition
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 
 def test_every_device_is_asked_and_its_axis_knows_what_it_can_do() -> None:

@@ -14,8 +14,8 @@ from motorbus.motion.machine import Machine
 from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.loop.lines import Doubtful
-from tests.motion.machines import described, machine
 from tests.motion.test_follow import move
+from tests.support.machines import described, machine
 
 LATE = 0.0005
 """s; a reading is there so long after the beginning of its cycle, at most."""

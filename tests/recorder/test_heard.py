@@ -9,7 +9,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.families.stepper import wire
 from motorbus.recorder import Decoder, decode
 from motorbus.recorder.heard import ByReceiver, captures_of
-from tests.conformance.subjects import FAMILIES
+from tests.support.subjects import FAMILIES
 
 TEMPLATE = FAMILIES["template"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from motorbus.core.operation import CanFrame, Data
-from tests.motion.machines import Heard
+from tests.support.machines import Heard
 
 
 def asks(data: Data) -> bool:

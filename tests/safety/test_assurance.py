@@ -13,7 +13,7 @@ from motorbus.motion.machine import Machine
 from motorbus.motion.moving.stream import SHARE, USUAL
 from motorbus.motion.safety.assurance import MACHINE, NONE, SCOPE, WHOLE, assured, cycle, unbounded
 from motorbus.session import prepare
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 def families(made: Machine) -> dict[str, Family]:

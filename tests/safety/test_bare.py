@@ -11,7 +11,7 @@ from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import sync_write_positions
 from motorbus.families.kst import broadcast_position
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 SLOW = {"max_velocity": "5 deg/s"}
 FAR_AND_BARE = "comes without a velocity, so its device would go there as fast as it can"

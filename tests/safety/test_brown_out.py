@@ -17,9 +17,9 @@ from motorbus.cli.simulated import Simulated
 from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.canary import FaultNoted
 from motorbus.session.robot import Robot
-from tests.motion.machines import described
 from tests.safety.decoders import READ
 from tests.safety.test_canary import moving_or_giving_torque
+from tests.support.machines import described
 
 
 class Served(NamedTuple):

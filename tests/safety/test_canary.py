@@ -15,8 +15,8 @@ from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import HEALTH, LET_GO, RESTART, Canary, FaultNoted
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import machine
 from tests.safety.decoders import READ, REG_WRITE, SYNC_WRITE, WRITE
+from tests.support.machines import machine
 
 GOALS = {"a1": 0.6, "a2": -0.6, "a3": 0.6}
 

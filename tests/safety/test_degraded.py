@@ -24,7 +24,7 @@ from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Report
 from motorbus.errors import MotorbusError
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 ROOT = Path(__file__).parents[2]
 LONG = 60.0  # s until a test that hangs says so

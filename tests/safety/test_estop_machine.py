@@ -15,8 +15,8 @@ import pytest
 from motorbus import AsyncRobot
 from motorbus.core.operation import Data
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import machine
 from tests.safety.test_estop import MOST, is_stop, is_target, queued
+from tests.support.machines import machine
 
 CHUNK = 0.001  # s of the line that one piece of garbage fills
 FAMILIES = {"arm": "feetech", "can": "kst", "stage": "stepper"}

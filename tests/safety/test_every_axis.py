@@ -18,7 +18,7 @@ from motorbus import AsyncRobot, Robot
 from motorbus.core.operation import CanFrame, Data, Operation, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import disable_torque_all
-from tests.motion.machines import Heard, listened, machine
+from tests.support.machines import Heard, listened, machine
 
 SERVOS = {f"a{node}": node for node in (1, 2, 3, 4)}
 CANS = {"c1": 0x25, "c2": 0x26}

@@ -16,7 +16,7 @@ from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds
 from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 STEP = {"max_step": "10 deg"}
 DOWN = {"sign": -1, "gear": 2.0, "low": "-40 deg", "high": "20 deg", "max_step": "4 deg"}

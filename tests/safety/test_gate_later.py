@@ -17,7 +17,7 @@ from motorbus.motion.machine import Machine
 from motorbus.motion.safety.lease import Lease
 from motorbus.session import prepare
 from motorbus.session.robot import Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 STEP = {"a1": {"max_step": "15 deg"}}
 

@@ -10,7 +10,7 @@ from motorbus.core.operation import Operation, Pause
 from motorbus.errors import Faulted, LinkLost, NotHomed
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
-from tests.motion.machines import Heard, machine
+from tests.support.machines import Heard, machine
 
 AWAY = 0.5
 

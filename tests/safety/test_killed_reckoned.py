@@ -1,6 +1,6 @@
 """A program that is killed while a stepper axis moves: the motor ends the one move it was given, and rests.
 
-In real processes, as in `test_killed`. The controller tells nothing of where it is, so the motor of the simulator is
+In real processes, as in `test_kill`. The controller tells nothing of where it is, so the motor of the simulator is
 asked. The killed program leaves word of each move before it orders it.
 """
 
@@ -22,7 +22,7 @@ from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
 from motorbus.link.serial import SerialLink
 from motorbus.session.robot import Robot
-from tests.motion.machines import described
+from tests.support.machines import described
 
 PROGRAM = """
 import os, signal, sys

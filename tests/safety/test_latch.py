@@ -21,8 +21,8 @@ import pytest
 from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
 from motorbus.core.operation import CanFrame, Data, Effect, Exchange, Goal
 from motorbus.errors import MotorbusError
-from tests.motion.machines import listened, machine
 from tests.safety.points import asks, sent
+from tests.support.machines import listened, machine
 
 ROOT = Path(__file__).parents[2]
 
@@ -198,7 +198,7 @@ def test_06_without_a_thread_to_be_had_every_bus_is_stopped(monkeypatch: pytest.
 PROGRAM = """
 import signal, sys
 from motorbus import Interrupted, Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 real = {"arm": {"clock": "real"}, "can": {"clock": "real"}}
 with machine(arm="1-2", can="0x25", options=real) as (made, sims), Robot.of(made) as robot:

@@ -13,7 +13,7 @@ from motorbus.families.stepper.table import Project
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.families.stepper.runs import TURN, made
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 BACK = replace(TURN, direction=1)
 

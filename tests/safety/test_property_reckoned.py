@@ -15,7 +15,7 @@ import pytest
 
 from motorbus.errors import MotorbusError
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 PULSES = 1600
 """Of a turn: 200 full steps in 8 microsteps."""

@@ -11,7 +11,7 @@ import pytest
 from motorbus.errors import RequestError, Stalled
 from motorbus.motion.moving.stream import SETTLE
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 BLOCKED = (2000, 2048 + 240)
 """Counts: 21.1 degrees up."""

@@ -21,7 +21,7 @@ from motorbus.link.base import Delivery, Side
 from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
 from motorbus.motion.safety.track import Sample
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import Heard, listened, machine, said
+from tests.support.machines import Heard, listened, machine, said
 
 
 class Promise(Enum):

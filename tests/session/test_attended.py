@@ -17,7 +17,7 @@ from motorbus.errors import Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 REAL = {"arm": {"clock": "real"}, "can": {"clock": "real"}, "stage": {"clock": "real"}}
 

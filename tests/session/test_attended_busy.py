@@ -10,7 +10,7 @@ from motorbus.errors import Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.lease import Standing
 from tests.conftest import Figures, Rounds
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 LASTS = 0.2
 ARM = "1-6"

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from motorbus.cli.simulated import Simulated
-from tests.motion.machines import described
 from tests.session.test_robot_signals_ports import LOOKS, status
+from tests.support.machines import described
 
 PROGRAM = """
 import sys, threading

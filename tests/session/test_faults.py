@@ -16,7 +16,7 @@ from motorbus.motion.machine import Machine
 from motorbus.motion.safety import canary
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 CHANGE = {"node": 2, "new": 3}
 

@@ -12,7 +12,7 @@ from motorbus.families.feetech import FAMILY
 from motorbus.motion.machine import Machine
 from motorbus.session.plan import Plan, estop_options, loaded
 from tests.motion.machine.files import GOOD, UNOPENABLE, Broken, axis
-from tests.motion.machines import described, machine
+from tests.support.machines import described, machine
 
 
 def made_of(arm: str, can: str) -> Machine:

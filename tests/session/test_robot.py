@@ -14,7 +14,7 @@ import motorbus
 from motorbus import AsyncRobot, NoReply, PortNotFound, RequestError, Robot
 from motorbus.core.operation import INTENT, Journal, Progress
 from motorbus.motion.machine import Machine
-from tests.motion.machines import Cut, machine
+from tests.support.machines import Cut, machine
 
 
 def broken(made: Machine, bus: str, address: str) -> Machine:

@@ -13,7 +13,7 @@ from motorbus.core.operation import Pause
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety.lease import Lease
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 EXITS = {
     "a1": {"exit": "torque_off"},

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from motorbus.cli.simulated import Simulated
-from tests.motion.machines import described
+from tests.support.machines import described
 
 PROGRAM = """
 import sys

@@ -18,7 +18,7 @@ from motorbus.motion import capabilities
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.session.sentry import AGAIN, Sentry
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 REAL = {"arm": {"clock": "real"}, "can": {"clock": "real"}}
 

@@ -9,7 +9,7 @@ import pytest
 
 from motorbus import AsyncRobot, Interrupted, Robot
 from motorbus.session.stopping import estop, reset
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 def test_every_bus_is_stopped_and_tells_what_came_of_it() -> None:

@@ -21,7 +21,7 @@ from motorbus.simulation.faulted import Faulted
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import Mount
-from tests.simulation.served import asked, served
+from tests.support.mounts import asked, served
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.served import LinkClient
 from tests.simulation.links import QueueLink
-from tests.simulation.served import PATIENCE, asked, received, served
+from tests.support.mounts import PATIENCE, asked, received, served
 
 PING, PONG = "FF FF 01 02 01 FB", "FF FF 01 02 00 FC"
 

@@ -20,7 +20,7 @@ from motorbus.link.pty import PtyMaster
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import HASTE, Mount
-from tests.simulation.served import asked, received, served
+from tests.support.mounts import asked, received, served
 
 PING_1 = "FF FF 01 02 01 FB"
 PONG_1 = "FF FF 01 02 00 FC"

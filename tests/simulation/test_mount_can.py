@@ -23,7 +23,7 @@ from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
 from tests.simulation.parrots import Parrots
-from tests.simulation.served import PATIENCE, served
+from tests.support.mounts import PATIENCE, served
 
 ASK, ANSWER = b"t60120102\r", b"t68120102\r"
 

@@ -25,7 +25,7 @@ from tests.families.feetech.driver_script import (
     watch,
     writes,
 )
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 def off(id: int, error: int = 0) -> Line:

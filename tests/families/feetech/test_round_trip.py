@@ -18,10 +18,9 @@ from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, CONTROL, TABLES
 from motorbus.families.feetech.table import MODELS as NUMBERS
-from tests.conformance.world import samples
 from tests.families.feetech.maps import MODELS
 from tests.families.feetech.quirk_bus import Bench, bench
-from tests.simulators.feetech.host import (
+from tests.support.hosts.feetech import (
     ACTION,
     ALL,
     READ,
@@ -31,6 +30,7 @@ from tests.simulators.feetech.host import (
     Host,
     packet,
 )
+from tests.support.world import samples
 
 ID = 1
 POWERLESS = "goal_torque", 0

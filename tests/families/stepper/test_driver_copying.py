@@ -17,7 +17,7 @@ from motorbus.families.stepper.program.backups import Backup
 from motorbus.families.stepper.table import Project
 from tests.families.stepper.bench import Bench, bench
 from tests.families.stepper.written import KINDS, LONGER, PICK, cut_at, named, stored
-from tests.protocol.stepper.program.projects import projects
+from tests.support.stepper_projects import projects
 
 kinds = pytest.mark.parametrize("kind", KINDS, ids=named)
 ALIKE = replace(LONGER, stop_mode=1)

@@ -14,9 +14,9 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, Side
 from tests.conftest import Figures, Rounds
-from tests.families.stepper.fault_rig import MOTIONS, FalseWord, Rig
-from tests.families.stepper.mischief import BYTE, Mischief
-from tests.families.stepper.test_single_faults import ask
+from tests.faults.test_stepper_single_faults import ask
+from tests.support.lines import BYTE, Mischief
+from tests.support.rigs.stepper import MOTIONS, FalseWord, Rig
 
 OFF, FULL, SIX, LATE = "off", "full", "six", "late"
 

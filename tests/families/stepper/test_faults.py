@@ -10,8 +10,8 @@ import pytest
 from motorbus.errors import OutcomeUnknown
 from motorbus.families.stepper.table import ORDERS
 from tests.conftest import Rounds
-from tests.families.stepper.fault_rig import KEPT, MOTIONS, FalseWord, Rig
-from tests.families.stepper.mischief import EVERYTHING, NOTICES, REPLIES, REQUESTS, Mischief
+from tests.support.lines import EVERYTHING, NOTICES, REPLIES, REQUESTS, Mischief
+from tests.support.rigs.stepper import KEPT, MOTIONS, FalseWord, Rig
 
 
 class Ledger:

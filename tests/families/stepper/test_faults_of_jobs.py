@@ -16,8 +16,8 @@ from motorbus.families.stepper.driver.waiting import Outcome, Ran
 from motorbus.families.stepper.program import Program
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
 from tests.conftest import Figures, Rounds
-from tests.families.stepper.fault_rig import UNMOVED, FalseWord, Rig
-from tests.families.stepper.mischief import NOTICES, REPLIES, REQUESTS, Mischief
+from tests.support.lines import NOTICES, REPLIES, REQUESTS, Mischief
+from tests.support.rigs.stepper import UNMOVED, FalseWord, Rig
 
 FAULTS = (*REQUESTS, *(kind for kind in REPLIES if not kind.startswith("notice")), *NOTICES)
 """All but notices out of nothing: one at a moment at which it may be true is undistinguishable from a true one."""

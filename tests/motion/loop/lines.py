@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.link.base import Delivery, Side
-from tests.motion.machines import Heard
+from tests.support.machines import Heard
 
 
 class Doubtful(Heard):

@@ -13,7 +13,7 @@ from motorbus.errors import LimitExceeded, LinkError
 from motorbus.motion.loop.faces import Loop
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.motion.machines import Cut, Heard, machine
+from tests.support.machines import Cut, Heard, machine
 
 QUICK = radians(90)
 

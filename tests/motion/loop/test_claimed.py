@@ -10,7 +10,7 @@ import pytest
 from motorbus.errors import Interrupted
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 TOLD = ["stop", "disable_torque", "hold", "estop"]
 NAMES = ["a1", "c1"]

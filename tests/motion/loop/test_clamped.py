@@ -15,7 +15,7 @@ from motorbus.motion.clamping import Clamped
 from motorbus.motion.loop.faces import Loop
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.loop.test_rounds import RATE, cycles
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 HIGH = radians(150)
 STEP = radians(90) / RATE

@@ -13,7 +13,7 @@ from motorbus.motion.body import Body
 from motorbus.motion.loop.faces import AsyncLoop, Errand, Loop, LoopFace, looped
 from motorbus.motion.loop.readings import LoopState
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import Heard, machine
+from tests.support.machines import Heard, machine
 
 
 def lead(loop: Any, state: LoopState) -> None:

@@ -14,7 +14,7 @@ from motorbus.motion.loop.place import CATCH_UP, Place
 from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 PERIOD = 0.01
 STEP = radians(90) * PERIOD

@@ -15,7 +15,7 @@ from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState
 from motorbus.session.robot import Robot
-from tests.motion.machines import Heard, machine
+from tests.support.machines import Heard, machine
 
 RATE = 100.0
 

@@ -18,7 +18,7 @@ from motorbus.motion.loop.readings import PATIENCE
 from motorbus.session.robot import Robot
 from tests.motion.loop.lines import Doubtful
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 SLOW = 20.0
 """Hz: a bus leaves a device that it doubts alone for a while, which at this rate is four cycles and not eleven."""

@@ -11,8 +11,8 @@ from motorbus.motion.safety.canary import HEALTH
 from motorbus.motion.safety.watch import OVERDUE
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.motion.machines import Heard, machine
 from tests.safety.test_canary import Drops
+from tests.support.machines import Heard, machine
 
 BOTH = pytest.mark.parametrize("ahead", [False, True])
 

@@ -22,7 +22,7 @@ from motorbus.motion.profile.shapes import trapezoid
 from motorbus.motion.trajectory import Interpolation, Trajectory, Waypoint, interpolated
 from motorbus.motion.trajectory.limits import SLACK
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 LIMIT = radians(360)
 SPEED = radians(90)

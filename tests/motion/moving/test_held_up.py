@@ -12,7 +12,7 @@ from motorbus.link.base import Delivery, Side
 from motorbus.motion.moving.stream import HELD_UP
 from motorbus.session.robot import Robot
 from tests.motion.loop.lines import Doubtful
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 @pytest.mark.parametrize("axis", ["a1", "c1"])

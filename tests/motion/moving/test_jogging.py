@@ -13,7 +13,7 @@ from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.clamping import Clamped
 from motorbus.motion.moving.jogging import way_of_jog
 from motorbus.session.robot import Robot
-from tests.motion.machines import listened, machine, said
+from tests.support.machines import listened, machine, said
 
 HIGH = radians(50)
 

@@ -12,7 +12,7 @@ from motorbus.core.operation import Progress
 from motorbus.errors import Interrupted, LinkLost, NoReply, RequestError, Stalled
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 GOALS = {"a1": 1.0, "a2": -1.0, "c1": 0.6}
 

@@ -14,7 +14,7 @@ from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from motorbus.motion.moving.stream import SETTLE, Fate, Grid, grains, rate_for
 from motorbus.session.robot import AsyncRobot, Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 
 def train(robot: Robot, bus: str) -> Any:

@@ -16,7 +16,7 @@ from motorbus.motion.profile import Limiting, Limits, Move, synchronised
 from motorbus.motion.trajectory import Trajectory, Waypoint, interpolated
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 POSES = """
 [pose.ready]

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from motorbus.core.family import Explanation
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.explain import explain
-from tests.families.feetech.vectors import INVALID, REPLIES, REQUESTS, VALID, name_of
-from tests.families.vectors import Vector
 from tests.protocol.feetech.test_wire_stream import STREAMS
+from tests.support.vectors.common import Vector
+from tests.support.vectors.feetech import INVALID, REPLIES, REQUESTS, VALID, name_of
 
 
 def told(text: str) -> list[Explanation]:

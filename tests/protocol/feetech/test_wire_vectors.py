@@ -10,7 +10,8 @@ import pytest
 from motorbus.core.operation import Noise, Reply
 from motorbus.errors import ChecksumError, RequestError
 from motorbus.families.feetech import wire
-from tests.families.feetech.vectors import (
+from tests.support.vectors.common import Vector
+from tests.support.vectors.feetech import (
     ALL,
     INVALID,
     MANUAL,
@@ -19,7 +20,6 @@ from tests.families.feetech.vectors import (
     VALID,
     name_of,
 )
-from tests.families.vectors import Vector
 
 # Each of these ends where the packet begins; the last three look like packets that would swallow it.
 BEFORE = [

@@ -11,8 +11,8 @@ from motorbus.core.operation import CanFrame
 from motorbus.families.kst import wire
 from motorbus.families.kst.explain import explain
 from motorbus.families.kst.table import PROFILES
-from tests.families.kst.vectors import ALL, INVALID, MANUAL, VALID, Vector, name_of
 from tests.protocol.kst.test_wire import FRAMES
+from tests.support.vectors.kst import ALL, INVALID, MANUAL, VALID, Vector, name_of
 
 KNOWN = st.sampled_from([vector.frame for vector in ALL])
 

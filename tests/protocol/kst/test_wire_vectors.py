@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.core.operation import CanFrame, Noise, Notice, Reply
 from motorbus.families.kst import wire
-from tests.families.kst.vectors import (
+from tests.support.vectors.kst import (
     ALL,
     INVALID,
     MANUAL,

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from motorbus.core.family import Explanation
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.explain import explain
-from tests.families.stepper.vectors import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
-from tests.families.vectors import Vector
+from tests.support.vectors.common import Vector
+from tests.support.vectors.stepper import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
 
 KNOWN = st.sampled_from([vector.data for vector in ALL])
 

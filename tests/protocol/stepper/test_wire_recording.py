@@ -16,7 +16,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.explain import explain
 from motorbus.families.stepper.wire import bulk
 from motorbus.families.stepper.wire.recording import CAPTURES, Recording, code_of
-from tests.conformance.subjects import vectors
+from tests.support.subjects import vectors
 
 START, STOP = wire.encode("start_project", project=1), wire.encode("stop_project")
 JOG, STEP = wire.encode("jog_forward"), wire.encode("set_step_delay", delay=1000, step=1)

@@ -9,7 +9,8 @@ import pytest
 
 from motorbus.core.operation import Noise, Notice, Reply
 from motorbus.families.stepper import wire
-from tests.families.stepper.vectors import (
+from tests.support.vectors.common import Vector
+from tests.support.vectors.stepper import (
     ALL,
     DUMP_A,
     DUMP_B,
@@ -21,7 +22,6 @@ from tests.families.stepper.vectors import (
     VALID,
     name_of,
 )
-from tests.families.vectors import Vector
 
 PAIRS = [
     (request, reply)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.families.feetech.simulator.servo import Servo
-from tests.simulators.feetech.host import (
+from tests.support.hosts.feetech import (
     ALL,
     CALIBRATE,
     PING,

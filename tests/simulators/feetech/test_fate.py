@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from tests.simulators.feetech.host import Host, word
+from tests.support.hosts.feetech import Host, word
 
 
 def burdened(*torques: float) -> Host:

@@ -7,7 +7,8 @@ import pytest
 from motorbus.families.feetech.simulator.instructions import OBEY
 from motorbus.families.feetech.table import TABLES
 from motorbus.families.feetech.wire import Instruction
-from tests.simulators.feetech.host import (
+from tests.simulators.feetech.test_maps import LOCK, USUAL, host_of
+from tests.support.hosts.feetech import (
     ACTION,
     ALL,
     PING,
@@ -19,7 +20,6 @@ from tests.simulators.feetech.host import (
     Host,
     packet,
 )
-from tests.simulators.feetech.test_maps import LOCK, USUAL, host_of
 
 ACK = ["FF FF 01 02 00 FC"]
 SCS = {"scs", "scs2"}

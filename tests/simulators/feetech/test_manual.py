@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.simulators.feetech.host import (
+from tests.support.hosts.feetech import (
     Host,
 )
 

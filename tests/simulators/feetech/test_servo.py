@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from tests.simulators.feetech.host import (
+from tests.support.hosts.feetech import (
     ACTION,
     BOOTLOADER,
     CALIBRATE,

@@ -8,8 +8,7 @@ from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator import Change, simulate
 from motorbus.link.memory import MemoryLink
-from tests.families.stepper.vectors import DUMP_A
-from tests.simulators.stepper.host import (
+from tests.support.hosts.stepper import (
     DONE,
     FORWARD,
     READ,
@@ -21,6 +20,7 @@ from tests.simulators.stepper.host import (
     step,
     written,
 )
+from tests.support.vectors.stepper import DUMP_A
 
 
 def test_a_reply_begins_after_the_turnaround() -> None:

@@ -9,9 +9,7 @@ import pytest
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper.table import TABLE, Project, Step, with_steps
-from tests.families.stepper.vectors import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
-from tests.families.vectors import Vector
-from tests.simulators.stepper.host import (
+from tests.support.hosts.stepper import (
     CLEAR,
     DONE,
     FORWARD,
@@ -27,6 +25,8 @@ from tests.simulators.stepper.host import (
     step,
     written,
 )
+from tests.support.vectors.common import Vector
+from tests.support.vectors.stepper import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
 
 EXAMPLES = [
     (request, reply)

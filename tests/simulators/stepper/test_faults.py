@@ -8,8 +8,7 @@ from motorbus.core.operation import Noise, Reply
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.simulator import Switches
-from tests.families.stepper.vectors import DUMP_A
-from tests.simulators.stepper.host import (
+from tests.support.hosts.stepper import (
     DONE,
     HOME,
     SAVE,
@@ -22,6 +21,7 @@ from tests.simulators.stepper.host import (
     step,
     written,
 )
+from tests.support.vectors.stepper import DUMP_A
 
 EDIT = step(1, distance=77)[0]
 EDITED = "FF AA 03 03 00 01"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import RequestError
-from tests.simulators.stepper.host import (
+from tests.support.hosts.stepper import (
     CLEAR,
     DONE,
     FORWARD,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.simulators.stepper.host import (
+from tests.support.hosts.stepper import (
     FORWARD,
     HOME,
     REVERSE,

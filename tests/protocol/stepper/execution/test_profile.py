@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour, Ramp, motion, still
 from motorbus.families.stepper.table import Project, Step
-from tests.families.stepper.vectors import behaviour
 from tests.protocol.stepper.execution import exact
+from tests.support.vectors.stepper import behaviour
 
 VECTORS = behaviour("motion")
 RAMPS = ("time", "pulse")

@@ -24,8 +24,8 @@ from motorbus.families.feetech.driver.exchanges import (
 from motorbus.families.feetech.driver.holding import COUNT, _order, ask, resting
 from motorbus.families.feetech.driver.line import stop
 from motorbus.families.feetech.driver.sharing import _twice
-from tests.faults.rig import FEEDBACK, IDS, Rig, ping
-from tests.faults.single import Overheard
+from tests.support.rigs.feetech import FEEDBACK, IDS, Rig, ping
+from tests.support.single_faults import Overheard
 
 GOAL_TIME = 44  # on HLS the goal torque; a word of RAM that moves nothing while a servo is limp
 GROUP = (1, 2, 3)

@@ -26,7 +26,7 @@ from motorbus.families.stepper.table import BLANK, EDITS, ORDERS, PARAMETERS, de
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.families.stepper.mischief import Mischief
+from tests.support.lines import Mischief
 
 PORTS = (1, 2, 3, 4, 5)
 ACTIVE = (2, 5)

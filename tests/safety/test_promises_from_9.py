@@ -1,4 +1,4 @@
-"""The points from 9 on that a machine with motors should be able to rely on; those before are in `test_points`."""
+"""The points from 9 on that a machine with motors should be able to rely on; those before are in `test_promises`."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from motorbus.families.feetech import action_all, reg_write_all, sync_write_posi
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
-from tests.families.feetech.cuts import Cut, World
-from tests.motion.machines import Heard, listened, machine
 from tests.safety.points import asks, known, sent
+from tests.support.cuts import Cut, World
+from tests.support.machines import Heard, listened, machine
 
 
 def test_09_a_change_of_settings_is_all_or_nothing_and_the_lock_is_closed_again() -> None:

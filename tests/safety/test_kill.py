@@ -26,7 +26,7 @@ from motorbus.bus.air import Air
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import CanFrame, Data
 from motorbus.session.robot import Robot
-from tests.motion.machines import described
+from tests.support.machines import described
 
 PROGRAM = """
 import json, os, signal, sys

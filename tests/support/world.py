@@ -20,7 +20,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from tests.conformance.subjects import possible, tables_of, vectors
+from tests.support.subjects import possible, tables_of, vectors
 
 IDS = (1, 2, 3)
 """The devices of a world, where a line holds so many; a world knows its `ids`."""

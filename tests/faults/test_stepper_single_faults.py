@@ -18,8 +18,8 @@ from motorbus.families.stepper.table import EDITS, ORDERS
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.simulation.faults import Fault, FaultyLine
 from tests.conftest import Figures
-from tests.families.stepper.fault_rig import KEPT, MOTIONS, STOPS, FalseWord, Rig
-from tests.families.stepper.mischief import BYTE
+from tests.support.lines import BYTE
+from tests.support.rigs.stepper import KEPT, MOTIONS, STOPS, FalseWord, Rig
 
 EDGES = (0x00, 0x01, 0x02, 0x03, 0x08, 0x0D, 0x3E, 0x5E, 0x80, 0xAA, 0xDD, 0xEE, 0xFF)
 """Values that mean something somewhere in a reply."""

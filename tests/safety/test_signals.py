@@ -15,7 +15,7 @@ PROGRAM = """
 import sys
 import motorbus
 from motorbus import Robot
-from tests.motion.machines import machine
+from tests.support.machines import machine
 
 real = {"arm": {"clock": "real"}, "can": {"clock": "real"}, "stage": {"clock": "real"}}
 with machine(arm="1-3", can="0x25", lift=True, exit="torque_off", options=real,

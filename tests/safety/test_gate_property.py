@@ -12,10 +12,10 @@ from itertools import count
 import pytest
 
 from motorbus.session.robot import Robot
-from tests.motion.machines import machine
 from tests.safety.calls import AXES, Tally, drawn
 from tests.safety.courses import POSES
 from tests.safety.matters import Matters
+from tests.support.machines import machine
 
 CALLS = 2_000
 """Of one seed; after so many a new machine is opened."""

@@ -19,9 +19,9 @@ from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.standstill import Rest, stopped
 from motorbus.session.robot import Robot
-from tests.motion.machines import listened, machine, said
 from tests.safety.points import asks, known, sent
 from tests.safety.test_estop import is_stop, queued
+from tests.support.machines import listened, machine, said
 
 
 def test_01_nothing_moves_on_connect(rounds: Callable[[int], int]) -> None:
