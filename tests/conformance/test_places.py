@@ -18,10 +18,8 @@ NODE = IDS[0]
 def test_the_bus_keeps_what_told_a_position_and_how_to_read_it(leader: Family, one: str) -> None:
     with world(leader) as found:
         told = _told(found, one)
-        with (
-            found.bus.turns.lock
-        ):  # whoever looks has the lock: what was read the straight way is told only then
-            exchange, answer = found.bus.turns.known.seen[NODE]
+        with found.bus.lock:
+            exchange, answer = found.bus.positions[NODE]
         assert callable(exchange.tells_position)
         place = exchange.tells_position(answer)[NODE]
         assert place == pytest.approx(told)

@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.trace import TraceRecord
 from motorbus.core.family import Family, Found
 from motorbus.core.operation import Effect, Exchange, Operation, Progress, Runnable, Together
 from motorbus.errors import NoReply
 from tests.support.subjects import possible
-from tests.support.world import IDS, Cut, Steps, World, has, said, sent, world
+from tests.support.world import IDS, Cut, Steps, TraceRecord, World, has, said, sent, world
 
 NODE = IDS[0]
 LOOKS = ("ping", "identify", "read", "telemetry", "position")

@@ -8,14 +8,24 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.pump import Bus
-from motorbus.bus.stop import StopOutcome
 from motorbus.core.family import Family
 from motorbus.core.operation import Effect, Exchange
 from motorbus.errors import Interrupted, MotionError, NoReply
 from tests.conformance.test_guarded import Interrupting, guarded
 from tests.support.subjects import possible
-from tests.support.world import IDS, World, closed, kept, locks, said, sent, switch_on, world
+from tests.support.world import (
+    IDS,
+    StopOutcome,
+    World,
+    closed,
+    kept,
+    locks,
+    make_bus,
+    said,
+    sent,
+    switch_on,
+    world,
+)
 
 NODE = IDS[0]
 WAY = 0.6  # rad; some servos turn 44° to either side and no more
@@ -78,7 +88,7 @@ def test_without_a_gate(mover: Family) -> None:
     with world(mover) as there:
         met(there)
         under_way(there)
-        bus = Bus(there.link, mover)
+        bus = make_bus(there.link, mover, gate=False)
         for node in IDS:
             assert mover.devices.blocking(bus, node).ping() is True
         assert_at_rest(there, bus.estop())

@@ -22,8 +22,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Mapping
 from contextlib import suppress
-from heapq import heappush
-from math import inf
 from random import Random
 from typing import Any, ClassVar, Final
 
@@ -31,17 +29,14 @@ from hypothesis import note
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from hypothesis.strategies import integers, sampled_from
 
-from motorbus.bus.pump import Bus
-from motorbus.bus.turns import RETRIES
 from motorbus.core.family import Family, Simulator
 from motorbus.core.operation import Data, Exchange
 from motorbus.errors import MotorbusError
-from motorbus.link.base import Side
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
-from motorbus.simulation.faults import FaultyLine, World, parse
+from motorbus.simulation.faults import FaultyLine, World
 from motorbus.simulation.history import History
 from tests.support.oracle import FalseWord, Oracle, Outcome, Window
+from tests.support.world import RETRIES, is_idle, make_bus, receiver_of
 
 BUFFER: Final = 4096
 LOTS: Final = 1 << 16
@@ -58,28 +53,12 @@ Verb = Callable[[Random], Window]
 
 
 class Line(FaultyLine):
-    """One whose script goes on being written."""
-
-    def add(self, text: str) -> None:
-        """So much more."""
-        for fault in parse(text):
-            self._check(fault)
-            self.faults += (fault,)
-            self._waiting.setdefault(fault.exchange or 0, []).append((len(self.faults) - 1, fault))
-
-    @property
-    def calm(self) -> bool:
-        """Nothing of what has passed is still to come."""
-        return not any(way.front or way.behind for way in self._ways.values())
+    """A line whose script grows."""
 
     @property
     def due(self) -> bool:
         """A fault may still happen; one whose byte did not come never will."""
-        return any(exchange > self.exchange for exchange in self._waiting if self._waiting[exchange])
-
-    def clear_until(self) -> float:
-        """When the last of what it has delayed arrives (s)."""
-        return max(way.floor for way in self._ways.values())
+        return any((fault.exchange or 0) > self.exchange for fault in self.pending)
 
 
 class Heeded(MemoryLink):
@@ -126,9 +105,9 @@ class Rig:
         self.world = World(self.history)
         self.line = Line((), self.world, most=1000)
         self.link = Heeded(self.world, rate=rate, line=self.line, **how)
-        self.bus = Bus(self.link, family.configured(), admit=Gate(), report=lambda event: None)
+        self.bus = make_bus(self.link, family.configured(), report=lambda event: None)
         self.family = self.bus.family
-        self.oracle = Oracle(self.link, self.history, lambda: self.world._ahead)
+        self.oracle = Oracle(self.link, self.history, lambda: self.world.ahead)
         self.verbs: dict[str, Verb] = {}
         self.calls: Counter[str] = Counter()
         self.untouched = 0
@@ -207,7 +186,7 @@ class Rig:
         exchange = self.line.exchange + random.randrange(1, 4)
         for one in self.faults[name].format(**place).split(";"):
             for part in one.split("|"):
-                self.line.add(f"exchange {exchange} {part}")
+                self.line.extend(f"exchange {exchange} {part}")
             exchange += 1
         if "copied" in name:
             self.quarantine = 3
@@ -215,14 +194,14 @@ class Rig:
     def rest(self) -> None:
         """Let everything that is late arrive; then the second call at most is right."""
         for _ in range(8):
-            if self.line.due or not self.line.calm:
+            if self.line.due or self.line.holds_back:
                 self.spend()
         self.settle()
         self.spend()
         window = self.probe()
         if window.error is not None:
             raise FalseWord("the second call after the last fault failed") from window.error
-        if not self.bus.turns.idle:
+        if not is_idle(self.bus):
             raise FalseWord("the bus is not idle")
         self.quarantine = 0
 
@@ -244,8 +223,7 @@ class Rig:
 
     def intrude(self, later: float, data: Data) -> None:
         """Somebody else says this, so much later (s)."""
-        self.link._serial += 1
-        heappush(self.link._under_way, (self.link.now() + later, self.link._serial, Side.HOST, data))
+        self.link.inject(data, later)
         self.strangers += 1
 
     def stir(self, random: Random) -> None:
@@ -259,7 +237,7 @@ class Rig:
     def settle(self) -> None:
         """Let time pass until nothing is under way."""
         self.link.advance(
-            max(0.0, min(self.line.clear_until(), self.link.now() + 10.0) - self.link.now()) + 2.0
+            max(0.0, min(self.line.last_arrival, self.link.now() + 10.0) - self.link.now()) + 2.0
         )
 
     def spend(self) -> None:
@@ -276,12 +254,10 @@ class Rig:
     def troubled(self) -> bool:
         """Something that was struck is still under way, or something is away."""
         return bool(
-            self.link._under_way
-            or self.link._arrived
-            or self.link._gone_at < inf
-            or not self.line.calm
-            or self.line.clear_until() > self.link.now()
-            or self.world._events
+            not self.link.quiet
+            or self.line.holds_back
+            or self.line.last_arrival > self.link.now()
+            or self.world.scheduled
         )
 
     @property
@@ -290,13 +266,12 @@ class Rig:
         return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
 
     def sound(self) -> None:
-        """Nobody holds the bus, and what the receiver keeps is little."""
-        turns = self.bus.turns
-        if turns.lock._is_owned():  # type: ignore[attr-defined]  # of a lock that can be taken again
-            raise FalseWord("the lock of the bus is still held")
-        if not turns.idle:
-            raise FalseWord("something still waits for the bus, or holds it, and nobody has called")
-        if (held := kept(turns.receiver)) > BUFFER:
+        """No caller holds the bus, and the receiver keeps few bytes."""
+        if not is_idle(self.bus):
+            raise FalseWord(
+                "a request still waits for the bus, or holds it or its lock, and no call is running"
+            )
+        if (held := kept(receiver_of(self.bus))) > BUFFER:
             raise FalseWord(f"the receiver keeps {held} bytes")
 
     def told(self) -> str:

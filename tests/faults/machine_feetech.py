@@ -13,6 +13,7 @@ from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.table import TABLES
 from tests.faults.machine import Rig, machine
 from tests.support.oracle import FalseWord, Window
+from tests.support.world import exclude_echo
 
 IDS = (1, 2, 3)
 TABLE = TABLES["sts"]
@@ -65,7 +66,7 @@ class FeetechRig(Rig):
 
     def __init__(self) -> None:
         super().__init__(FAMILY, FAMILY.simulator(IDS), 1_000_000, pace=True)
-        self.bus.turns.echo.excluded()
+        exclude_echo(self.bus)
         self.servos = {node: Servo(self.bus, node) for node in IDS}
         for servo in self.servos.values():
             servo.prepare()

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Hashable
 from contextlib import suppress
-from math import inf
 from random import Random
 from types import MappingProxyType
 from typing import Any, Final
@@ -97,7 +96,7 @@ class StepperRig(Rig):
         self.obey, self.there.obey = self.there.obey, self.note
         self.there.put(SWEEP.number, SWEEP)
         test = FAMILY.echo_test()
-        self.bus.turns.expect_echo(test)
+        self.bus.expect_echo(test)
         with suppress(MotorbusError):
             self.bus.run(test)
         self.fresh = 1000
@@ -126,8 +125,7 @@ class StepperRig(Rig):
     @property
     def troubled(self) -> bool:
         """Or it has still to answer: the copy of a request waits until it has dealt with the first one."""
-        owes = self.simulator._waiting or self.simulator._line.due() < inf
-        return super().troubled or bool(owes)
+        return super().troubled or bool(self.simulator.owes)
 
     def slowest(self) -> Exchange[Any]:
         return dump_once(Controller(self.bus), 1)
@@ -152,7 +150,7 @@ class StepperRig(Rig):
         other = wire.encode("set_output", port=port % 3 + 1, level=0)
         self.intrude(random.uniform(0.021, 0.04), random.choice([wire.NOTICE, wire.encode_reply(other)]))
         if not self.line.due and not self.quarantine:
-            self.line.add(f"exchange {self.line.exchange + 1} to device: drop")
+            self.line.extend(f"exchange {self.line.exchange + 1} to device: drop")
         window = self.switched(port)
         self.link.advance(0.05)  # later it might be the very answer that is due then
         return window

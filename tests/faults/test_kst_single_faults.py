@@ -9,13 +9,13 @@ from contextlib import suppress
 
 import pytest
 
-from motorbus.bus.trust import EQUAL_RUN
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Side
 from tests.conftest import Figures, Rounds
 from tests.faults.frames import LATE, FrameFault, FrameLine, every_fault
 from tests.support.catalogue.kst import KINDS, NODE, Kind, KstRig, read_segments
 from tests.support.single_faults import suffer
+from tests.support.world import EQUAL_RUN
 
 LEFT_ALONE = 0.002
 """s after which a servo that was asked twice has said all that it has to say."""

@@ -73,7 +73,7 @@ def test_a_walk_among_faults_where_a_line_takes_no_time() -> None:
 def test_a_controller_that_has_still_to_answer_has_not_been_left_alone() -> None:
     """It deals with the copy of a request behind the first one, and what it says then comes in the next call."""
     rig = StepperRig()
-    rig.line.add(f"exchange {rig.line.exchange + 1} to device: duplicate")
+    rig.line.extend(f"exchange {rig.line.exchange + 1} to device: duplicate")
     rig.call("set an output", 1)
     assert rig.troubled
     rig.rest()
@@ -85,7 +85,7 @@ def test_two_devices_with_one_id_take_nothing_from_the_others(family: str) -> No
     """What the two say together is nobody's word; every other device is as right as before, among their answers."""
     rig = RIGS[family]()
     doubled, random = min(rig.history.nodes), Random(7)
-    rig.line.add(f"exchange {rig.line.exchange + 1}: duplicate-id {doubled}")
+    rig.line.extend(f"exchange {rig.line.exchange + 1}: duplicate-id {doubled}")
     rig.spend()
     assert rig.line.counts["duplicate-id"] == 1
     others = {node: servo for node, servo in rig.servos.items() if node != doubled}

@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.face import BusFace
-from motorbus.bus.trace import Subscription, TraceRecord
+from tests.support.world import Subscription, TraceRecord
 
 VERBS: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [
     ("ping", (), {}),
@@ -69,7 +68,7 @@ def reached(by: str, folder: Path) -> Iterator[str]:
             yield address
 
 
-def sent(bus: BusFace, watch: Subscription[TraceRecord]) -> list[bytes]:
+def sent(watch: Subscription[TraceRecord]) -> list[bytes]:
     assert watch.dropped == 0
     return [
         bytes(record.data) for record in watch if record.direction == "tx" and isinstance(record.data, bytes)
@@ -81,7 +80,7 @@ def blocking(address: str) -> tuple[list[object], list[bytes]]:
         watch = bus.trace.subscribe()
         servo = motorbus.feetech.Servo(bus, 2)
         values = [told(verb, getattr(servo, verb)(*args, **named)) for verb, args, named in VERBS]
-        return values, sent(bus, watch)
+        return values, sent(watch)
 
 
 def awaiting(address: str) -> tuple[list[object], list[bytes]]:
@@ -90,7 +89,7 @@ def awaiting(address: str) -> tuple[list[object], list[bytes]]:
             watch = bus.trace.subscribe()
             servo = motorbus.feetech.AsyncServo(bus, 2)
             values = [told(verb, await getattr(servo, verb)(*args, **named)) for verb, args, named in VERBS]
-            return values, sent(bus, watch)
+            return values, sent(watch)
 
     return asyncio.run(main())
 

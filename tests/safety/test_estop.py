@@ -14,9 +14,6 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.crank import crank
-from motorbus.bus.pump import Bus
-from motorbus.bus.ticket import Flight
 from motorbus.core.goal import Goal
 from motorbus.core.operation import CanFrame, Data, Effect, Exchange
 from motorbus.errors import MotorbusError
@@ -25,6 +22,7 @@ from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.kst.driver.feedback import position_exchange
 from motorbus.families.stepper import wire as stepper
 from motorbus.link.memory import NoisyLine
+from tests.support.world import Bus, Pending, is_queued, queue, turn
 
 QUEUED = 10_000
 NODES = {"feetech": (1, 2, 3), "kst": (0x25, 0x26), "stepper": (1,)}
@@ -40,7 +38,7 @@ AGAIN = 0.052
 
 
 @contextmanager
-def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Flight]]]:
+def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Pending]]]:
     """A bus whose devices are known, with thousands of questions and orders in its queue, and one on the wire."""
     ids = "+".join(map(str, NODES[family]))
     with motorbus.simulate(family, ids=ids) as sim:
@@ -51,7 +49,7 @@ def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Flight]]]:
             sim.line = NoisyLine(seed, corrupt=0.2, loss=0.05, delay=0.0002)
             orders = queued(bus, NODES[family])
             for _ in range(seed):
-                crank(bus.link, bus.turns, bus.link.now() + 0.0007)
+                turn(bus, 0.0007)
             yield bus, orders
 
 
@@ -78,15 +76,14 @@ def order(bus: Bus, node: int) -> Exchange[Any]:
     return Exchange(request, (), lane=node, effect=Effect.MOTION, goals=(goal,))
 
 
-def queued(bus: Any, nodes: tuple[int, ...]) -> list[Flight]:
+def queued(bus: Any, nodes: tuple[int, ...]) -> list[Pending]:
     """Have thousands wait, of which every third would move something; those are given."""
     orders = []
     for number in range(QUEUED):
         node = nodes[number % len(nodes)]
         moves = number % 3 == 2
-        flight = Flight(order(bus, node) if moves else question(bus, node))
-        orders += [flight] if moves else []
-        bus.turns.submit(flight, bus.link.now())
+        pending = queue(bus, order(bus, node) if moves else question(bus, node))
+        orders += [pending] if moves else []
     return orders
 
 
@@ -115,8 +112,8 @@ def test_the_first_byte_of_a_stop_leaves_in_time_whatever_waits(family: str, see
         sent = [(one.at, one.data) for one in records if one.direction == "tx"]
         assert all(is_stop(family, data) for _, data in sent), "nothing else leaves any more"
         assert sent[0][0] - asked <= MOST[family]
-        assert bus.turns.latched
-        assert not bus.turns.waiting
+        assert bus.latched
+        assert not is_queued(bus)
         assert outcome.rounds <= 5
         assert [one for one in orders if not one.done] == []
         assert sum(isinstance(one.error, MotorbusError) for one in orders) > QUEUED / 4, "they were not sent"

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import Alone, Data, Journal
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.feetech import FAMILY
@@ -20,7 +19,7 @@ from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Course, Job,
 from motorbus.families.feetech.simulator import FeetechBus, Servo, simulate
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from tests.support.world import Bus, make_bus
 
 OLD, NEW, STRANGER = 3, 7, 9
 """Ids: of the servo that changes, what it shall become, and of another one that nobody may touch."""
@@ -76,7 +75,7 @@ class Doomed(MemoryLink):
         """Half of a packet reaches the devices before anything else happens."""
         if data:
             super().write(data)
-            self._happen_until(self.now())
+            self.advance(0.0)
 
     def _watch(self) -> None:
         self.commits.update(commit.moment for commit in self.world.servo.memory.commits)
@@ -169,7 +168,7 @@ class World:
                 link._alive()
             self.journal(event)
 
-        bus = Bus(link, FAMILY, admit=Gate(), journal=record)
+        bus = make_bus(link, FAMILY, journal=record)
         try:
             return operation(bus)
         except MotorbusError as error:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import Fault, FaultyLine
+from tests.support.world import Bus
 
 SPLIT = 0.0003
 """s between two pieces of what is one packet all the same."""

@@ -1,7 +1,7 @@
-"""A simulated bus with everything around it, and operations carried out one step at a time.
+"""A simulated bus with gate and simulator, and operations run one step at a time.
 
-All parts are the real ones: bus, gate, memory link, simulator. What a test does to them (an interruption, another
-frame than the one sent) it does at their joints.
+This file alone knows the engine (`motorbus.bus`). Every other helper and every test of the net takes a bus from
+`make_bus`, and what no public property of a bus offers from the functions below it.
 """
 
 from __future__ import annotations
@@ -11,16 +11,116 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol, cast
 
+from motorbus.bus import verdict
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.crank import crank
+from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
+from motorbus.bus.stop import StopOutcome
+from motorbus.bus.ticket import Flight
+from motorbus.bus.trace import Subscription, TraceRecord
+from motorbus.bus.turns import Turns
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
 from motorbus.core.operation import Alone, Data, Effect, Exchange, Notice, Operation, Runnable, Step, Together
 from motorbus.errors import RequestError
-from motorbus.link.base import Line
+from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from tests.support.subjects import possible, tables_of, vectors
+
+__all__ = ["AsyncBus", "Bus", "StopOutcome", "Subscription", "TraceRecord"]
+
+RETRIES = 2
+"""How often a bus repeats a request that may be repeated."""
+EQUAL_RUN = 128
+"""Equal replies in a row of a node on CAN after which a bus sends a probe: they could all be one old reply."""
+BIT_TIMES = 33
+"""Exchanges after which a CAN bus knows that its link takes bit time."""
+
+Notify = Callable[[object], None]
+AnyBus = BusFace
+
+
+def make_bus(
+    link: Link,
+    family: Family,
+    *,
+    gate: bool = True,
+    report: Notify | None = None,
+    journal: Notify | None = None,
+) -> Bus:
+    """A blocking bus around a link that the test has made, with a gate that admits motion unless `gate` is off."""
+    return Bus(link, family, admit=Gate() if gate else None, report=report, journal=journal)
+
+
+def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) -> AsyncBus:
+    """An async bus around a link that the test has made."""
+    return AsyncBus(link, family, admit=Gate(), report=report)
+
+
+def exclude_echo(bus: AnyBus) -> None:
+    """Tell the bus that its line has no echo, as the echo test of `motorbus.open` finds out."""
+    bus.turns.echo.excluded()
+
+
+def is_idle(bus: AnyBus) -> bool:
+    """Nothing is queued or awaited, and no caller holds the bus or its lock."""
+    owned: bool = cast("Any", bus.turns.lock)._is_owned()
+    return bus.turns.idle and not owned
+
+
+def is_queued(bus: AnyBus) -> bool:
+    """Requests wait to be sent."""
+    return bus.turns.waiting
+
+
+def receiver_of(bus: AnyBus) -> object:
+    """The receiver of the family that cuts the incoming bytes into frames."""
+    return bus.turns.receiver
+
+
+class Pending(Protocol):
+    """A request that was queued."""
+
+    @property
+    def done(self) -> bool: ...
+    @property
+    def error(self) -> BaseException | None: ...
+
+
+def queue(bus: AnyBus, exchange: Exchange[Any]) -> Pending:
+    """Queue a request without waiting for its reply."""
+    flight = Flight(exchange)
+    bus.turns.submit(flight, bus.link.now())
+    return flight
+
+
+def turn(bus: AnyBus, seconds: float) -> None:
+    """Send what may be sent, and receive for at most so long."""
+    crank(bus.link, bus.turns, bus.link.now() + seconds)
+
+
+class Tries:
+    """The first try of each request, without a link: it is sent, these data arrive, and then silence."""
+
+    SOON = 0.001
+    """s from the request to its reply."""
+
+    def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
+        self.turns = Turns(family, rate=rate)
+        if not echo:
+            self.turns.echo.excluded()
+
+    def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
+        """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
+        flight = Flight(exchange)
+        if self.turns.short(flight, 0.0) is not None:
+            self.turns.feed(data, self.SOON)
+            self.turns.expire(flight.deadline)
+        value = flight.value if flight.done and flight.error is None else None
+        return value, verdict.fault(flight)
+
 
 IDS = (1, 2, 3)
 """The devices of a world, where a line holds so many; a world knows its `ids`."""
@@ -49,11 +149,11 @@ class World:
         self.simulator = family.simulator(self.ids)
         self.link = link(self.simulator, rate=rate or family.link.rate, line=line)
         self.events: list[object] = []
-        self.bus = Bus(self.link, family, admit=Gate(), report=self.events.append)
+        self.bus = make_bus(self.link, family, report=self.events.append)
 
     def async_bus(self) -> AsyncBus:
         """A second face on the same link; use one of the two at a time."""
-        return AsyncBus(self.link, self.family, admit=Gate(), report=self.events.append)
+        return make_async_bus(self.link, self.family, report=self.events.append)
 
     def device(self, node: int) -> Any:
         """The verbs of one device."""

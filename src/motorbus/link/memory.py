@@ -155,6 +155,18 @@ class MemoryLink:
             self._happen_until(end)
             self._now = end
 
+    @property
+    def quiet(self) -> bool:
+        """Nothing is under way, nothing waits to be read, and the adapter is there and stays."""
+        return not (self._under_way or self._arrived) and self._gone_at == inf
+
+    def inject(self, data: Data, seconds: float = 0.0) -> None:
+        """Deliver data of a foreign sender to the host so many seconds later."""
+        with self._changed:
+            self._serial += 1
+            heappush(self._under_way, (self.now() + seconds, self._serial, Side.HOST, data))
+            self._changed.notify_all()
+
     # -- the course of events -------------------------------------------------------------------------------
 
     def _read_virtual(self, until: float) -> list[Data]:

@@ -11,12 +11,12 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import CanFrame, Due, Exchange
 from motorbus.families.kst import FAMILY, wire
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Frame, SdoCase, SdoRequest
 from tests.interop.differential.streams import AS_RECORDED
+from tests.support.world import make_bus
 
 NODE: Final = 0x25
 Step = tuple[Frame, ...]
@@ -27,8 +27,8 @@ TEXT: Final = b"KST-X12 firmware 4.07"
 @cache
 def recorded() -> tuple[SdoCase, ...]:
     """Reads and writes of a simulated servo, objects it lacks among them, and transfers in segments."""
-    bus = Bus(MemoryLink(FAMILY.simulator((NODE,)), rate=500_000), FAMILY.configured())
-    trace = bus.turns.trace.subscribe()
+    bus = make_bus(MemoryLink(FAMILY.simulator((NODE,)), rate=500_000), FAMILY.configured(), gate=False)
+    trace = bus.trace.subscribe()
     reads = [SdoRequest("upload", NODE, index, subindex) for index, subindex in OBJECTS]
     writes = [
         SdoRequest("download", NODE, index, 0, data) for index, data in ((0x6003, b"\x64\0"), (0x7FFF, b"\1"))

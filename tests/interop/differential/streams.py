@@ -11,13 +11,13 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import Due, Exchange
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import MODELS
 from motorbus.families.feetech.table import CONTROL, TABLES
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Case, Request
+from tests.support.world import exclude_echo, make_bus
 
 IDS: Final = (1, 2, 3)
 AS_RECORDED: Final = "as recorded"
@@ -31,9 +31,11 @@ def recorded() -> tuple[Case, ...]:
 
 def _session(name: str) -> Iterator[Case]:
     model = next(model for model in sorted(MODELS) if MODELS[model].table.name == name)
-    bus = Bus(MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY)
-    bus.turns.echo.excluded()
-    trace = bus.turns.trace.subscribe()
+    bus = make_bus(
+        MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY, gate=False
+    )
+    exclude_echo(bus)
+    trace = bus.trace.subscribe()
     for request in _requests(name):
         exchange: Exchange[object] = Exchange(
             request.packet(), tuple(Due(node, node, length) for node, length in request.due())

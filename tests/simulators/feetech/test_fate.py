@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from math import inf
-
 import pytest
 
-from tests.support.hosts.feetech import Host, word
+from tests.support.hosts.feetech import Host
 
 
 def burdened(*torques: float) -> Host:
@@ -36,14 +34,6 @@ def test_what_follows_from_it_follows_at_once() -> None:
     servo.torque = 0.9
     host.wait(2.0 + 0.7 * 3400 / 25_400)
     assert servo.motion.velocity(host.now) == pytest.approx(-0.7 * 3400)
-
-
-def test_nothing_is_expected_where_nothing_can_happen() -> None:
-    host = burdened(0.0, 0.0)
-    host.write(1, 42, *word(3000))
-    assert host.bus._fate.soon == inf
-    host.bus.nodes[2].torque = 0.9
-    assert host.bus._fate.soon == pytest.approx(host.now + 2.0)
 
 
 def test_a_moment_that_was_put_off_does_no_harm() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Operation, Timeout
+from motorbus.core.operation import Answer, Due, Exchange, Operation, Reply, Timeout
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -21,9 +21,9 @@ from motorbus.families.feetech.driver.exchanges import (
     verified,
     write_block,
 )
-from motorbus.families.feetech.driver.holding import COUNT, _order, ask, resting
+from motorbus.families.feetech.driver.holding import COUNT, ask, holds
 from motorbus.families.feetech.driver.line import stop
-from motorbus.families.feetech.driver.sharing import _twice
+from motorbus.families.feetech.driver.sharing import read_twice
 from tests.support.rigs.feetech import FEEDBACK, IDS, Rig, ping
 from tests.support.single_faults import Overheard
 
@@ -178,7 +178,7 @@ def clear_turns(rig: Rig) -> None:
     _written(rig, exchange, lambda: servo.raw_position, servo.raw_position % 4096)
 
 
-TORQUE = 40
+TORQUE, GOAL = 40, 42
 
 
 def _let_be(rig: Rig) -> None:
@@ -233,16 +233,16 @@ def _image(rig: Rig, raw: int) -> bytes:
 def hold(rig: Rig) -> None:
     """What it is told then: to be where it is. Success means that this is its goal."""
     raw, memory = rig.stir(), rig.servos[1].memory
-    block = resting(1, _image(rig, raw))
-    exchange = _order(1, block)
-    assert block.data == rig.code(raw)
-    _written(rig, exchange, lambda: memory.read(block.address, 2), block.data)
+    told = Reply(1, 1, wire.encode_status(1, 0, _image(rig, raw)))
+    (exchange,) = holds({1: Answer((told,), (), rig.link.now())}, (1,))
+    assert exchange.request == wire.write(1, GOAL, rig.code(raw))
+    _written(rig, exchange, lambda: memory.read(GOAL, 2), rig.code(raw))
 
 
 def listened_twice(rig: Rig) -> None:
     """READ with the line kept open for a second servo of the same id. There is none, and none may be heard."""
     raw, memory = rig.stir(), rig.servos[1].memory
-    told = rig.bus.run(_twice(Servo(rig.bus, 1), PRESENT, FEEDBACK))
+    told = rig.bus.run(read_twice(Servo(rig.bus, 1), PRESENT, FEEDBACK))
     assert told == (rig.code(raw) + memory.read(58, FEEDBACK - 2),)
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from motorbus.bus.pace import SHOWN
-from motorbus.bus.pump import Bus
 from motorbus.core.entry import changed
 from motorbus.core.operation import Answer, Runnable
 from motorbus.errors import DeviceError, MotorbusError, NoReply
@@ -28,7 +26,7 @@ from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.table import BIT_RATES
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from tests.support.world import BIT_TIMES, make_bus
 
 NODES = (0x25, 0x26, 0x27)
 NODE = NODES[0]
@@ -46,10 +44,10 @@ class KstRig:
         self.servos = simulator.nodes
         self.link = self.linked(simulator)
         self.family = FAMILY.configured(profile=profile)
-        self.bus = Bus(self.link, self.family, admit=Gate(), report=lambda event: None)
+        self.bus = make_bus(self.link, self.family, report=lambda event: None)
         self.dialect = Servo(self.bus, NODE).dialect
         self.count = self.here = 0
-        for _ in range(SHOWN + 1):  # by then it shows that this link takes its bit time
+        for _ in range(BIT_TIMES):  # by then it shows that this link takes its bit time
             read_2(self)
 
     def linked(self, simulator: KstBus) -> MemoryLink:

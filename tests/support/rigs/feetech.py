@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from motorbus.bus.pump import Bus
 from motorbus.core.operation import Answer, Data, Due, Exchange
 from motorbus.families.feetech import FAMILY, Servo, wire
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.simulator import FeetechBus
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from tests.support.world import exclude_echo, make_bus
 
 IDS = (1, 2, 3, 4, 5, 6)
 FEEDBACK = 15  # bytes from 56 on
@@ -35,8 +34,8 @@ class Rig:
         assert isinstance(self.simulator, FeetechBus)
         self.servos = self.simulator.nodes
         self.link = MemoryLink(self.simulator, line=self.line, **self.options)
-        self.bus = Bus(self.link, FAMILY, admit=Gate())
-        self.bus.turns.echo.excluded()
+        self.bus = make_bus(self.link, FAMILY)
+        exclude_echo(self.bus)
 
     def put(self, line: Line) -> None:
         """Another line between host and servos."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from random import Random
 
-from motorbus.bus.pump import Bus
 from motorbus.core.can_bits import ERROR_BITS, bits
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import CanFrame, Data, Operation, Together
@@ -19,7 +18,7 @@ from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.wire import encode_abort_reply
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from tests.support.world import make_bus
 
 RATE = 500_000
 BIT = 1 / RATE
@@ -67,7 +66,7 @@ class Rig:
         assert isinstance(simulator, KstBus)
         self.servos = Turning(simulator)
         self.link = MemoryLink(self.servos, rate=RATE, line=line or PerfectLine(), pace=True)
-        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate())
+        self.bus = make_bus(self.link, FAMILY.configured())
         self.devices = {node: Servo(self.bus, node) for node in ids}
         self.good = self.failed = self.wrong = 0
         self.errors: list[MotorbusError] = []

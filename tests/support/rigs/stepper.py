@@ -13,8 +13,6 @@ from contextlib import suppress
 from random import Random
 from typing import Any
 
-from motorbus.bus.pump import Bus
-from motorbus.bus.turns import RETRIES
 from motorbus.core.operation import Exchange, Rank, Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller, wire
@@ -25,8 +23,8 @@ from motorbus.families.stepper.simulator import simulate
 from motorbus.families.stepper.table import BLANK, EDITS, ORDERS, PARAMETERS, decode_image
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
 from tests.support.lines import Mischief
+from tests.support.world import RETRIES, make_bus
 
 PORTS = (1, 2, 3, 4, 5)
 ACTIVE = (2, 5)
@@ -52,7 +50,7 @@ class Rig:
         self.simulator = simulate((1,), **options)
         self.line = line
         self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
-        self.bus = Bus(self.link, FAMILY.configured(), admit=Gate(), report=lambda event: None)
+        self.bus = make_bus(self.link, FAMILY.configured(), report=lambda event: None)
         self.device = Controller(self.bus)
         self.there = self.simulator.nodes[1]
         self.random = Random(seed)
@@ -71,7 +69,7 @@ class Rig:
     def open(self) -> None:
         """Find out about echo, as opening a bus does."""
         test = FAMILY.echo_test()
-        self.bus.turns.expect_echo(test)
+        self.bus.expect_echo(test)
         with suppress(MotorbusError):
             self.bus.run(test)
 

@@ -123,6 +123,23 @@ class FaultyLine:
             fault for index, fault in enumerate(self.faults) if fault.percent and index not in self._lucky
         )
 
+    @property
+    def holds_back(self) -> bool:
+        """Data of an earlier packet wait for the next packet."""
+        return any(way.front or way.behind for way in self._ways.values())
+
+    @property
+    def last_arrival(self) -> float:
+        """When the last data that were delayed arrive (s)."""
+        return max(way.floor for way in self._ways.values())
+
+    def extend(self, script: Script | str | Iterable[Fault]) -> None:
+        """Add faults to the script while it runs."""
+        for fault in as_script(script):
+            self._check(fault)
+            self.faults += (fault,)
+            self._place(len(self.faults) - 1, fault, twin=0)
+
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         """What arrives of this, and when."""
         to = Side.HOST

@@ -74,6 +74,16 @@ class World:
         """The devices by their ids."""
         return self.simulator.nodes
 
+    @property
+    def ahead(self) -> float:
+        """How far the clock of the devices is ahead of the host's (s)."""
+        return self._ahead
+
+    @property
+    def scheduled(self) -> bool:
+        """Something is still to happen."""
+        return bool(self._events)
+
     # -- what is to happen --------------------------------------------------------------------------------------------
 
     def check(self, fault: Fault) -> None:

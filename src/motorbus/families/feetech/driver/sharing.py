@@ -91,7 +91,7 @@ def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operat
     silence: MotorbusError | None = None
     for number in range(polls):
         block = BLOCKS[number // 2 % len(BLOCKS)]
-        answers = yield from outcome((_alone if number % 2 == 0 else _twice)(node, *block))
+        answers = yield from outcome((_alone if number % 2 == 0 else read_twice)(node, *block))
         if isinstance(answers, NoReply):
             silence = silence or answers  # the first one says what may be the cause, too
         if block[0] == 0 and not first and not isinstance(answers, MotorbusError):
@@ -147,7 +147,7 @@ def _alone(node: Node, address: int, count: int) -> Exchange[tuple[bytes, ...]]:
     return read_block(node, address, count, lambda data: (data,), timeout=Timeout.SCAN)
 
 
-def _twice(node: Node, address: int, count: int) -> Operation[tuple[bytes, ...]]:
+def read_twice(node: Node, address: int, count: int) -> Operation[tuple[bytes, ...]]:
     """The same with the line kept open as long as a second answer could take."""
     due = Due(node.node, node.node, wire.OVERHEAD + count)
 

@@ -111,6 +111,11 @@ class StepperBus:
         moment = inf if self._began is None else self._next()
         return None if moment == inf else moment
 
+    @property
+    def owes(self) -> bool:
+        """A request waits to be carried out, or a reply to be sent."""
+        return self._waiting > 0 or self._line.due() < inf
+
     obeys_at_once = False
 
     def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
