@@ -16,6 +16,7 @@ import pytest
 from hypothesis import settings
 
 from motorbus.link import adapters
+from tests.net import NET, ROOT
 
 HERE = Path(__file__).parent
 USUAL_ROUNDS = 10_000
@@ -53,6 +54,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     wanted = {"soak": _is_soak, "quick": _is_quick, "test": _is_usual}[_profile(config)]
     for item in items:
+        if any(item.path.is_relative_to(ROOT / path) for path in NET):
+            item.add_marker("net")
         if "rounds" in getattr(item, "fixturenames", ()) and _profile(config) == "soak":
             item.add_marker("soak")
     config.hook.pytest_deselected(items=[item for item in items if not wanted(item)])

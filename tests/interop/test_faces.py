@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import groupby
@@ -15,6 +12,7 @@ from typing import Any
 import pytest
 
 import motorbus
+from motorbus.cli.simulated import Simulated
 from tests.support.world import Subscription, TraceRecord
 
 VERBS: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [
@@ -31,6 +29,8 @@ VERBS: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [
     ("telemetry", (), {}),
     ("position", (), {}),
 ]
+LATENCY = 1.0
+"""s that the process of the simulator may wait for a processor."""
 SETTLED = {"position", "telemetry"}  # depend on how far it has come meanwhile; compared in kind
 
 
@@ -39,33 +39,15 @@ def told(verb: str, value: Any) -> object:
 
 
 @contextmanager
-def served(*where: str) -> Iterator[str]:
-    """A simulated bus in a process of its own; gives the address from its ready line."""
-    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--ids", "1-3", *where]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        try:
-            yield line.split()[1]
-        finally:
-            process.terminate()
-    assert process.returncode == 0
-
-
-@contextmanager
 def reached(by: str, folder: Path) -> Iterator[str]:
-    """The address of six fresh servos at the end of this kind of link."""
+    """The address of three new servos behind this kind of link."""
     if by == "memory":
         with motorbus.simulate("feetech", ids="1-3") as simulated:
             yield simulated.url
-    elif by == "tcp":
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        with served("--tcp", f"127.0.0.1:{port}") as address:
-            yield address
     else:
-        with served("--link", str(folder / "arm")) as address:
-            yield address
+        where: dict[str, Any] = {"tcp": "0"} if by == "tcp" else {"link": folder / "arm"}
+        with Simulated("feetech", ids="1-3", **where) as served:
+            yield served.bus
 
 
 def sent(watch: Subscription[TraceRecord]) -> list[bytes]:
@@ -77,6 +59,7 @@ def sent(watch: Subscription[TraceRecord]) -> list[bytes]:
 
 def blocking(address: str) -> tuple[list[object], list[bytes]]:
     with motorbus.open(address) as bus:
+        bus.latency = LATENCY
         watch = bus.trace.subscribe()
         servo = motorbus.feetech.Servo(bus, 2)
         values = [told(verb, getattr(servo, verb)(*args, **named)) for verb, args, named in VERBS]
@@ -86,6 +69,7 @@ def blocking(address: str) -> tuple[list[object], list[bytes]]:
 def awaiting(address: str) -> tuple[list[object], list[bytes]]:
     async def main() -> tuple[list[object], list[bytes]]:
         async with motorbus.open_async(address) as bus:
+            bus.latency = LATENCY
             watch = bus.trace.subscribe()
             servo = motorbus.feetech.AsyncServo(bus, 2)
             values = [told(verb, await getattr(servo, verb)(*args, **named)) for verb, args, named in VERBS]
@@ -106,7 +90,6 @@ def test_the_same_verbs_say_and_send_the_same(
     by: str,
     face: Any,
     tmp_path: Path,
-    unhurried: None,
     monkeypatch: pytest.MonkeyPatch,
     reference: tuple[list[object], list[bytes]],
 ) -> None:
