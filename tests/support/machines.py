@@ -6,7 +6,7 @@
 
 The axes of the bus `arm` are a1, a2 …, those of the bus `can` are c1, c2 …, and the one of the bus `stage` is `lift`,
 in m. They form the groups `all`, `upper` (those of arm) and `led` (those of arm and can). Everything stands at 0, but
-the lift, of which nobody knows where it is.
+the lift, which is not homed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LINEAR = {"max_velocity": "20 mm/s", "max_acceleration": "100 mm/s2"}
 
 
 class Heard(PerfectLine):
-    """A wire that does nothing but carry, and keeps what the host sent: `sims["arm"].line = Heard()`."""
+    """A line without faults that keeps what the host sent: `sims["arm"].line = Heard()`."""
 
     def __init__(self) -> None:
         self.sent: list[Data] = []

@@ -72,7 +72,7 @@ def outcome(error: MotorbusError) -> Outcome:
 
 
 class FalseWord(AssertionError):
-    """Something was told that is not so."""
+    """A value or a success was false."""
 
 
 class Window:

@@ -1,7 +1,7 @@
 """Which families are judged here, with which simulated devices, and where their vectors lie.
 
 Every family that discovery finds, and the template, which is out of tree and is loaded from its folder as its own
-pyproject says, without being installed. So whoever installs a family beside motorbus has it judged as well. A family
+pyproject says, without being installed. So a family that is installed beside motorbus is tested as well. A family
 that has several register maps and a simulated device of each (subjects.toml says which) is a subject once
 for each of them: what is true of one map only is not true of the family.
 """
@@ -67,7 +67,7 @@ class Line(NamedTuple):
 
     `devices`   how many a line can hold; 0: as many as there are ids
     `probes`    how many probes there are whose replies differ
-    `checksum`  whether a damaged reply can be told by itself; where not, its exchange judges what it is told
+    `checksum`  whether a damaged reply can be recognised by itself; where not, its exchange checks the reply
     `writes`    whether its devices are written by name
     """
 

@@ -152,11 +152,11 @@ class World:
         self.bus = make_bus(self.link, family, report=self.events.append)
 
     def async_bus(self) -> AsyncBus:
-        """A second face on the same link; use one of the two at a time."""
+        """An async bus on the same link; use only one of the two at a time."""
         return make_async_bus(self.link, self.family, report=self.events.append)
 
     def device(self, node: int) -> Any:
-        """The verbs of one device."""
+        """The device object of one id."""
         return self.family.devices.blocking(self.bus, node)
 
     def memory(self, node: int) -> Memory:
@@ -164,11 +164,11 @@ class World:
         return cast("Memory", cast("Any", self.simulator.nodes[node]).memory)
 
     def table(self, node: int) -> Table:
-        """The table the device says it has."""
+        """The register table of the device."""
         return self.family.tables[self.bus.run(self.family.identify(node)).table]
 
     def settings(self) -> dict[int, dict[str, int]]:
-        """Everything that a host could have changed, of all devices."""
+        """All writable rows of all devices."""
         tables = tables_of(self.family)
         return {
             node: {
@@ -178,7 +178,7 @@ class World:
         }
 
     def _held(self, node: int, name: str) -> list[int]:
-        """What it holds in this row; [] where it has another table of its family, without such a row."""
+        """The value of this row; [] where the table of the device has no such row."""
         try:
             return [self.memory(node)[name]]
         except (KeyError, RequestError):
@@ -187,7 +187,7 @@ class World:
             return []
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the bus."""
         self.bus.close()
 
 
@@ -207,7 +207,7 @@ def world(family: Family, **options: Any) -> Iterator[World]:
 
 @contextmanager
 def sent(bus: Bus) -> Iterator[list[Data]]:
-    """Fills with what leaves meanwhile."""
+    """Collect the data that the bus sends inside the block."""
     frames: list[Data] = []
     subscription = bus.trace.subscribe(limit=1_000_000)
     try:
@@ -218,27 +218,27 @@ def sent(bus: Bus) -> Iterator[list[Data]]:
 
 
 def said(device: Any, verb: str, *arguments: object, **named: object) -> Runnable[Any]:
-    """The operation behind a verb of a device, not yet begun."""
+    """The operation of a verb of a device, not started."""
     return cast("Runnable[Any]", getattr(type(device), verb).function(device, *arguments, **named))
 
 
 def has(family: Family, verb: str) -> bool:
-    """Whether the devices of this family have this verb."""
+    """Devices of this family have this verb."""
     return hasattr(family.devices.blocking, verb)
 
 
 def moves(family: Family) -> bool:
-    """Whether the devices of this family can be moved."""
+    """Devices of this family can be moved."""
     return has(family, "move")
 
 
 def has_torque_switch(family: Family) -> bool:
-    """Whether devices that move can be let go; some hold whenever they have power."""
+    """Whether the torque of devices that move can be switched off; some hold whenever they have power."""
     return moves(family) and has(family, "enable_torque")
 
 
 def abilities(family: Family) -> Mapping[str, Callable[..., Any]]:
-    """What a simulated device of this family offers a machine, by the model that it says it is."""
+    """The axis functions that the family offers for the model of its simulated device."""
     return _abilities(cast("Any", family))
 
 
@@ -250,18 +250,18 @@ def _abilities(family: Any) -> Mapping[str, Callable[..., Any]]:
 
 
 def leads(family: Family) -> bool:
-    """Whether devices of this family can be led in a loop."""
+    """Whether a control loop can drive devices of this family."""
     return "train" in abilities(family)
 
 
 def switch_on(device: Any) -> None:
-    """Make it ready to move, where that is a thing of its own."""
+    """Switch torque on where the device has a switch for it."""
     if hasattr(device, "enable_torque"):
         device.enable_torque()
 
 
 def reports(family: Family) -> list[Notice]:
-    """What devices of this family are known to say on their own account."""
+    """The notices that devices of this family send without a request."""
     told = [vector.data for vector in vectors(family.name) if vector.direction == "status"]
     events = [event for data in told for event in family.receiver().feed(data)]
     return [event for event in events if isinstance(event, Notice)]
@@ -280,7 +280,7 @@ def closed(lock: Entry) -> int:
 
 
 def plain(table: Table) -> list[Entry]:
-    """Rows whose writing does nothing but keep a value, which can be read, for as long as there is power."""
+    """Rows that can be read and written in RAM without any effect."""
     rows = [row for row in table.values() if row.writable and row.readable and not row.protected]
     return [row for row in rows if row.effect is Effect.NONE]
 
@@ -311,11 +311,11 @@ def samples(row: Entry) -> list[int]:
 
 
 class Cut(BaseException):
-    """An interruption that no code of ours has heard of."""
+    """An interruption of a type that the product does not know."""
 
 
 class Steps:
-    """Carries out an operation step by step, each by the bus, and can cut it at any step.
+    """Runs an operation step by step on the bus, and can cut it at any step.
 
     `cut_at` counts steps from 0; `before` cuts in place of the step, else when it has been carried out and its
     result is lost. `exchanges` are all that were carried out, `seen` is called after each step.
