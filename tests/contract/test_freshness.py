@@ -51,7 +51,7 @@ class Oracle:
         """Turn all servos."""
         return [self.change(which) for which in range(len(self.nodes))]
 
-    def judge(self, expected: Sequence[float], values: Sequence[float]) -> None:
+    def judge(self, expected: Sequence[float], values: Sequence[Any]) -> None:
         """Compare to half a count."""
         for (sim, node), place, value in zip(self.nodes, expected, values, strict=True):
             assert abs(place - value) < ANGLE[sim.family.name] / 2, (sim.url, node, place, value, self.calls)
@@ -64,7 +64,13 @@ class Oracle:
             return
         sim, _ = self.nodes[which]
         assert isinstance(value, float)
-        assert abs(expected - value) < ANGLE[sim.family.name] / 2, (sim.url, which, expected, value, self.calls)
+        assert abs(expected - value) < ANGLE[sim.family.name] / 2, (
+            sim.url,
+            which,
+            expected,
+            value,
+            self.calls,
+        )
         self.right += 1
 
     def check(self, *sims: Any) -> None:

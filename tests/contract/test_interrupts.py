@@ -27,8 +27,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Simulator]:
 
 def bombarded(job: str, amount: float, place: object) -> dict[str, Any]:
     """What the child says at its end; see tests/contract/bombarded.py."""
-    child = python("-m", "tests.contract.bombarded", job, str(amount), str(place))
-    output, errors = child.communicate(timeout=LIMIT + 2 * amount)
+    with python("-m", "tests.contract.bombarded", job, str(amount), str(place)) as child:
+        output, errors = child.communicate(timeout=LIMIT + 3 * amount)
     assert child.returncode == 0, errors
     found: dict[str, Any] = json.loads(output)
     return found
@@ -46,7 +46,9 @@ def test_reads_of_one_bus(running: Simulator, rounds: Rounds) -> None:
     check(bombarded("read", rounds(60, 1), running.address))
 
 
-@pytest.mark.xfail(strict=True, reason="issue 25: a signal is raised when the exchange has ended, not within it")
+@pytest.mark.xfail(
+    strict=True, reason="issue 25: a signal is raised when the exchange has ended, not within it"
+)
 def test_a_request_that_was_sent_is_answered_when_the_interrupt_is_raised(
     running: Simulator, rounds: Rounds
 ) -> None:
@@ -83,7 +85,7 @@ def test_reads_and_moves_on_two_buses(running: Simulator, tmp_path: Path, rounds
     with simulator(tmp_path / "can", "kst", "--ids", "0x21") as can:
         file = tmp_path / "motorbus.toml"
         file.write_text(MACHINE.format(arm=running.address, can=can.address))
-        check(bombarded("machine", rounds(60, 2), file))
+        check(bombarded("machine", rounds(60, 1), file))
 
 
 def check_one_servo(running: Simulator, *ids: int) -> None:

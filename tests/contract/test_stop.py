@@ -133,7 +133,7 @@ def test_from_another_process(running: Simulator) -> None:
         other = threading.Thread(target=lambda: outcome.append(shell("estop", running.address)))
         busy.until_stopped(other.start)
         other.join(LIMIT)
-        (code, document), = outcome
+        ((code, document),) = outcome
         assert code == 0, document
         check_stopped(bus, busy.servos)
 

@@ -7,7 +7,8 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -17,12 +18,19 @@ from motorbus import LinkLost, NoReply
 ROOT: Final = Path(__file__).parents[2]
 LIMIT: Final = 60.0
 """s after which a child counts as hung."""
-TRIES: Final = 2_000
-"""Calls that `until_back` makes; each one on a lost port looks for it."""
 
 
-def python(*arguments: str) -> subprocess.Popen[str]:
-    """Start `python ARGUMENTS` in a session of its own; it can import `motorbus` and `tests`."""
+@contextmanager
+def python(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Run `python ARGUMENTS` in a child that can import `motorbus` and `tests`; it is killed at the end."""
+    with _started(arguments) as child:
+        try:
+            yield child
+        finally:
+            child.kill()
+
+
+def _started(arguments: Sequence[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, *arguments],
         cwd=ROOT,
@@ -37,22 +45,20 @@ def python(*arguments: str) -> subprocess.Popen[str]:
 
 def motorbus(*arguments: str) -> tuple[int, dict[str, Any]]:
     """Run `motorbus ARGUMENTS --json`; return its exit code and its document."""
-    child = python("-m", "motorbus.cli", *arguments, "--json")
-    output, errors = child.communicate(timeout=LIMIT)
+    with python("-m", "motorbus.cli", *arguments, "--json") as child:
+        output, errors = child.communicate(timeout=LIMIT)
     assert output, errors
     return child.returncode, json.loads(output)
 
 
 class Simulator:
-    """`motorbus simulate` in a child. `address` is the bus for motorbus.open, `port` the path of its pseudo-terminal."""
+    """`motorbus simulate` in a child. `address` is for motorbus.open, `port` the path of its pseudo-terminal."""
 
     def __init__(self, port: Path, family: str, *arguments: str) -> None:
         self.port = port
         self.control = port.with_name(port.name + ".control")
-        self._child = python(
-            "-m", "motorbus.cli", "simulate", family, "--link", str(port), "--control", str(self.control),
-            "--quiet", "--json", *arguments,
-        )  # fmt: skip
+        flags = ("--link", str(port), "--control", str(self.control), "--quiet", "--json")
+        self._child = _started(("-m", "motorbus.cli", "simulate", family, *flags, *arguments))
         assert self._child.stdout is not None
         ready = self._child.stdout.readline()
         assert ready, self._child.communicate()[1]
@@ -91,12 +97,11 @@ def simulator(port: Path, family: str, *arguments: str) -> Iterator[Simulator]:
 
 
 def until_back(read: Callable[[], Any]) -> Any:
-    """Call until the port is back and the device answers."""
-    for _ in range(TRIES):
+    """Call until the port is back and the device answers; each call on a lost port looks for it."""
+    end = time.monotonic() + LIMIT
+    while time.monotonic() < end:
         try:
             return read()
-        except LinkLost:
+        except (LinkLost, NoReply):
             os.sched_yield()
-        except NoReply:
-            continue
     raise AssertionError("the port did not come back")
