@@ -18,8 +18,6 @@ DEAD: Final = 8
 GROUPS: Final = 2
 """Callers that read a group with the dead node in it, which holds the bus up for its time-outs."""
 SERVOS: Final = tuple(node for node in range(1, THREADS + 1) if node != DEAD)
-OPTIONS: Final = ",latency=0.1"
-"""A busy machine may hold a reply back for so long (s)."""
 
 
 def test_16_threads_on_a_blocking_bus(tmp_path: Path, rounds: Rounds) -> None:
@@ -50,7 +48,7 @@ def test_16_threads_on_a_blocking_bus(tmp_path: Path, rounds: Rounds) -> None:
     ids = ",".join(map(str, SERVOS))
     with (
         simulator(tmp_path / "bus", "feetech", "--ids", ids) as simulated,
-        motorbus.open(simulated.address + OPTIONS) as bus,
+        motorbus.open(simulated.address) as bus,
         ThreadPoolExecutor(THREADS) as pool,
     ):
         dead = pool.submit(caller_of_the_dead, bus)
@@ -124,4 +122,4 @@ def test_64_tasks_on_a_real_port(tmp_path: Path, rounds: Rounds) -> None:
 
     ids = ",".join(map(str, SERVOS))
     with simulator(tmp_path / "bus", "feetech", "--ids", ids) as simulated:
-        asyncio.run(main(simulated.address + OPTIONS))
+        asyncio.run(main(simulated.address))

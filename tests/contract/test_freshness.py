@@ -99,11 +99,31 @@ def test_blocking_reads_of_one_bus(family: str, faults: str, rounds: Rounds) -> 
         servos = [SERVO[family](bus, node) for node in IDS[family]]
         sim.faults = faults
         oracle = Oracle(sim)
-        for index in range(rounds(200_000, 3_000)):
+        for index in range(rounds(200_000, 2_500)):
             which = index // 50 % len(servos)
             expected = oracle.change(which)
             oracle.judge_one(which, expected, attempt(servos[which].position))
         oracle.check(sim)
+
+
+def test_an_echo_that_comes_and_goes() -> None:
+    """Found at open it costs no request; where it changes later it costs a few failed reads and no wrong value."""
+    with (
+        motorbus.simulate("feetech", ids=IDS["feetech"], faults="100%: echo") as sim,
+        motorbus.open(sim.url) as bus,
+    ):
+        servo, oracle = feetech.Servo(bus, 1), Oracle(sim)
+        servo.position()
+        assert bus.echoes
+        trace = bus.trace.subscribe(1_000)
+        for script in ("100%: echo", "", "100%: echo", ""):
+            sim.faults = script
+            for _ in range(50):
+                expected = oracle.change(0)
+                oracle.judge_one(0, expected, attempt(servo.position))
+                requests = sum(record.direction == "tx" for record in trace)
+                assert requests == 1 or oracle.calls > 50
+        assert oracle.failed < 10
 
 
 @pytest.mark.parametrize("faults", [LATE, f"{LATE}; 1%: drop"])
@@ -144,7 +164,7 @@ def test_tasks_on_one_bus(family: str, faults: str, rounds: Rounds) -> None:
                 servos = [ASYNC_SERVO[family](bus, node) for node in IDS[family]]
                 await asyncio.gather(*(servo.position() for servo in servos))
                 sim.faults = faults
-                oracle, count = Oracle(sim), rounds(200_000, 2_100) // len(servos)
+                oracle, count = Oracle(sim), rounds(200_000, 1_500) // len(servos)
                 await asyncio.gather(
                     *(reader(oracle, which, servo, count) for which, servo in enumerate(servos))
                 )
@@ -176,7 +196,7 @@ def test_a_robot_on_three_buses(tmp_path: Path, rounds: Rounds) -> None:
         for sim, (_, seed) in zip(sims, BUSES, strict=True):
             sim.faults = LOST.replace("seed 7", seed)
         oracle = Oracle(*sims)
-        for _ in range(rounds(100_000, 250)):
+        for _ in range(rounds(100_000, 200)):
             expected = oracle.change_all()
             values = attempt(robot.positions)
             if not isinstance(values, motorbus.MotorbusError):
@@ -192,7 +212,7 @@ def test_an_async_robot_on_three_buses(tmp_path: Path, rounds: Rounds) -> None:
                 for sim, (_, seed) in zip(sims, BUSES, strict=True):
                     sim.faults = LOST.replace("seed 7", seed)
                 oracle = Oracle(*sims)
-                for _ in range(rounds(100_000, 250)):
+                for _ in range(rounds(100_000, 200)):
                     expected = oracle.change_all()
                     try:
                         values = await robot.positions()
@@ -206,8 +226,8 @@ def test_an_async_robot_on_three_buses(tmp_path: Path, rounds: Rounds) -> None:
 
 def test_reads_on_a_real_port(tmp_path: Path, rounds: Rounds) -> None:
     """What was written just now is read back, though replies are later than any time-out."""
-    faults = "seed 5; 3% of packets: delay 0.05-0.2; 2%: drop; 2%: corrupt"
-    right, total = 0, rounds(2_000, 80)
+    faults = "seed 5; 3% of packets: delay 0.15-0.4; 2%: drop; 2%: corrupt"
+    right, total = 0, rounds(2_000, 60)
     with (
         simulator(tmp_path / "bus", "feetech", "--ids", "1", "--faults", faults) as simulated,
         motorbus.open(simulated.address) as bus,

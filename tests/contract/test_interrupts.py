@@ -15,7 +15,7 @@ import pytest
 import motorbus
 from motorbus import feetech
 from tests.conftest import Rounds
-from tests.support.processes import LIMIT, Simulator, python, simulator
+from tests.support.processes import LATENCY, LIMIT, Simulator, python, simulator
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +110,6 @@ def test_changes_of_an_eeprom_register(running: Simulator, rounds: Rounds) -> No
 def test_changes_of_an_id(tmp_path: Path, rounds: Rounds) -> None:
     total = rounds(60, 1)
     with simulator(tmp_path / "bus", "feetech", "--ids", "1") as simulated:
-        found = bombarded("rename", total, simulated.address)
+        found = bombarded("rename", total, simulated.address.replace(LATENCY, ",latency=0.02"))
         assert found == {"right": True, "interrupts": total, "errors": []}
         check_one_servo(simulated, 1, 2)

@@ -15,13 +15,13 @@ import pytest
 
 import motorbus
 from motorbus import feetech, kst, stepper
-from tests.support.processes import LIMIT, Simulator, simulator, until_back
+from tests.conftest import Rounds
+from tests.support.processes import LATENCY, LIMIT, Simulator, simulator, until_back
 
 READ: Final = 2
 PING: Final = 1
 """Instructions of FEETECH packets; byte 4 of each."""
 FAMILIES: Final[dict[str, tuple[str, Callable[[Any], Any]]]] = {
-    "feetech": ("1", lambda bus: feetech.Servo(bus, 1).position()),
     "kst": ("0x21", lambda bus: kst.Servo(bus, 0x21).position()),
     "stepper": ("1", lambda bus: stepper.Controller(bus).read_input(1)),
 }
@@ -97,7 +97,7 @@ def test_orders_of_before_are_not_sent_afterwards(before: Simulator) -> None:
 
 def test_callers_that_wait_get_an_error_at_once(before: Simulator) -> None:
     """They wait for silent nodes; with their time-outs of a second they would get NoReply."""
-    with motorbus.open(before.address + ",latency=1") as bus:
+    with motorbus.open(before.address.replace(LATENCY, ",latency=1")) as bus:
         errors: list[motorbus.MotorbusError | None] = []
 
         def read(node: int) -> None:
@@ -113,6 +113,68 @@ def test_callers_that_wait_get_an_error_at_once(before: Simulator) -> None:
         for caller in callers:
             caller.join(LIMIT)
         assert [type(error) for error in errors] == [motorbus.LinkLost] * len(callers)
+
+
+def lost(error: BaseException | None) -> bool:
+    """Whether the error, or one behind it, says that the port is gone."""
+    while error is not None:
+        if isinstance(error, motorbus.LinkLost):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+CALLS: Final[dict[str, tuple[str, Any, Callable[[Any], Any]]]] = {
+    "feetech read": ("feetech", feetech.Servo, lambda servo: servo.position()),
+    "feetech move": ("feetech", feetech.Servo, lambda servo: servo.move(3.3, wait=False)),
+    "feetech EEPROM": ("feetech", feetech.Servo, lambda servo: servo.write(max_temperature=61)),
+    "kst read": ("kst", kst.Servo, lambda servo: servo.position()),
+    "kst move": ("kst", kst.Servo, lambda servo: servo.move(0.3, wait=False)),
+    "stepper read": ("stepper", stepper.Controller, lambda controller: controller.read_input(1)),
+    "stepper start": ("stepper", stepper.Controller, lambda controller: controller.start_project(1)),
+}
+"""Family, device class and call."""
+
+
+def pulled(name: str, place: str) -> bool:
+    """Pull the port at this place of the call; False when the call has no such place."""
+    family, device, call = CALLS[name]
+    with motorbus.simulate(family, ids="1") as sim:
+        sim.pace = True
+        with motorbus.open(sim.url) as bus:
+            servo = device(bus, 1)
+            servo.identify()
+            if name == "feetech move":
+                servo.enable_torque()
+            sim.faults = f"exchange {place}: unplug 0.5"
+            error = raised(lambda: call(servo))
+            if not sim.faults.count:
+                assert error is None
+                return False
+            assert error is None or lost(error)
+            assert lost(raised(servo.ping))
+            sim.wait(sim.now + 1.0)
+            trace = bus.trace.subscribe(1_000)
+            for _ in range(3):
+                raised(servo.ping)
+            for record in trace:
+                if isinstance(record.data, bytes) and family == "feetech" and record.direction == "tx":
+                    assert instructions(record.data) <= {READ, PING}
+            assert servo.ping()
+            return True
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_port_that_is_pulled_at_any_byte(name: str, rounds: Rounds) -> None:
+    """In virtual time; bytes of requests and of replies, in each exchange of the call."""
+    most, fired = rounds(10_000, 40), 0
+    for exchange in range(1, 10):
+        for byte in range(250):
+            struck = [pulled(name, f"{exchange} byte {byte} to {side}") for side in ("device", "host")]
+            fired += sum(struck)
+            if not any(struck) or fired > most:
+                break
+    assert fired >= 4
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -7,7 +7,6 @@ chance exceeds once in a thousand. What is confirmed, and what late replies brin
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 
 import pytest
@@ -151,29 +150,6 @@ def test_l3_l4_confirmed_nothing_is_wrong(row: str, what: str, rounds: Rounds, f
     assert sent >= 2 * total
     assert (ledger.wrong, ledger.untouched_again) == (0, 0)
     assert ledger.failed < 0.03 * total, "of so bad a line a few reads get no answer in three tries"
-
-
-@pytest.mark.timeout(7200)
-@pytest.mark.parametrize("family", ["feetech", "kst"])
-def test_l7_late_replies_give_no_stale_value(family: str, rounds: Rounds, figures: Figures) -> None:
-    """1 % late by up to half a second, and all behind it held up; every read has another right answer."""
-    total = rounds(1_000_000)
-    rig: Rig | KstRig = Rig(ids=(1,)) if family == "feetech" else KstRig()
-    ledger = Ledger(rig, "seed 7; 1% of packets to host: delay 0.001-0.5")
-    for _ in range(total):
-        ledger.call(partial(read_word, rig) if isinstance(rig, Rig) else partial(read_position, rig))
-    assert ledger.line.count > total / 200
-    assert (ledger.wrong, ledger.untouched_again) == (0, 0)
-    assert ledger.good > total - 12 * ledger.line.count, (
-        "while the line is held up, a few reads find it silent"
-    )
-    assert rig.bus.statistics.other["late"] > 0
-    figures("L7 late replies", family=family, seed=7, reads=total, stale=ledger.wrong, **ledger.told())
-
-
-def read_position(rig: KstRig) -> None:
-    raw = rig.stir()
-    assert rig.servo.read_raw("present_position") == {"present_position": raw}
 
 
 def test_the_line_between_chance_and_a_fault_is_that_of_poisson() -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from motorbus.core.operation import Data
-from motorbus.errors import MotorbusError, NoReply
+from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import NoisyLine
 from tests.conftest import Rounds
-from tests.support.rigs.feetech import KINDS, Rig, ping, read_word, sync_read, write_byte
+from tests.support.rigs.feetech import KINDS, Rig, read_word, sync_read
 
 
 def try_(exchange: Callable[[Rig], None], rig: Rig) -> bool:
@@ -56,22 +56,6 @@ def test_l7_replies_overtaken_by_more_than_that_are_the_known_limit(rounds: Roun
     assert 0 < stale <= late, "each such reply can be believed once, and never shifts the ones behind it"
 
 
-@pytest.mark.parametrize("by", [0.1, 0.5, 1.0, 2.0, 10.0, 50.0])
-def test_l7_replies_late_by_any_multiple_of_the_timeout(by: float) -> None:
-    timeout = 0.022
-    rig = Rig(NoisyLine(3, late=0.2, late_by=(by * timeout * 0.9, by * timeout * 1.1)))
-    assert isinstance(rig.line, NoisyLine)
-    for _ in range(300):
-        try_(read_word, rig)
-        try_(sync_read, rig)
-        try_(write_byte, rig)
-    assert rig.line.count("late") > 50
-    rig.put(PerfectLine())
-    rig.link.advance(10.0)
-    try_(read_word, rig)
-    read_word(rig)
-
-
 class Doubled:
     """Every so often a reply comes twice, the copy a while behind; and every servo takes its time to answer."""
 
@@ -104,68 +88,6 @@ def test_a_reply_that_comes_twice_is_believed_once(rounds: Rounds) -> None:
     assert good == total
 
 
-@pytest.mark.parametrize("exchange", [ping, read_word, write_byte, sync_read], ids=lambda f: f.__name__)
-def test_l8_an_echo_forges_no_answer(exchange: Callable[[Rig], None]) -> None:
-    """Echo from the start, switched on, switched off, and switched on again."""
-    rig = Rig(NoisyLine(1, echo=True))
-    rig.bus.turns.echo.doubted()
-    assert isinstance(rig.line, NoisyLine)
-    for echo in (True, False, True, False):
-        rig.line.echo = echo
-        for _ in range(50):
-            try_(exchange, rig)
-        exchange(rig)
-    assert rig.line.count("echo") > 50
-
-
-def test_l8_an_echo_found_at_open_costs_nothing() -> None:
-    rig = Rig(NoisyLine(1, echo=True))
-    rig.bus.turns.echo.doubted()
-    test = rig.bus.family.echo_test()
-    assert test is not None
-    rig.bus.turns.expect_echo(test)
-    rig.bus.run(test)
-    assert rig.bus.turns.echo.present is True
-    for _ in range(20):
-        ping(rig)
-        read_word(rig)
-        write_byte(rig)
-        sync_read(rig)
-    assert rig.bus.statistics.of(1).retries == 0
-
-
-def test_l8_a_damaged_echo_forges_nothing_either() -> None:
-    rig = Rig(NoisyLine(5, echo=True, corrupt=0.05, lose_byte=0.05, insert_byte=0.05, split=True))
-    rig.bus.turns.echo.doubted()
-    assert isinstance(rig.line, NoisyLine)
-    for _ in range(500):
-        try_(read_word, rig)
-        try_(write_byte, rig)
-    for fault in ("corrupt", "lose_byte", "insert_byte", "split", "echo"):
-        assert rig.line.count(fault) > 20, fault
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_l10_l11_replies_in_any_pieces_are_the_same_replies(kind: str) -> None:
-    exchange, _ = KINDS[kind]
-    rig = Rig(NoisyLine(9, split=True))
-    assert isinstance(rig.line, NoisyLine)
-    for _ in range(300):
-        exchange(rig)
-    assert rig.line.count("split") > 100
-    assert rig.bus.statistics.of(1).retries == 0
-
-
-def test_l6_delay_within_the_budget_is_no_fault() -> None:
-    """0 false timeouts while lateness stays within the margin."""
-    rig = Rig(NoisyLine(2, delay=0.015))
-    assert isinstance(rig.line, NoisyLine)
-    for _ in range(500):
-        read_word(rig)
-    assert rig.line.count("delay") > 400
-    assert rig.bus.statistics.of(1).retries == 0
-
-
 class Belated(PerfectLine):
     """Hands each answer over so long (s) after its question has left."""
 
@@ -192,14 +114,6 @@ def test_l6_an_answer_at_0_95_of_the_budget_is_no_fault() -> None:
     assert rig.bus.statistics.of(1).retries == 0
 
 
-def test_lost_replies_are_asked_for_again_and_lost_writes_are_not_called_done() -> None:
-    rig = Rig(NoisyLine(4, loss=0.1, toward=None))
-    assert isinstance(rig.line, NoisyLine)
-    good = sum(try_(read_word, rig) + try_(write_byte, rig) for _ in range(500))
-    assert rig.line.count("loss") > 50
-    assert good > 600
-
-
 @pytest.mark.parametrize(
     "fault", ["late", "loss", "duplicate", "corrupt", "lose_byte", "insert_byte", "double_byte"]
 )
@@ -222,15 +136,6 @@ def test_the_second_exchange_after_the_last_fault_is_right_at_its_first_try(faul
         exchange(rig)
         assert sum(ledger.retries for ledger in rig.bus.statistics.nodes.values()) == before
     assert fired >= 60
-
-
-def test_l6_a_call_on_a_dead_line_ends_and_says_so() -> None:
-    rig = Rig(NoisyLine(4, loss=1.0))
-    with pytest.raises(NoReply):
-        read_word(rig)
-    assert rig.link.now() < 0.5
-    assert isinstance(rig.line, NoisyLine)
-    assert rig.line.count("loss") >= 2
 
 
 class Silent:

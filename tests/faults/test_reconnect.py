@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import gc
 import os
 import socket
@@ -20,12 +19,9 @@ from motorbus import families
 from motorbus.bus.pump import Bus
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Operation, Pause
-from motorbus.errors import Faulted, LinkLost, NoReply
+from motorbus.errors import LinkLost, NoReply
 from motorbus.link.lock import socket_path
 from motorbus.link.pty import PtyMaster
-from motorbus.motion.machine import Machine
-from motorbus.session.opening import prepare
-from motorbus.session.robot import Robot
 from motorbus.simulation.mount import Mount
 from tests.conftest import Figures
 from tests.support.mounts import served
@@ -48,12 +44,9 @@ def free_port() -> int:
 
 
 WAYS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {
-    "pty": lambda folder: ("feetech", {"link": folder / "bus"}),
     "tcp": lambda folder: ("feetech", {"tcp": f"127.0.0.1:{free_port()}"}),
-    "slcan": lambda folder: ("kst", {"link": folder / "can"}),
     "slcan over tcp": lambda folder: ("kst", {"tcp": f"127.0.0.1:{free_port()}"}),
     "socketcand": lambda folder: ("kst", {"socketcand": f"127.0.0.1:{free_port()}"}),
-    "stepper": lambda folder: ("stepper", {"link": folder / "line"}),
 }
 
 
@@ -96,7 +89,7 @@ def again(bus: Bus) -> object:
     raise AssertionError("it was not opened anew")
 
 
-OFTEN = ("pty", "tcp", "slcan")
+OFTEN = ("tcp",)
 """Those that are tried with every commit; each takes two processes."""
 
 
@@ -118,48 +111,6 @@ def test_l12_a_simulator_that_is_killed_and_started_again(way: str, tmp_path: Pa
             assert bus.turns.losses == 1
             link: Any = bus.link
             assert socket_path(link.lock_name).exists(), "it is to be stopped by other programs there"
-
-
-def test_l12_the_async_pump_over_a_terminal(tmp_path: Path) -> None:
-    async def main() -> None:
-        place: dict[str, Any] = {"link": tmp_path / "bus"}
-        with Simulated("feetech", ids="1", **place) as before:
-            async with motorbus.open_async(before.bus) as bus:
-                servo = bus.family.devices.awaiting(bus, 1)
-                told = await servo.position()
-                kill(before, **place)
-                found = await asyncio.gather(*(servo.position() for _ in range(5)), return_exceptions=True)
-                assert all(isinstance(one, LinkLost) for one in found)
-                with Simulated("feetech", ids="1", **place):
-                    for _ in range(TRIES):
-                        await bus.run(pause())
-                        if bus.turns.gone is None:
-                            break
-                    assert await asyncio.gather(*(servo.position() for _ in range(5))) == [told] * 5
-
-    asyncio.run(main())
-
-
-def test_a_servo_that_has_restarted_behind_it_is_at_fault_and_limp(tmp_path: Path) -> None:
-    place: dict[str, Any] = {"link": tmp_path / "bus"}
-    with Simulated("feetech", ids="1", **place) as before:
-        text = (
-            f'format = 1\n[bus.arm]\naddress = "{before.bus}"\n[axis.a1]\ndevice = "arm#1"\nzero = "180 deg"\n'
-            'low = "-90 deg"\nhigh = "90 deg"\nmax_velocity = "90 deg/s"\nmax_acceleration = "360 deg/s2"\n'
-            'exit = "leave"\n'
-        )
-        with Robot.of(Machine.parse(text, check_address=lambda address: prepare(address, {}))) as robot:
-            robot["a1"].enable_torque()
-            robot.move({"a1": 0.1})
-            kill(before, **place)
-            with pytest.raises(LinkLost):
-                robot.move({"a1": 0.2})
-            bus: Any = robot.buses["arm"]
-            with Simulated("feetech", ids="1", **place):
-                again(bus)
-                with pytest.raises(Faulted, match="has restarted"):
-                    robot.move({"a1": 0.2})
-                assert not first(bus).read("torque_enable")["torque_enable"]
 
 
 # -- often ---------------------------------------------------------------------------------------------------------
