@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -51,14 +51,13 @@ class Oracle:
         """Turn all servos."""
         return [self.change(which) for which in range(len(self.nodes))]
 
-    def judge(self, expected: Sequence[float], values: Sequence[Any]) -> None:
-        """Compare to half a count."""
-        for (sim, node), place, value in zip(self.nodes, expected, values, strict=True):
-            assert abs(place - value) < ANGLE[sim.family.name] / 2, (sim.url, node, place, value, self.calls)
-        self.right += len(values)
+    def judge(self, expected: Sequence[float], values: Iterable[object]) -> None:
+        """Judge a result for each servo."""
+        for which, (place, value) in enumerate(zip(expected, values, strict=True)):
+            self.judge_one(which, place, value)
 
     def judge_one(self, which: int, expected: float, value: object) -> None:
-        """Judge the result of one call, which may be an error."""
+        """Judge the result of one call, to half a count; it may be an error."""
         if isinstance(value, motorbus.MotorbusError):
             self.failed += 1
             return
@@ -200,7 +199,7 @@ def test_a_robot_on_three_buses(tmp_path: Path, rounds: Rounds) -> None:
             expected = oracle.change_all()
             values = attempt(robot.positions)
             if not isinstance(values, motorbus.MotorbusError):
-                oracle.judge(expected, list(values.values()))
+                oracle.judge(expected, values.values())
         oracle.check(*sims)
 
 
@@ -218,7 +217,7 @@ def test_an_async_robot_on_three_buses(tmp_path: Path, rounds: Rounds) -> None:
                         values = await robot.positions()
                     except motorbus.MotorbusError:
                         continue
-                    oracle.judge(expected, list(values.values()))
+                    oracle.judge(expected, values.values())
                 oracle.check(*sims)
 
     asyncio.run(main())
