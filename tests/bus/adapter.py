@@ -1,0 +1,222 @@
+"""Binds the vocabulary of the engine tests (submit, deliver, advance, cancel, stop, sent, result) to the bus.
+
+The one file of the engine tests that names classes of the bus. Time is virtual; nothing here waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+from motorbus.bus.crank import crank
+from motorbus.bus.pump import Bus
+from motorbus.bus.run import Run
+from motorbus.bus.stop import StopOutcome
+from motorbus.core.goal import Goal
+from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen, Operation
+from motorbus.core.operation import Effect as Effect
+from motorbus.core.operation import Rank as Priority
+from motorbus.core.operation import Timeout as Timeout
+from motorbus.errors import LinkLost
+from motorbus.families import feetech, kst
+from motorbus.families.kst.wire import download_due, upload_due
+from motorbus.link.memory import MemoryLink
+
+Cancelled = KeyboardInterrupt
+PENDING = object()
+FAMILIES: dict[str, Any] = {"feetech": feetech.FAMILY, "kst": kst.FAMILY}
+
+
+def request(
+    frame: Data,
+    expected: Sequence[tuple[int, Any, int]] | None,
+    decode: Callable[[list[bytes]], Any],
+    *,
+    priority: Priority = Priority.POLL,
+    goal_of: int | None = None,
+    alternate: Callable[[], Any] | None = None,
+    **options: Any,
+) -> Exchange[Any]:
+    """One request and the replies it calls for: (node, key, length) each; None: all until the deadline."""
+    makers = {"upload": upload_due, "download": download_due}
+    dues = tuple(
+        makers[key[0]](node, key[1]) if isinstance(key, tuple) else Due(node, key, length)
+        for node, key, length in expected or ()
+    )
+
+    def read(answer: Answer) -> Any:
+        return decode([reply.data for reply in answer.replies])
+
+    def whole(data: Any, _: float) -> Any:
+        parts, start = [], 0
+        for due in dues:
+            part = data[start : start + due.length]
+            if part[:3] != bytes([0xFF, 0xFF, due.node]) or part[4] or ~sum(part[2:-1]) & 0xFF != part[-1]:
+                return UNLIKE
+            parts.append(part)
+            start += due.length
+        return decode(parts) if start == len(data) else UNLIKE
+
+    return Exchange(
+        frame,
+        ANY if expected is None else dues,
+        read,
+        rank=priority,
+        goals=() if goal_of is None else (Goal(goal_of, "position", 0.0, -1.0, 1.0),),
+        other=alternate,
+        whole=whole if isinstance(frame, bytes) and dues else None,
+        **options,
+    )
+
+
+def exclusive(*requests: Exchange[Any]) -> Operation[Any]:
+    """These requests in order, and no other in between."""
+
+    def sequence() -> Operation[list[Any]]:
+        values = []
+        for one in requests:
+            value = yield from one
+            values.append(value)
+        return values
+
+    return (yield from Alone(sequence()))
+
+
+def notification(node: int, seconds: float) -> Operation[Any]:
+    """Wait for a notification of this node: its kind, None after so many seconds."""
+    heard = yield from Listen(lambda notice: notice.node == node, seconds)
+    return heard and heard.kind
+
+
+class Wire:
+    """The far end: keeps what was sent, says what it is given, and may answer and echo by itself."""
+
+    nodes: ClassVar[dict[int, Any]] = {}
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[float, Data]] = []
+        self.coming: list[tuple[float, Data]] = []
+        self.answer: Callable[[Any], list[Data]] = lambda frame: []
+        self.delay = 0.0005
+        self.echoes = False
+
+    def tune(self, rate: int) -> None:
+        self.rate = rate
+
+    def receive(self, data: Data, at: float) -> None:
+        self.sent.append((at, data))
+        if self.echoes:
+            self.coming.append((at, data))
+        self.coming += [(at + self.delay, reply) for reply in self.answer(data)]
+
+    def due(self) -> float | None:
+        return min((at for at, _ in self.coming), default=None)
+
+    def advance(self, to: float) -> list[tuple[float, Data]]:
+        ready = sorted((one for one in self.coming if one[0] <= to), key=lambda one: one[0])
+        self.coming = [one for one in self.coming if one[0] > to]
+        return ready
+
+
+class Engine:
+    """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none)."""
+
+    def __init__(
+        self,
+        family: str = "feetech",
+        *,
+        check: Callable[[Any], None] | None = lambda request: None,
+        latency: float = 0.0,
+        echo: bool = False,
+        listen_only: bool = False,
+        answer: Callable[[Any], list[Data]] | None = None,
+    ) -> None:
+        self.wire = Wire()
+        self.family = FAMILIES[family]
+        self.link = MemoryLink(self.wire, rate=self.family.link.rate)
+        self.link.listen_only = listen_only
+        self.bus = Bus(self.link, self.family, admit=check)
+        self.bus.latency = latency
+        self.calls: dict[str, Run[Any]] = {}
+        self.wire.echoes = echo
+        if answer is not None:
+            self.wire.answer = answer
+            if family == "feetech":  # as `motorbus.open` does
+                test = self.family.echo_test()
+                self.bus.expect_echo(test)
+                self.bus.run(test)
+        self.wire.answer = lambda frame: []
+        self.sent()
+
+    @property
+    def now(self) -> float:
+        return self.link.now()
+
+    @property
+    def quiet_time(self) -> float:
+        return float(self.family.quiet_time(self.bus.rate))
+
+    @property
+    def deadline(self) -> float:
+        """Seconds until the engine acts by itself."""
+        return self.bus.turns.due() - self.now
+
+    def submit(self, name: str, work: Any) -> None:
+        self.calls[name] = Run(self.bus.turns, work, now=self.link.now)
+        self.advance()
+
+    def run(self, work: Any) -> Any:
+        """Carry it out as a blocking caller does."""
+        return self.bus.run(work)
+
+    def cancel(self, name: str) -> None:
+        self.calls[name].interrupt(Cancelled())
+        self.advance()
+
+    def deliver(self, *data: Data, after: float = 0.0005) -> None:
+        """These arrive after so many seconds, each by itself."""
+        self.wire.coming += [(self.now + after, one) for one in data]
+        self.advance(after)
+
+    def advance(self, seconds: float = 0.0) -> None:
+        """Let time pass, and do all that is to be done meanwhile."""
+        end, same = self.now + seconds, 0
+        while same < 2:
+            before = self.now, len(self.wire.sent), self.bus.turns.settled
+            for call in self.calls.values():
+                call.advance()
+            crank(self.link, self.bus.turns, end)
+            self.link.advance(0.0)
+            same = same + 1 if before == (self.now, len(self.wire.sent), self.bus.turns.settled) else 0
+        assert self.now >= end - 1e-9
+
+    def sent(self) -> list[Any]:
+        """Everything sent since the last look."""
+        sent, self.wire.sent = [data for _, data in self.wire.sent], []
+        return sent
+
+    def result(self, name: str) -> Any:
+        """The value of a call or its error, PENDING while it has not ended."""
+        call = self.calls[name]
+        if not call.advance():
+            return PENDING
+        return call.root.value if call.told() is None else call.told()
+
+    def estop(self) -> StopOutcome:
+        outcome = self.bus.estop()
+        self.advance()
+        return outcome
+
+    def unplug(self) -> None:
+        self.link.unplug()
+        self.advance()
+
+    def plug(self) -> None:
+        self.link.plug()
+        self.advance()
+
+    def counts(self, node: int) -> Any:
+        return self.bus.statistics.nodes[node]
+
+
+__all__ = ["PENDING", "Cancelled", "Effect", "Engine", "LinkLost", "Priority", "Timeout", "request"]
