@@ -35,8 +35,10 @@ from tests.bus.frames import (
     GOAL,
     TORQUE,
     Servos,
+    can_move,
     can_read,
     checksummed,
+    download_frame,
     downloaded,
     group,
     group_frame,
@@ -736,6 +738,16 @@ def test_a_motion_order_that_is_lost_is_not_repeated_behind_a_torque_off(engine:
     assert engine.result("stop") == "written"
     engine.advance(1.0)
     assert write_frame(1, GOAL, 1) not in engine.sent()
+
+
+def test_a_stop_ends_the_motion_orders_of_nodes_that_it_does_not_know(can: Engine) -> None:
+    can.submit("read", can_read(9))
+    can.submit("move", can_move(9))
+    can.wire.answer = Servos()
+    can.estop()
+    can.advance(1.0)
+    assert isinstance(can.result("move"), Interrupted)
+    assert download_frame(9, 1) not in can.sent()
 
 
 def test_a_late_acknowledgement_is_not_taken_for_that_of_the_stop(engine: Engine) -> None:
