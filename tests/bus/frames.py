@@ -99,9 +99,9 @@ def upload_frame(node: int, index: int = CAN_POSITION) -> CanFrame:
     return CanFrame(0x600 + node, bytes([0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0]))
 
 
-def download_frame(node: int, value: int) -> CanFrame:
+def download_frame(node: int, value: int, tail: bytes = b"\0\0") -> CanFrame:
     head = bytes([0x22, CAN_GOAL & 0xFF, CAN_GOAL >> 8, 0])
-    return CanFrame(0x600 + node, head + value.to_bytes(2, "little") + b"\0\0")
+    return CanFrame(0x600 + node, head + value.to_bytes(2, "little") + tail)
 
 
 def uploaded(node: int, value: int, index: int = CAN_POSITION) -> CanFrame:
@@ -124,7 +124,7 @@ def can_read(node: int, **options: Any) -> Any:
     return request(upload_frame(node), [(node, ("upload", CAN_POSITION), 8)], can_value, **options)
 
 
-def can_move(node: int, value: int = 1, **options: Any) -> Any:
+def can_move(node: int, value: int = 1, *, tail: bytes = b"\0\0", **options: Any) -> Any:
     options = {
         "effect": Effect.MOTION,
         "priority": Priority.CONTROL,
@@ -132,7 +132,7 @@ def can_move(node: int, value: int = 1, **options: Any) -> Any:
         "lane": node,
         **options,
     }
-    frame, expected = download_frame(node, value), [(node, ("download", CAN_GOAL), 8)]
+    frame, expected = download_frame(node, value, tail), [(node, ("download", CAN_GOAL), 8)]
     return request(frame, expected, lambda _: "written", **options)
 
 
