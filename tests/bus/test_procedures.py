@@ -1,0 +1,230 @@
+"""Procedures of several steps: values, errors and clean-up go where they belong, and what is cancelled closes up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from motorbus.core.operation import (
+    CanFrame,
+    Journal,
+    Listen,
+    Operation,
+    Pause,
+    Progress,
+    Report,
+    Together,
+    Tune,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import LinkError, NoReply, RequestError
+from tests.bus.adapter import Cancelled, Effect, Engine
+from tests.bus.frames import Servos, can_move, can_read, read, write, write_frame
+
+LOCK = 55
+
+
+@pytest.fixture
+def engine() -> Engine:
+    engine = Engine(answer=Servos())
+    engine.wire.answer = Servos()
+    return engine
+
+
+@pytest.fixture
+def can() -> Engine:
+    engine = Engine("kst")
+    engine.wire.answer = Servos()
+    return engine
+
+
+def lock(node: int, closed: int) -> Any:
+    return write(node, closed, address=LOCK, effect=Effect.PERSISTENT, repeatable=True)
+
+
+def guarded(node: int, work: Any = None) -> Operation[None]:
+    """Open the lock, change something, close the lock whatever happens."""
+
+    def change() -> Operation[None]:
+        yield from lock(node, 0)
+        yield from work or write(node, 9, repeatable=True)
+
+    return afterwards(change(), lambda: lock(node, 1))
+
+
+def turning(*rests: float) -> Operation[None]:
+    """Wait for ever; then wait for something to come to rest, and write."""
+    try:
+        yield from Pause(1e9)
+    finally:
+        for rest in rests:
+            yield from outcome(iter(Pause(rest)))
+        yield from outcome(write(1, 9))
+
+
+def test_each_step_gives_its_value(engine: Engine) -> None:
+    def everything() -> Operation[list[Any]]:
+        values: list[Any] = [(yield from read(1))]
+        values += yield from Together([read(2), read(3)])
+        none: list[Any] = []
+        values.append((yield from Together(none)))
+        values.append((yield from Pause(3600.0)) > 3600.0)
+        values += [(yield from Tune(500_000)), (yield from Tune(0)), (yield from read(4))]
+        return values
+
+    assert engine.run(everything()) == [100, 200, 300, [], True, 1_000_000, 500_000, 400]
+    assert engine.bus.rate == engine.wire.rate == 500_000
+
+
+def test_one_failure_of_several_stops_none_of_the_others(engine: Engine) -> None:
+    engine.wire.answer = servos = Servos()
+    servos.silent = {2, 4}
+
+    def several() -> Operation[list[Any]]:
+        return (yield from Together([read(node) for node in (1, 2, 3, 4)]))
+
+    with pytest.raises(NoReply, match="node 2") as caught:
+        engine.run(several())
+    assert "node 4" in "".join(caught.value.__notes__)
+    assert {frame[2] for frame in engine.sent()} == {1, 2, 3, 4}
+
+
+def test_reports_are_handed_over_before_the_next_step_and_what_they_raise_comes_back(engine: Engine) -> None:
+    seen: list[tuple[object, int]] = []
+
+    def work() -> Operation[None]:
+        try:
+            for done in range(2):
+                yield from Report(Progress(done, 2))
+                yield from read(1)
+        finally:
+            yield from lock(1, 1)
+
+    engine.bus.run(work(), report=lambda event: seen.append((event, len(engine.wire.sent))))
+    assert seen == [(Progress(0, 2), 0), (Progress(1, 2), 1)]
+    engine.sent()
+
+    def full(event: object) -> None:
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        engine.bus.run(work(), report=full)
+    assert engine.sent() == [write_frame(1, LOCK, 1)]
+
+
+def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: Engine) -> None:
+    def change() -> Operation[None]:
+        yield from Report(Journal("set_id", "begun", {}))
+        yield from write(1, 2, address=5)
+
+    with pytest.raises(RequestError, match="keeps no journal"):
+        engine.run(change())
+    assert engine.sent() == []
+
+
+@pytest.mark.parametrize("after", [0.0, 0.0005, 0.001, 0.0015])
+def test_a_cancelled_change_closes_its_lock_at_every_step(engine: Engine, after: float) -> None:
+    def both() -> Operation[Any]:
+        return (yield from Together([guarded(node, Pause(0.001)) for node in (1, 2)]))
+
+    engine.submit("a", both())
+    engine.advance(after)
+    engine.cancel("a")
+    engine.advance(1.0)
+    assert isinstance(engine.result("a"), Cancelled)
+    sent = engine.sent()
+    for node in (1, 2):
+        if write_frame(node, LOCK, 0) in sent:
+            assert [frame for frame in sent if frame[2] == node][-1] == write_frame(node, LOCK, 1)
+    assert engine.run(read(1)) == 100
+
+
+@pytest.mark.parametrize(("rest", "reached"), [(0.4, True), (5.0, True), (29.0, True), (31.0, False)])
+def test_a_clean_up_gets_its_time_to_come_to_rest(engine: Engine, rest: float, reached: bool) -> None:
+    engine.submit("a", turning(rest))
+    engine.cancel("a")
+    engine.advance(40.0)
+    assert isinstance(engine.result("a"), Cancelled)
+    assert (write_frame(1, 20, 9) in engine.sent()) is reached
+
+
+def test_a_clean_up_that_does_not_end_is_given_up_and_a_second_cancel_shortens_it(engine: Engine) -> None:
+    begun = engine.now
+    engine.submit("a", turning(*[1.0] * 1000))
+    engine.submit("b", turning(20.0))
+    for name in ("a", "b", "b"):
+        engine.cancel(name)
+    engine.advance(0.3)
+    assert isinstance(engine.result("b"), Cancelled)
+    engine.advance(100.0)
+    assert isinstance(engine.result("a"), Cancelled)
+    assert engine.now - begun < 101
+    assert engine.run(read(1)) == 100
+
+
+def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Engine) -> None:
+    def failing(text: str) -> Operation[None]:
+        try:
+            yield from Pause(1e9)
+        finally:
+            raise RequestError(text)
+
+    def several() -> Operation[Any]:
+        return (yield from Together([failing("it may turn"), failing("it may turn"), failing("so may this")]))
+
+    engine.submit("a", several())
+    engine.cancel("a")
+    engine.advance(1.0)
+    assert engine.result("a").__notes__ == ["it may turn", "so may this"]
+
+
+def test_while_a_bus_only_listens_requests_are_refused_and_notifications_heard(can: Engine) -> None:
+    def listen() -> Operation[list[Any]]:
+        yield from Tune(125_000, listen_only=True)
+        refused = yield from outcome(can_read(1))
+        heard = yield from Listen(lambda notice: notice.node == 5, 0.1)
+        before = yield from Tune(500_000)
+        return [refused, heard, before, (yield from can_read(1))]
+
+    can.submit("a", listen())
+    can.deliver(CanFrame(0x585, b"\x64\0\0\0"))
+    can.advance(0.1)
+    refused, heard, before, value = can.result("a")
+    assert isinstance(refused, RequestError)
+    assert heard.kind == "report"
+    assert (before, value) == (125_000, 100)
+    assert len(can.sent()) == 1
+
+
+def test_a_rate_that_the_link_refuses_fails_the_change_only(
+    can: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(rate: int, listen_only: bool = False) -> None:
+        raise LinkError("this adapter cannot")
+
+    monkeypatch.setattr(can.link, "tune", refuse)
+    with pytest.raises(LinkError, match="cannot"):
+        can.run(iter(Tune(125_000, listen_only=True)))
+    assert can.bus.rate == 500_000
+    assert can.run(can_read(1)) == 100
+
+
+def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None:
+    can.run(can_read(1, tells_position=True))
+    can.run(iter(Tune(125_000, listen_only=True)))
+    assert can.estop().acknowledged == (1,)
+    assert can.bus.rate == can.wire.rate == 500_000
+
+
+def test_after_a_motion_order_a_stop_asks_where_the_node_is(can: Engine) -> None:
+    for node in (1, 2):
+        can.run(can_read(node, tells_position=True))
+    can.run(can_move(1, 500))
+    can.wire.answer = servos = Servos(lambda node: 333)
+    servos.silent = {3}
+    can.sent()
+    assert sorted(can.estop().acknowledged) == [1, 2]
+    goals = {frame.id: frame.data[4:6] for frame in can.sent() if frame.data[0] == 0x22}
+    assert goals == {0x601: (333).to_bytes(2, "little"), 0x602: (200).to_bytes(2, "little")}
