@@ -84,8 +84,8 @@ def exclusive(*requests: Exchange[Any]) -> Operation[Any]:
 
 def notification(node: int, seconds: float) -> Operation[Any]:
     """Wait for a notification of this node: its kind, None after so many seconds."""
-    heard = yield from Listen(lambda notice: notice.node == node, seconds)
-    return heard and heard.kind
+    notice = yield from Listen(lambda one: one.node == node, seconds)
+    return notice and notice.kind
 
 
 class Wire:

@@ -102,7 +102,6 @@ def test_a_request_is_sent_once_and_its_reply_is_the_result(engine: Engine) -> N
     assert engine.result("a") is PENDING
     engine.deliver(said(1, 1234))
     assert engine.result("a") == 1234
-    engine.advance(1.0)
     assert engine.sent() == []
 
 
@@ -298,7 +297,6 @@ def test_a_blocking_read_meets_surplus_bytes_that_came_before_it(engine: Engine)
     assert engine.run(read(1)) == 100
     servos.position = lambda node: 777
     engine.sent()
-    engine.link.advance(0.0005)
     engine.wire.coming.append((engine.now, said(1, 1111)))
     engine.link.advance(0.0)
     assert engine.run(read(1)) == 777
@@ -385,7 +383,6 @@ def test_an_echo_is_taken_off_wherever_it_is_cut(cut: int) -> None:
 
 @pytest.mark.parametrize("before", [True, False], ids=["ceases", "appears"])
 def test_an_echo_that_changes_while_the_bus_is_open_is_never_a_result(before: bool) -> None:
-    """The echo of this read is a sound reply: register 56 would be 0x0238."""
     engine = Engine(answer=Servos(), echo=before)
     engine.wire.answer = Servos(lambda node: 2222)
     engine.wire.echoes = not before
@@ -449,13 +446,6 @@ def test_a_can_bus_has_one_request_in_flight_per_lane_and_as_many_lanes_as_its_w
     assert [can.result(f"{node}") for node in lanes] == wanted
 
 
-def test_replies_of_lanes_may_come_in_any_order(can: Engine) -> None:
-    for node in (1, 2, 3):
-        can.submit(str(node), can_read(node))
-    can.deliver(*(uploaded(node, 10 * node) for node in (3, 1, 2)))
-    assert [can.result(str(node)) for node in (1, 2, 3)] == [10, 20, 30]
-
-
 @pytest.mark.parametrize("other", [uploaded(1, 5, 0x6063), downloaded(1), uploaded(2, 5)])
 def test_a_can_reply_to_something_else_is_no_answer(can: Engine, other: CanFrame) -> None:
     can.submit("a", can_read(1))
@@ -508,7 +498,7 @@ def test_an_exclusive_sequence_is_not_interrupted_but_by_a_stop(engine: Engine) 
     assert engine.result("alone") == [100, 100, 100]
 
 
-def test_an_exclusive_sequence_that_is_cancelled_lets_the_others_go(engine: Engine) -> None:
+def test_an_exclusive_sequence_that_is_cancelled_frees_the_bus(engine: Engine) -> None:
     engine.submit("alone", exclusive(read(1), read(1)))
     engine.submit("other", read(2))
     engine.cancel("alone")
@@ -518,7 +508,7 @@ def test_an_exclusive_sequence_that_is_cancelled_lets_the_others_go(engine: Engi
     assert engine.result("other") == 8
 
 
-def test_a_notification_without_a_request_is_told_and_disturbs_no_reply(can: Engine) -> None:
+def test_a_notification_without_a_request_is_passed_on_and_disturbs_no_reply(can: Engine) -> None:
     watch = can.bus.notices.subscribe()
     can.submit("none", notification(7, 0.5))
     can.submit("one", notification(5, 0.5))
@@ -856,19 +846,6 @@ def test_a_lost_link_fails_everything_and_nothing_of_before_is_sent_later(engine
     probe, asked = engine.sent()
     assert (probe[4], asked) == (2, read_frame(1))
     assert probe != asked, "what was owed before the loss may still come"
-
-
-def test_a_reply_of_before_a_loss_is_no_answer_after_it(engine: Engine) -> None:
-    engine.submit("a", read(1))
-    engine.sent()
-    engine.unplug()
-    engine.plug()
-    engine.submit("b", read(1))
-    engine.deliver(said(1, 1111))
-    assert engine.result("b") is PENDING
-    engine.wire.answer = Servos()
-    engine.advance(0.5)
-    assert engine.result("b") == 100
 
 
 def test_a_procedure_that_began_before_a_loss_moves_nothing_after_it(engine: Engine) -> None:

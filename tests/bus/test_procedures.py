@@ -180,20 +180,20 @@ def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Eng
     assert engine.result("a").__notes__ == ["it may turn", "so may this"]
 
 
-def test_while_a_bus_only_listens_requests_are_refused_and_notifications_heard(can: Engine) -> None:
+def test_while_a_bus_only_listens_requests_are_refused_and_notifications_received(can: Engine) -> None:
     def listen() -> Operation[list[Any]]:
         yield from Tune(125_000, listen_only=True)
         refused = yield from outcome(can_read(1))
-        heard = yield from Listen(lambda notice: notice.node == 5, 0.1)
+        notice = yield from Listen(lambda one: one.node == 5, 0.1)
         before = yield from Tune(500_000)
-        return [refused, heard, before, (yield from can_read(1))]
+        return [refused, notice, before, (yield from can_read(1))]
 
     can.submit("a", listen())
     can.deliver(CanFrame(0x585, b"\x64\0\0\0"))
     can.advance(0.1)
-    refused, heard, before, value = can.result("a")
+    refused, notice, before, value = can.result("a")
     assert isinstance(refused, RequestError)
-    assert heard.kind == "report"
+    assert notice.kind == "report"
     assert (before, value) == (125_000, 100)
     assert len(can.sent()) == 1
 

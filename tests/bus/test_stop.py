@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import ROUNDS, request_estop
-from motorbus.core.operation import Effect, Exchange, Operation, Pause, Tune
-from motorbus.errors import Interrupted, LinkError, LinkLost, OutcomeUnknown, PortNotFound
+from motorbus.bus.stop import request_estop
+from motorbus.core.operation import Effect, Operation, Pause
+from motorbus.errors import Interrupted, LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
-from tests.bus.responder import Responder, async_bus, first_byte, memory_bus, position, positions, write
+from tests.bus.responder import Responder, async_bus, memory_bus, position, write
 from tests.bus.script import admit_all
 
 TORQUE = 40
@@ -37,94 +37,6 @@ def known(bus: Bus, *nodes: int) -> None:
         bus.run(position(node))
 
 
-def test_a_stop_is_broadcast_then_acknowledged_by_every_known_node() -> None:
-    bus, responder = memory_bus()
-    known(bus, 1, 2, 3)
-    outcome = bus.estop()
-    assert torque_offs(responder) == [254, 1, 2, 3]
-    assert outcome.acknowledged == (1, 2, 3)
-    assert outcome.silent == ()
-    assert outcome.rounds == 1
-    assert outcome.promise
-
-
-def test_a_node_that_does_not_acknowledge_is_asked_five_times_and_named() -> None:
-    bus, responder = memory_bus()
-    known(bus, 1, 2)
-    responder.dead = {2}
-    outcome = bus.estop()
-    assert outcome.acknowledged == (1,)
-    assert outcome.silent == (2,)
-    assert torque_offs(responder).count(2) == 5
-    assert torque_offs(responder).count(1) == 1
-
-
-def test_it_is_latched_until_reset_and_reading_goes_on() -> None:
-    bus, _ = memory_bus()
-    known(bus, 1)
-    bus.estop()
-    with pytest.raises(Interrupted, match="reset"):
-        bus.run(write(1, TORQUE, 1, Effect.TORQUE))
-    assert bus.run(position(1)) == 1
-    bus.reset()
-    bus.run(write(1, TORQUE, 1, Effect.TORQUE))
-
-
-def test_the_frames_are_made_with_the_last_positions() -> None:
-    bus, _ = memory_bus()
-    seen: list[dict[int, bool]] = []
-    stop = type(FAMILY).stop
-
-    class Watched(type(FAMILY)):  # type: ignore[misc]
-        def stop(self, nodes: Any) -> Any:
-            seen.append({node: answer is not None for node, answer in nodes.items()})
-            return stop(FAMILY, nodes)
-
-    bus.turns.family = Watched()
-    told: Exchange[int] = Exchange(
-        position(1).request, position(1).replies, first_byte, repeatable=True, tells_position=True
-    )
-    bus.run(told)
-    bus.run(position(2))
-    bus.run(told)
-    bus.estop()
-    assert seen[-1] == {1: True, 2: False}
-
-
-def test_an_acknowledgement_that_was_lost_before_does_not_make_a_node_silent() -> None:
-    bus, responder = memory_bus()
-    known(bus, 1)
-    responder.dead = {1}
-    with pytest.raises(OutcomeUnknown):
-        bus.run(Exchange(write(1, 41, 1).request, write(1, 41, 1).replies))
-    responder.dead = set()
-    outcome = bus.estop()
-    assert outcome.acknowledged == (1,)
-    assert outcome.rounds == 2, "the first acknowledgement may have been that of the write"
-
-
-def test_dead_nodes_keep_no_frame_from_the_others() -> None:
-    bus, responder = memory_bus()
-    known(bus, *range(1, 21))
-    responder.dead = set(range(1, 11))
-    outcome = bus.estop()
-    assert set(outcome.acknowledged) == set(range(11, 21))
-    assert [torque_offs(responder).count(node) for node in range(11, 21)] == [1] * 10
-    assert torque_offs(responder).count(254) == ROUNDS
-
-
-def test_a_stop_goes_out_at_the_rate_at_which_nodes_were_heard() -> None:
-    bus, responder = memory_bus()
-    known(bus, 1)
-
-    def other_rate() -> Operation[None]:
-        yield from Tune(500_000)
-
-    bus.run(other_rate())
-    bus.estop()
-    assert responder.rate == bus.rate == 1_000_000
-
-
 def test_a_stop_after_close_says_at_once_that_nothing_was_sent() -> None:
     for virtual in (True, False):
         bus, responder = memory_bus(virtual=virtual)
@@ -133,57 +45,6 @@ def test_a_stop_after_close_says_at_once_that_nothing_was_sent() -> None:
         with pytest.raises(LinkLost, match="no stop was sent"):
             bus.estop()
         assert torque_offs(responder) == []
-
-
-def test_a_stop_survives_a_closed_event_loop() -> None:
-    bus, responder = async_bus(virtual=False)
-    loop = asyncio.new_event_loop()
-
-    begun: list[bool] = []
-
-    def endless() -> Operation[None]:
-        yield from write(1, TORQUE, 1, Effect.TORQUE)
-        begun.append(True)
-        yield from Pause(1000.0)
-
-    task = loop.create_task(bus.run(endless()))
-    while not begun:
-        loop.run_until_complete(asyncio.sleep(0.001))
-    loop._ready.clear()  # type: ignore[attr-defined]  # it dies as it stands, with the task pending
-    task._log_destroy_pending = False  # type: ignore[attr-defined]
-    loop.close()
-    assert bus.estop().acknowledged == (1,)
-    assert torque_offs(responder)[:2] == [254, 1]
-    loop2 = asyncio.new_event_loop()
-    loop2.run_until_complete(bus.close())
-    loop2.close()
-
-
-def test_without_a_place_for_its_socket_the_stop_still_works(tmp_path: Path) -> None:
-    responder = Responder()
-    where = tmp_path / "no" / "such" / "folder" / "stop"
-    bus = Bus(MemoryLink(responder, virtual=False), FAMILY, admit=admit_all, stop_socket=where)
-    known(bus, 1)
-    assert bus.estop().acknowledged == (1,)
-    bus.close()
-
-
-def test_a_process_that_ends_without_answering_is_told_as_such(tmp_path: Path) -> None:
-    path = tmp_path / "stop"
-    with socket.socket(socket.AF_UNIX) as server:
-        server.bind(str(path))
-        server.listen(1)
-
-        def hang_up() -> None:
-            client, _ = server.accept()
-            client.recv(10)
-            client.close()
-
-        thread = threading.Thread(target=hang_up)
-        thread.start()
-        with pytest.raises(LinkError, match="ended without answering"):
-            request_estop(path)
-        thread.join(10)
 
 
 def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:
@@ -213,14 +74,6 @@ def test_a_signal_handler_may_ask_for_a_stop() -> None:
         time.sleep(0.001)
     assert torque_offs(responder)[:2] == [254, 1]
     bus.close()
-
-
-def test_a_second_stop_is_as_good_as_the_first() -> None:
-    bus, responder = memory_bus()
-    known(bus, 1)
-    bus.estop()
-    assert bus.estop().acknowledged == (1,)
-    assert torque_offs(responder) == [254, 1, 254, 1]
 
 
 def test_a_stop_in_the_middle_of_an_operation_ends_it_and_lets_it_clean_up() -> None:
@@ -385,16 +238,3 @@ def test_garbage_on_the_line_does_not_hold_the_stop() -> None:
     outcome = bus.estop()
     assert torque_offs(responder)[0] == 254
     assert set(outcome.acknowledged) | set(outcome.silent) == {1, 2}
-
-
-def test_a_stop_works_from_every_state() -> None:
-    bus, responder = memory_bus()
-    assert bus.estop().promise, "nobody known: broadcast only"
-    assert torque_offs(responder) == [254] * ROUNDS, "nobody can acknowledge, so it is said five times"
-    bus.reset()
-    bus.run(positions(1, 2))
-    responder.dead = {1}
-    with pytest.raises(Exception, match="did not answer"):
-        bus.run(position(1))
-    responder.dead = set()
-    assert set(bus.estop().acknowledged) == {1, 2}, "after a timeout"
