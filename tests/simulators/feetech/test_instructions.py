@@ -174,7 +174,7 @@ def test_codes_that_a_map_does_not_allow_are_rates_or_make_it_deaf(name: str) ->
 def test_an_id_is_changed_and_locked_by_the_register_of_the_map(name: str) -> None:
     host = host_of(name)
     host.write(1, LOCK[name], 0)
-    assert host.write(1, 5, 7) == ["FF FF 07 02 00 F6"]
+    assert host.write(1, 5, 7) == ["FF FF 01 02 00 FC"]
     host.wait(1.0).write(7, LOCK[name], 1)
     host.bus.nodes[7].power_cycle()
     assert host.say(packet(7, PING)) == ["FF FF 07 02 00 F6"]

@@ -83,12 +83,12 @@ def test_a_code_that_means_nothing_makes_it_deaf() -> None:
     assert host.say(packet(1, PING)) == []
 
 
-def test_the_id_write_is_acknowledged_from_the_new_id_or_the_old() -> None:
+def test_the_id_write_is_acknowledged_from_the_old_id_or_the_new() -> None:
     host = Host((1,))
-    assert host.write(1, 5, 7) == ["FF FF 07 02 00 F6"]
+    assert host.write(1, 5, 7) == ["FF FF 01 02 00 FC"]
     assert host.say(packet(1, PING)) == []
     assert list(host.bus.nodes) == [7]
-    assert Host((1,), id_ack="old").write(1, 5, 7) == ["FF FF 01 02 00 FC"]
+    assert Host((1,), id_ack="new").write(1, 5, 7) == ["FF FF 07 02 00 F6"]
 
 
 def test_unplugged_is_silent_and_plugged_in_again_answers() -> None:
@@ -148,10 +148,10 @@ def test_0x08_acknowledged() -> None:
     assert Host(bootloader="ack").say(packet(1, BOOTLOADER)) == ["FF FF 01 02 00 FC"]
 
 
-def test_0x06_answers_then_is_deaf_for_a_second() -> None:
+def test_0x06_answers_then_is_deaf_for_half_a_second() -> None:
     host = Host()
     assert host.say(packet(1, RESTORE)) == ["FF FF 01 02 00 FC"]
-    assert host.wait(0.99).say(packet(1, PING)) == []
+    assert host.wait(0.49).say(packet(1, PING)) == []
     assert host.wait(0.02).say(packet(1, PING)) == ["FF FF 01 02 00 FC"]
 
 

@@ -295,12 +295,21 @@ def test_in_the_bootloader_it_is_limp() -> None:
 # Rights.
 
 
-@pytest.mark.parametrize("address", [0, 2, 3, 56, 60, 62, 66, 85])
+@pytest.mark.parametrize("address", [0, 2, 3, 56, 60, 62, 66, 84, 86])
 def test_read_only_registers_acknowledge_and_do_not_change(address: int) -> None:
     host = Host()
     before = host.read(1, address, 1)
     assert host.write(1, address, before ^ 1) == ["FF FF 01 02 00 FC"]
     assert host.read(1, address, 1) == before
+
+
+def test_max_acceleration_keeps_what_is_written_until_power_off() -> None:
+    host = Host()
+    assert host.read(1, 85, 1) == 254
+    assert host.write(1, 85, 100) == ["FF FF 01 02 00 FC"]
+    assert host.read(1, 85, 1) == 100
+    host.bus.nodes[1].power_cycle()
+    assert host.read(1, 85, 1) == 254
 
 
 def test_a_write_over_both_kinds_changes_what_may_be() -> None:

@@ -54,6 +54,6 @@ def test_each_has_a_help_text_a_source_and_a_default_among_its_choices(one: obje
 def test_every_switch_is_an_option_with_its_choices_and_its_source() -> None:
     found = {option.name: option for option in options(Switches)}
     assert set(found) == {one.name for one in fields(Switches)}
-    assert found["id_ack"].choices == ("new", "old")
+    assert found["id_ack"].choices == ("old", "new")
     assert all(option.source for option in found.values())
     assert found["store_time"].kind is float

@@ -21,6 +21,8 @@ Tell: TypeAlias = Callable[[Any, float], int]
 """Works out what a row says of a servo at a moment."""
 _IDS = 254
 """0 to 253; 254 means all and 255 is the head of a packet."""
+# assumption: kept until power-off. lerobot (configure_motors) writes it to every servo and never reads it back.
+_KEPT_FACTORY_ROWS = frozenset({"max_acceleration"})
 
 
 class Written(NamedTuple):
@@ -274,7 +276,7 @@ class Memory:
 
 def _takes(entry: Entry) -> bool:
     """Whether a host can write this row."""
-    return entry.writable and entry.storage is not Storage.FACTORY
+    return (entry.writable and entry.storage is not Storage.FACTORY) or entry.name in _KEPT_FACTORY_ROWS
 
 
 def _span(rows: tuple[Entry, ...], address: int, count: int) -> Span:

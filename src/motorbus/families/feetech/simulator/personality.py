@@ -76,6 +76,7 @@ _LIKE_SCS: Final = {
 }  # fmt: skip
 # Assumed: 60 degrees in 0.1 s, which are 2048 counts/s, and currents of a small servo.
 _SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
+_LEROBOT: Final = {"max_acceleration": 254}  # assumption: what lerobot (configure_motors) writes on these maps
 _LEAST_SMS: Final = 100e-6  # FEETECH page on SMS servos: values of register 7 below 50 act as 50
 
 PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
@@ -84,6 +85,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             firmware=(3, 10),
             voltage=7.4,
             drive=_STS,
+            shipped=_LEROBOT,
             smaller=True,  # servolab, measured on STS3215: a positive duty goes the other way than a positive velocity
             goal_enables=True,  # feetech-cli, measured on STS3215
             calibrates=True,  # 0x0B is in the dispatcher of firmware 3.10 (kuterd/feetech-fw-util)
@@ -94,7 +96,7 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             firmware=(2, 45),
             voltage=12.0,
             drive=_STS,
-            shipped={**_SMS, "phase": 12, "torque_limit": 1000},  # phase as an STS ships: velocity in counts/s
+            shipped={**_SMS, **_LEROBOT, "phase": 12, "torque_limit": 1000},  # phase as an STS ships: velocity in counts/s
             least_delay=_LEAST_SMS,
             reversed_by=(0, 7),
             bridge_bit=5,

@@ -112,11 +112,12 @@ class BusSwitches:
         source="manual V1.01, 1.3 table (one parameter) against 1.3.3 (at least two)",
     )
     id_ack: str = switch(
-        "new",
-        "a WRITE of the id is acknowledged from the new id or from the old one",
-        "new",
         "old",
-        source="fanhao375/microduck-replica#28 (from the new id)",
+        "a WRITE of the id is acknowledged from the old id or from the new one",
+        "old",
+        "new",
+        source="lerobot (setup_motor), rustypot (change_id) and sts-suite accept the old id only;"
+        " fanhao375/microduck-replica#28: the reply may come from the new id",
     )
     baud_ack: str = switch(
         "old",
