@@ -60,6 +60,17 @@ def test_two_that_begin_at_different_moments_are_heard(jitter: float) -> None:
         assert asked(simulation).suspected
 
 
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("rate", [0, 1_000_000, 38_400])
+def test_a_simulated_duplicate_is_seen_with_the_default_settings(model: str, rate: int) -> None:
+    with motorbus.simulate("feetech", ids="2-3", model=model, servo_baud=rate, duplicate=3) as simulation:
+        with motorbus.open(simulation.url) as bus:
+            assert not bus.run(duplicates(Node(2))).suspected
+        seen = asked(simulation)
+    assert seen.suspected
+    assert seen.polls <= 20
+
+
 def test_two_that_answer_one_after_the_other_are_heard() -> None:
     """The second answer comes behind the first, or into the next question, which has more answers then than are due."""
     with twins("scs0009") as simulation:

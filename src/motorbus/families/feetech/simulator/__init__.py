@@ -43,7 +43,9 @@ def simulate(ids: Iterable[int], model_name: str = "", /, **options: object) -> 
     twins = [_twin(word, numbers) for word in switches.duplicate.replace(",", "+").split("+") if word]
     kinds += [kinds[numbers.index(twin)] for twin in twins]
     rated = _rated(kinds, switches.servo_baud)
-    return FeetechBus([*numbers, *twins], rated, position=position, switches=switches)
+    bus = FeetechBus([*numbers, *twins], rated, position=position, switches=switches)
+    bus.twins = frozenset(bus.servos[len(numbers) :])
+    return bus
 
 
 def _position(position: object) -> int | Mapping[int, int] | None:

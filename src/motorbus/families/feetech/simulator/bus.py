@@ -39,6 +39,8 @@ from motorbus.families.feetech.wire import (
 )
 
 _USUAL_RATE = 1_000_000
+_TWIN_JITTER: Final = 20
+"""Bits by which a duplicate begins its reply later, at most. # assumption: two equal servos never reply in step"""
 _ANSWERED_AT_LEVEL_0 = (Instruction.PING, Instruction.READ)
 _BY_SECOND_ID = (Instruction.WRITE, Instruction.REG_WRITE)
 _NOBODY: tuple[Servo, ...] = ()
@@ -64,6 +66,7 @@ class FeetechBus:
     """A `motorbus.core.family.Simulator` of FEETECH servos.
 
     `servos` are all of them in the order given, two with one id included; `now` is the latest moment it was told.
+    `twins` are those of them that duplicate an id; unless `reply_jitter` is set they reply up to 20 bits later.
     `model` is that of all, or those of each. `usual_rate` is the rate that the first had at first (bit/s), by which to
     open the bus.
     """
@@ -108,6 +111,7 @@ class FeetechBus:
         )
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
+        self.twins: frozenset[Servo] = frozenset()
         self._fate = Fate(self.servos, self.switches)
         self.usual_rate = self.servos[0].baud_rate
 
@@ -130,6 +134,7 @@ class FeetechBus:
             first.memory["baud_rate"]
         )
         self.servos = (*self.servos, twin)
+        self.twins |= {twin}
         self._fate = Fate(self.servos, self.switches)
         self._fate.expect(self.now)
         self._forget_ids()
@@ -319,10 +324,13 @@ class FeetechBus:
         """When it begins, what it sends, and for how long each bit of that (s)."""
         parameters, id, later = answer
         own, error, delay = servo.speaks()
+        bit = self._byte_time(servo) / BITS
         if self._jitter:
             later += self._jitter * self._chance.draw()
+        elif servo in self.twins:
+            later += _TWIN_JITTER * bit * self._chance.draw()
         data = frame(own if id is None else id, error, parameters)
-        return at + delay + later, data, self._byte_time(servo) / BITS
+        return at + delay + later, data, bit
 
     def _byte_time(self, servo: Servo | None) -> float:
         """Seconds of a byte on the wire: ten bits."""

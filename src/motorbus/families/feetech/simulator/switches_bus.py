@@ -23,7 +23,8 @@ class BusSwitches:
     )
     duplicate: str = switch(
         "",
-        "ids that a second servo has as well, as 3 or 3+5",
+        "ids that a second servo has as well, as 3 or 3+5; unless reply_jitter is set the second one replies up to"
+        " 20 bits later by chance",
         source="new servos all have the id 1, and no servo knows of another",
     )
     servo_baud: int = switch(
