@@ -44,7 +44,9 @@ removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
-fault ID [NAME=VALUE …], notice ID, log [ID], faults [SCRIPT|off], help.
+fault ID [NAME=VALUE …], notice ID, log [ID], faults [SCRIPT|off], help,
+and for the shaft of a FEETECH servo block ID [LOW HIGH], push ID ANGLE,
+load ID PERCENT, release ID (of a KST servo load and release).
 
 What devices remark and tell no host, such as a number out of range, is said
 on stderr with its moment, in seconds from the start; --quiet leaves it out.

@@ -239,6 +239,7 @@ class SimulatedNode(Protocol):
     runs, as far as that makes sense, and gives all such switches as they are then; for an impossible name or value it
     raises RequestError and has changed nothing. `midway()`, when (s) the step by which it stores something is half
     done, infinity while it stores nothing: a power cut at that moment tears what is stored.
+    `block_shaft(between)`, `push_shaft(angle)`, `load_shaft(share)`, `release_shaft()` take rad, and 1 for full torque.
     """
 
     @property

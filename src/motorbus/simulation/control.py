@@ -32,7 +32,7 @@ LATEST = 20
 """Remarks of each node that `log` gives."""
 HELP = (
     "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | fault ID [NAME=VALUE …] | notice ID"
-    " | log [ID] | faults [SCRIPT|off] | help"
+    " | block ID [LOW HIGH] | push ID ANGLE | load ID PERCENT | release ID | log [ID] | faults [SCRIPT|off] | help"
 )
 
 
@@ -228,6 +228,48 @@ def _notice(simulator: Simulator, words: list[str]) -> str:
     return "ok"
 
 
+def _block(simulator: Simulator, words: list[str]) -> str:
+    form = "block ID [LOW HIGH]"
+    _expect(words, at_least=1, at_most=3, order=form)
+    block: Callable[[tuple[float, float] | None], None] = _able(
+        simulator, words[0], "block_shaft", "no physics for `block`"
+    )
+    if len(words) == 2:
+        raise RequestError(f"the order is: {form}")
+    block((_quantity(words[1], "position"), _quantity(words[2], "position")) if words[1:] else None)
+    return "ok"
+
+
+def _push(simulator: Simulator, words: list[str]) -> str:
+    _expect(words, at_least=2, at_most=2, order="push ID ANGLE")
+    push: Callable[[float], None] = _able(simulator, words[0], "push_shaft", "no physics for `push`")
+    push(_quantity(words[1], "position"))
+    return "ok"
+
+
+def _load(simulator: Simulator, words: list[str]) -> str:
+    _expect(words, at_least=2, at_most=2, order="load ID PERCENT")
+    load: Callable[[float], None] = _able(simulator, words[0], "load_shaft", "no physics for `load`")
+    load(_quantity(words[1], "load"))
+    return "ok"
+
+
+def _release(simulator: Simulator, words: list[str]) -> str:
+    _expect(words, at_least=1, at_most=1, order="release ID")
+    release: Callable[[], None] = _able(simulator, words[0], "release_shaft", "no physics for `release`")
+    release()
+    return "ok"
+
+
+def _quantity(text: str, quantity: str) -> float:
+    """A number with its unit. Raises RequestError without one."""
+    value = units.parse(text, quantity)
+    if text[-1] in "0123456789.":
+        example = "30deg or 0.5rad" if quantity == "position" else "50%"
+        raise RequestError(f"{text} has no unit", expected=f"a number with its unit, as {example}")
+    return value
+
+
 def _log(simulator: Simulator, words: list[str]) -> str:
     """Of nodes that have a `log`."""
     _expect(words, at_most=1, order="log [ID]")
@@ -262,6 +304,10 @@ _ORDERS: dict[str, Callable[[Simulator, list[str]], str]] = {
     "set-input": _set_input,
     "fault": _fault,
     "notice": _notice,
+    "block": _block,
+    "push": _push,
+    "load": _load,
+    "release": _release,
     "log": _log,
     "help": _help,
 }

@@ -167,7 +167,7 @@ class Body(ABC):
         self._carry(self.motion, None, inf, at)
 
     def go_freely(self, planned: Motion, torque: float, at: float) -> None:
-        """Do from this moment on as planned, with all of its torque: nothing from outside is in the way."""
+        """Do from this moment on as planned, with this torque: nothing from outside is in the way."""
         self._given = torque
         self._carry(planned, None, inf, at)
 
@@ -212,6 +212,8 @@ class Body(ABC):
 
     def duty(self, at: float) -> float:
         """The share of its supply that the motor gets at this moment, signed as the movement: FEETECH calls it load."""
+        if not self._given:
+            return 0.0  # limp, even when it is turned by hand
         if self.push is None and not self._world.torque:
             return self.model.drive.duty(self.motion.velocity(at))
         load = self._load(at)
@@ -219,6 +221,8 @@ class Body(ABC):
 
     def current(self, at: float) -> float:
         """A that it takes at this moment, signed as the effort."""
+        if not self._given:
+            return 0.0
         if self.push is None and not self._world.torque:
             return self.model.drive.current(self.motion.velocity(at))
         return self._load(at).current
@@ -239,7 +243,11 @@ class Body(ABC):
         self.motion, self.push, self._again = motion, push, again
         world, drive, calm = self._world, self.model.drive, False
         if push is None and not (world.torque and self._given):
-            calm = (not motion.phases and not motion.cruise) or self.protection.lets_run(motion, drive)
+            calm = (
+                not self._given
+                or (not motion.phases and not motion.cruise)
+                or self.protection.lets_run(motion, drive)
+            )
         self.protection.changed(at, None if calm else loads(motion, push, world, self._given, drive, at))
         self._tell()
 

@@ -76,7 +76,8 @@ _LIKE_SCS: Final = {
 }  # fmt: skip
 # Assumed: 60 degrees in 0.1 s, which are 2048 counts/s, and currents of a small servo.
 _SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
-_LEROBOT: Final = {"max_acceleration": 254}  # assumption: what lerobot (configure_motors) writes on these maps
+# assumption: what lerobot (configure_motors) writes to servos of these maps
+_LEROBOT: Final = {"max_acceleration": 254}
 _LEAST_SMS: Final = 100e-6  # FEETECH page on SMS servos: values of register 7 below 50 act as 50
 
 PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
@@ -96,7 +97,8 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             firmware=(2, 45),
             voltage=12.0,
             drive=_STS,
-            shipped={**_SMS, **_LEROBOT, "phase": 12, "torque_limit": 1000},  # phase as an STS ships: velocity in counts/s
+            # phase as an STS ships: velocity in counts/s
+            shipped={**_SMS, **_LEROBOT, "phase": 12, "torque_limit": 1000},
             least_delay=_LEAST_SMS,
             reversed_by=(0, 7),
             bridge_bit=5,

@@ -9,9 +9,11 @@ in `effects.py`: both know the servo, which knows neither.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import inf, tau
 
-from motorbus.core.plant import rest
+from motorbus.core import units
+from motorbus.core.plant import move, rest
+from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import motor, power
 from motorbus.families.feetech.simulator.body import Body
 from motorbus.families.feetech.simulator.memory import Layout
@@ -22,6 +24,9 @@ from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.table import Mode, alarms
 
 _VOLTAGE = 0x01
+_HAND_SPEED = 1.0
+"""rad/s of a limp shaft that is pushed. # assumption"""
+_LONGEST_PUSH = 10 * tau
 
 
 class Servo(Body):
@@ -139,9 +144,59 @@ class Servo(Body):
     def raw_position(self, counts: int) -> None:
         """Turn the shaft by hand, at rest afterwards."""
         now = self._now()
-        turned = self.facing * self.fold * (counts - self.raw_position)
+        turned = self._along * (counts - self.raw_position)
         self.motion = rest(now, round(self.motion.position(now)) + turned)
         self.stands(now)
+
+    def block_shaft(self, between: tuple[float, float] | None = None) -> None:
+        """Block the shaft where it is, or between two positions (rad). Raises RequestError when it is outside them."""
+        here = round(self.motion.position(self._now()))
+        if between is None:
+            self.blocked = here, here
+            return
+        first, last = (here + self._counts(angle) - self._along * self.raw_position for angle in between)
+        low, high = min(first, last), max(first, last)
+        if not low <= here <= high:
+            present = units.show(
+                self.raw_position * self.memory.layout.scales["present_position"], "position"
+            )
+            raise RequestError(f"the shaft is at {present}", expected="a range that contains this position")
+        self.blocked = low, high
+
+    def push_shaft(self, angle: float) -> None:
+        """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s; one with torque at once, and it returns."""
+        if abs(angle) > _LONGEST_PUSH:
+            raise RequestError(f"{units.show(angle, 'position')} is too far", expected="at most 10 turns")
+        now = self._now()
+        here = self.motion.position(now)
+        goal = here + self._counts(angle)
+        if self.blocked is not None:
+            goal = min(max(goal, self.blocked[0]), self.blocked[1])
+        if self.strong:
+            self.motion = rest(now, goal)
+            self.move(now)
+        else:
+            speed = abs(self._counts(_HAND_SPEED))
+            self.go_freely(move(now, here, goal, speed=speed, acceleration=10 * speed), 0.0, now)
+
+    def load_shaft(self, share: float) -> None:
+        """Let the outside take this share of the stall torque, -1 to 1; positive pushes towards smaller positions."""
+        if not -1.0 <= share <= 1.0:
+            raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
+        self.torque = self.facing * share
+
+    def release_shaft(self) -> None:
+        """End what block, push and load do."""
+        self.torque, self.blocked = 0.0, None
+
+    @property
+    def _along(self) -> int:
+        """Counts of the shaft for one count of a position, signed."""
+        return self.facing * self.fold
+
+    def _counts(self, angle: float) -> float:
+        """An angle (rad) in counts of the shaft."""
+        return self._along * angle / self.memory.layout.scales["present_position"]
 
     # What its supply does to it.
 

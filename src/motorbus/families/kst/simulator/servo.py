@@ -11,6 +11,7 @@ from math import inf, pi
 from typing import Final
 
 from motorbus.core.operation import CanFrame
+from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.simulator import objects
 from motorbus.families.kst.simulator.memory import REVERSE, Memory
@@ -204,6 +205,16 @@ class Servo:
     @load.setter
     def load(self, share: float) -> None:
         self._warmth.follow(share, self._now())
+
+    def load_shaft(self, share: float) -> None:
+        """Let the outside take this share of the full torque, -1 to 1."""
+        if not -1.0 <= share <= 1.0:
+            raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
+        self.load = share
+
+    def release_shaft(self) -> None:
+        """End the load."""
+        self.load = 0.0
 
     def current(self, at: float) -> float:
         """The supply current in A, by the model that `motor` tells."""
