@@ -43,6 +43,13 @@ class Client:
     def write(self, node: int, address: int, data: list[int]) -> None:
         self._good(lambda: (None, *self.packets.writeTxRx(self.port, node, address, len(data), data)))
 
+    def write_once(self, node: int, address: int, data: list[int]) -> None:
+        """As lerobot's `_write`: one try; the SDK drops a reply from another id. It waits 2 s, for a busy machine."""
+        self.port.setPacketTimeout = lambda count: self.port.setPacketTimeoutMillis(2000)
+        result, error = self.packets.writeTxRx(self.port, node, address, len(data), data)
+        if result != sdk.COMM_SUCCESS or error:
+            raise OSError(f"write to {node}: {self.packets.getTxRxResult(result)} alarm byte {error}")
+
     def sync_read(self, nodes: list[int], address: int, count: int) -> list[list[int]]:
         group = sdk.GroupSyncRead(self.port, self.packets, address, count)
         for node in nodes:

@@ -22,6 +22,7 @@ import pytest
 
 import motorbus
 from motorbus import feetech
+from motorbus.cli.simulated import Simulated
 
 T = TypeVar("T")
 
@@ -32,6 +33,7 @@ NODES = [1, 2, 3, 4, 5, 6]
 IDENTITY = [3, 10, 0, 9, 3]
 MIDDLE = 2048
 GOAL, POSITION, MOVING, ACCELERATION, TORQUE_LIMIT = 42, 56, 66, 41, 48
+ID, BAUD, RETURN_DELAY, TORQUE, LOCK, MAX_ACCELERATION = 5, 6, 7, 40, 55, 85
 
 
 class Library(NamedTuple):
@@ -214,6 +216,22 @@ def test_what_we_write_is_there_for_the_others(port: str, library: Library, othe
             patiently(partial(servo.write, torque_limit=0.1 * servo.node))
     with Peer(library, port) as peer:
         assert peer.sync_read(NODES, TORQUE_LIMIT, 2) == [pair(100 * node) for node in NODES]
+
+
+@pytest.mark.parametrize("target", [2, 3, 4, 5, 6])
+def test_lerobots_set_up_of_a_new_servo_with_the_sdk(tmp_path: Path, target: int) -> None:
+    """The writes of lerobot 0.4.4: `setup_motor`, then `configure_motors`."""
+    with Simulated("feetech", ids="1", link=tmp_path / "bus"), Peer(SDK, str(tmp_path / "bus")) as peer:
+        assert peer.ping(1) == 777
+        for address in (TORQUE, LOCK):
+            peer.write_once(1, address, [0])
+        peer.write_once(1, ID, [target])
+        peer.write_once(target, BAUD, [0])
+        assert peer.ping(target) == 777
+        for address, value in ((RETURN_DELAY, 0), (MAX_ACCELERATION, 254), (ACCELERATION, 254)):
+            for one in (100, value):  # another value first, in case it ships with this one
+                peer.write_once(target, address, [one])
+                assert peer.read(target, address, 1) == [one]
 
 
 def test_the_sdk_buffers_a_write_and_starts_it(port: str) -> None:

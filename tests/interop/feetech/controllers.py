@@ -172,11 +172,8 @@ def _named(controller: str, kind: Kind) -> Iterator[Step]:
 
 def _identity(controller: str, kind: Kind) -> Iterator[Step]:
     """Id, rate and status return level: their change is felt at once."""
-    other = Raised("Parsing error")
     renamed: Memory = {(9, ID): [9], (8, ID): [8]}
-    yield Step(
-        (Call("controller", "write_id", (1, 9), other),), after={(9, ID): [9]}, why="id-answer id-unlocked"
-    )
+    yield Step((Call("controller", "write_id", (1, 9)),), after={(9, ID): [9]}, why="id-unlocked")
     yield Step((Call("controller", "sync_write_id", (NODES, [9, 8])),), after=renamed, why="id-unlocked")
     for name in (register.name for register in registers(controller) if register.address == BAUD):
         slow = {"baud_rate": 500_000}
@@ -269,9 +266,9 @@ def _renamed() -> Iterator[Step]:
     """Id and rate, each of another servo: no power cycle brings back what was stored."""
     patient = Call("bus", "set_timeout", (2.0,))
     own = kept("Sts3215")
-    change = Call("bus", "change_id", (own, 11, 9), Raised("Parsing error"))
-    why = "id-answer left-unlocked"
-    yield Step((patient, change), after={(9, ID): [9], (9, 55): [0]}, why=why, lasting=True)
+    change = Call("bus", "change_id", (own, 11, 9))
+    after: Memory = {(9, ID): [9], (9, 55): [0]}
+    yield Step((patient, change), after=after, why="left-unlocked", lasting=True)
     for node, (rate, (code, why)) in enumerate(RATES.items(), 12):
         change = Call("bus", "change_baudrate", (own, node, rate))
         status = {"baud_rate": REAL[code], "locked": False}

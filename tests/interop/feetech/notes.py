@@ -156,10 +156,6 @@ NOTES: Final[Mapping[str, Note]] = MappingProxyType(
             "One silent servo makes an exception of the whole SYNC READ.",
             "Those who answered are there, those missing are named.",
         ),
-        "id-answer": Note(
-            "A WRITE of the id is answered from the new id, which is taken for an error although it succeeded.",
-            "Either id is accepted. The simulator can do both: `id_ack`.",
-        ),
         "id-unlocked": Note(
             "The lock is not opened, so the new id is gone at the next power-up. SYNC WRITE can renumber many at once.",
             "`set_id` opens the lock, checks that nobody has the id, verifies and closes the lock again.",
@@ -226,7 +222,7 @@ NOTES: Final[Mapping[str, Note]] = MappingProxyType(
             "1.9.8.5); older tables have one word there.",
         ),
         "factory-register": Note(
-            "It has calls that write this register: acknowledged, and nothing changes.",
+            "It has calls that write this register: acknowledged, and nothing changes, but for 85 in the simulator.",
             "It is the factory's (FD 1.9.8.5) and cannot be written.",
         ),
         "unsigned": Note(

@@ -302,14 +302,14 @@ def _settable(register: Register, kind: Kind) -> bool:
 
 
 def _writes(register: Register, kind: Kind) -> list[bool]:
-    """For each of its bytes whether our table lets a write change it."""
+    """For each of its bytes whether a write changes it: what our table says, and 85, which lerobot writes too."""
     rows = {
         place: row
         for row in TABLES[kind.map].values()
         for place in range(row.address, row.address + row.size)
     }
     found = [rows.get(register.address + i) for i in range(register.size)]
-    return [row is not None and row.writable and row.storage is not Storage.FACTORY for row in found]
+    return [row is not None and (row.writable or row.name == "max_acceleration") for row in found]
 
 
 def _reading(register: Register, kind: Kind, sample: list[int] | None, why: str) -> Step:
