@@ -163,6 +163,8 @@ def simulate(
         mount = Mount(world, *places, pace=rate if pace else None, rate=rate, attendants=controls)
         faulted = _faulted(mount, world, script, controls)
         buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
+        gc.collect()  # before the ready line: the first request is answered without this delay
+        gc.freeze()  # hundreds of devices live as long as this; to look through them again and again makes replies late
         _ready(output, buses, family, sorted(simulator.nodes), ids)
         _serve(mount, stop, faulted, None if quiet else output)
         _ended(output, faulted)
@@ -196,8 +198,6 @@ def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[in
 
 def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> None:
     """Serve until told to stop, and say what the devices remark, if there is anything to say it on."""
-    gc.collect()
-    gc.freeze()  # hundreds of devices live as long as this; to look through them again and again makes replies late
     if output is None:
         mount.serve(stop)
         return
