@@ -16,7 +16,7 @@ from motorbus.bus.glide import glide, let_go
 from motorbus.bus.interruption import closed, foremost
 from motorbus.bus.run import Notify, Run
 from motorbus.bus.watch import Watch, ringer
-from motorbus.core.operation import UNLIKE, Exchange, Runnable
+from motorbus.core.operation import UNLIKE, Closed, Exchange, Runnable
 
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ class AsyncBus(BusFace):
             try:
                 if not (at_once := at_once or closed(caught, run.around)):
                     let_go(self.turns.lock)
-                run.interrupt(asyncio.CancelledError() if isinstance(caught, GeneratorExit) else caught)
+                run.interrupt(Closed() if isinstance(caught, GeneratorExit) else caught)
                 while not run.advance():
                     await self._turn(news) if not at_once else crank(self.link, self.turns, inf)
                 break

@@ -2,7 +2,8 @@
 
 A family's face is the module (or package) of its name in this folder. Apart from its own commands it may offer
 
-    move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, all begun in the same instant
+    move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, begun in the same instant where the
+                                                               family can; when one device is lost the others stop
     ping_everyone(bus)                                         the nodes that answer one broadcast
     budget_frames(family, node)                                what a loop says to a node ("read", "write"): for each
                                                                frame of that exchange all that it may be

@@ -38,7 +38,7 @@ PHRASES: Final[Mapping[str, str]] = {
     "limp=False writes": "`--no-limp` writes",
 }
 """What only a program that goes on can do -> what comes to the same where the program has ended."""
-_BUS: Final = re.compile(r"(`motorbus [^`\[]*?\b)BUS(?![#\w])")
+_BUS: Final = re.compile(r"(`motorbus [^`\[]*?\b)BUS(?!#\D|\w)")
 _CALL: Final = re.compile(r"\b([a-z_]+\()([^()]*)\)|\b[a-z_]+=True\b|\b[a-z_]+=\([^()]*\)")
 _FAULT: Final = re.compile(r"robot\.clear_fault\([^()]*\)(, or open the machine anew)?")
 """A fault lives in one process: in a shell there is nothing to clear, for it has ended with the command."""

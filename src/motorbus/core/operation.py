@@ -359,6 +359,10 @@ Operation: TypeAlias = Generator[Step, Any, T]
 Runnable: TypeAlias = "Generator[Step, Any, T] | Exchange[T]"
 
 
+class Closed(BaseException):
+    """Raised in an operation whose coroutine was closed: settings are given back, and no motion is ordered."""
+
+
 def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
     """Carry out `runnable`; an error of ours becomes the value, so that a loop can visit everyone."""
     try:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from motorbus.cli.several import carried_out, or_all_stop
 from motorbus.core.operation import ANY, Answer, Exchange, Rank, Together
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound
 from motorbus.families.feetech.driver.group import sync_writes, written_all
-from motorbus.families.feetech.driver.motion import move_block, way
+from motorbus.families.feetech.driver.motion import move_block, stops, way
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,10 +31,11 @@ def move_together(
     """All goals (rad by id) in one packet, so that all begin in the same instant; errors as `Servo.move` raises.
 
     Where a goal does not switch torque on by itself the switch travels with it, in a packet of their own for those
-    servos: one that starts anew in between never goes for the goal it wakes up with.
+    servos: one that starts anew in between never goes for the goal it wakes up with. When a servo does not answer
+    meanwhile the others stop.
     """
     servos = [driver.Servo(bus, node) for node in goals]
-    bus.run(_move_together(servos, list(goals.values()), velocity, acceleration, wait))
+    carried_out(bus, _move_together(servos, list(goals.values()), velocity, acceleration, wait))
 
 
 def _move_together(
@@ -51,14 +53,21 @@ def _move_together(
         yield from ask_bound(servo, servo.table)
         block = move_block(servo, servo.table, goal, velocity, acceleration)
         blocks.append(block._replace(under=servo.settings))
-    yield from written_all(list(sync_writes(servos, blocks)))
-    if wait:
-        arrivals = []
-        for servo, goal in zip(servos, goals, strict=True):
-            assert servo.table is not None
-            order = way(servo, servo.table, goal, velocity, acceleration)
-            arrivals.append(arrive(servo, servo.table, order))
-        yield from Together(arrivals)
+    written = written_all(list(sync_writes(servos, blocks)))
+    if not wait:
+        yield from written
+        return
+    arrivals = []
+    for servo, goal in zip(servos, goals, strict=True):
+        assert servo.table is not None
+        order = way(servo, servo.table, goal, velocity, acceleration)
+        arrivals.append(or_all_stop(arrive(servo, servo.table, order)))
+    yield from stops(_gone(written, arrivals), *servos)
+
+
+def _gone(written: Operation[None], arrivals: Sequence[Operation[None]]) -> Operation[None]:
+    yield from written
+    yield from Together(arrivals)
 
 
 def ping_everyone(bus: Bus) -> list[int]:

@@ -18,6 +18,7 @@ from motorbus.cli.kst.offers import (
     say,
 )
 from motorbus.cli.kst.servo import app
+from motorbus.cli.kst.together import move_together
 
 __all__ = [
     "COMMANDS",
@@ -27,6 +28,7 @@ __all__ = [
     "budget_frames",
     "identity",
     "meaning",
+    "move_together",
     "ping_everyone",
     "position",
     "provision",

@@ -11,10 +11,10 @@ from __future__ import annotations
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.operation import Effect, Goal, Operation
 from motorbus.errors import LimitExceeded, RequestError
-from motorbus.families.feetech.driver.arrival import arrive
+from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.motion import ON, finite, ordered, way
+from motorbus.families.feetech.driver.motion import ON, finite, ordered, stops, way
 from motorbus.families.feetech.driver.node import MANY_TURNS, Node
 from motorbus.families.feetech.driver.orders import DUTY, speed_goal, unheeded
 from motorbus.families.feetech.driver.pace import burst, ramp_of
@@ -114,7 +114,8 @@ def step(
     Torque goes on: on STS by itself, on SMBL by a packet that goes before. Never sent twice, for the servo would go
     twice as far: raises OutcomeUnknown when it was not acknowledged, and where it stands tells whether it went. With
     `wait` it returns when the servo has arrived, and the way is followed turn by turn; bounds, tolerance and errors as
-    in `move`. The limits of the servo should be 0 in this mode; what they do otherwise is not published.
+    in `move`. The limits of the servo should be 0 in this mode; what they do otherwise is not published. When the wait
+    is interrupted the servo goes on, for no goal means "stay" here: a note says so, and disable_torque() ends it.
     """
     finite(node, by, velocity, acceleration, tolerance, timeout)
     table = yield from asked_anew(node)
@@ -129,11 +130,15 @@ def step(
     row = table["present_position"]
     raw = yield from read_block(node, PRESENT, row.size, row.decode)
     start = float(node.value(row, raw))
-    yield from confirmed(node, block)
     move = way(node, table, start + goal, velocity, acceleration, tolerance, timeout)
     settings = node.settings
     turn = settings.turn * move.resolution if settings is not None and not settings.accumulates else None
-    yield from arrive(node, table, move._replace(start=start, turn=turn))
+    yield from stops(_stepped(node, table, block, move._replace(start=start, turn=turn)), node)
+
+
+def _stepped(node: Node, table: Table, block: Block, move: Move) -> Operation[None]:
+    yield from confirmed(node, block)
+    yield from arrive(node, table, move)
 
 
 def _step_block(

@@ -9,15 +9,18 @@ STS3215 memory table V3.6; measured on hardware by feetech-cli and servolab.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final
+from functools import partial
+from typing import Final, TypeVar
 
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.goal import torque_on
-from motorbus.core.operation import Effect, Operation, Pause, outcome
+from motorbus.core.interrupted import Moving, stopped_if_interrupted
+from motorbus.core.operation import Effect, Operation, Pause, Runnable, outcome
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
 from motorbus.families.feetech.driver.exchanges import Block, confirmed
+from motorbus.families.feetech.driver.feedback import position
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import position_goal, speed_goal
 from motorbus.families.feetech.driver.pace import burst, ramp_of
@@ -36,6 +39,8 @@ from motorbus.families.feetech.driver.rest import (
 )
 from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
 from motorbus.families.feetech.table import Mode
+
+T = TypeVar("T")
 
 TOLERANCE: Final = 0.05
 """rad; 32 counts of STS. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user
@@ -227,7 +232,8 @@ def move(
     back. On HLS the packet also bounds the current: by `current` (A), or as it was; 0 is never sent, and a servo that
     was found with 0 is reported (`Powerless`). Returns when the servo is in position within `tolerance` rad (None:
     0.05, or ten counts where these are more) and no longer moves; at once with `wait=False`. A servo of many turns
-    that tells its position within one is judged within that.
+    that tells its position within one is judged within that. When the wait is interrupted or cancelled the servo stops
+    and holds, and a note of the interruption says where; with `wait=False` it goes to its goal.
 
     Raises LimitExceeded when `to` is not a finite number (and the gate does outside the limits), RequestError in other
     than position mode, for an acceleration where the map has no register for it (SCS) or a current where it has none
@@ -238,12 +244,35 @@ def move(
     table = yield from asked_anew(node)
     yield from ask_bound(node, table, current)
     block = move_block(node, table, to, velocity, acceleration, current)
+    if not wait:
+        node.last_move = None
+        yield from _sent(node, table, block)
+        return
+    order = way(node, table, block.goals[0].value, velocity, acceleration, tolerance, timeout)
+    yield from stops(_gone(node, table, block, order), node)
+
+
+def stops(move: Runnable[T], *nodes: Node) -> Operation[T]:
+    """Order a move and wait for it; when that is interrupted the servos stop and hold. A limp one stays limp."""
+    devices = [Moving(node, partial(_stopped, node), partial(position, node)) for node in nodes]
+    return (yield from stopped_if_interrupted(move, *devices))
+
+
+def _stopped(node: Node) -> Operation[Promise | None]:
+    if (yield from outcome(is_limp(node))) is True:
+        return None
+    return (yield from stop(node))
+
+
+def _gone(node: Node, table: Table, block: Block, order: Move) -> Operation[None]:
+    yield from _sent(node, table, block)
+    yield from arrive(node, table, order)
+
+
+def _sent(node: Node, table: Table, block: Block) -> Operation[None]:
     yield from ordered(node, table, block)
     if not node.control.goal_switches_on:
         yield from surely_on(node)
-    if wait:
-        goal = block.goals[0].value
-        yield from arrive(node, table, way(node, table, goal, velocity, acceleration, tolerance, timeout))
 
 
 def way(

@@ -126,6 +126,7 @@ class Node:
     those (rad) that were given up to make a motor of it, where limits decide about that. `questions` are packets that
     were made to read it, with the reply due, by address and count; `kept` are exchanges that bring one quantity, each
     with the settings under which it was made, and `preparation` the one that brings all that the driver must know.
+    `last_move` identifies the move that was ordered last.
     `unsure` are the EEPROM cells that were written and
     may not be kept: what came in between may have closed the lock, behind which a write is obeyed and soon gone.
     """
@@ -143,6 +144,7 @@ class Node:
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
         self.pending: Pending | None = None
+        self.last_move: object = None
         self.bound: int | None = None
         self.former_limits: tuple[float, float] | None = None
         self.unsure: set[int] = set()

@@ -9,15 +9,18 @@ module.
 from __future__ import annotations
 
 from enum import Enum
+from functools import partial
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, changed
 from motorbus.core.goal import Goal, Stays, torque_on
+from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.operation import CanFrame, Effect, Exchange, Operation, Rank, Report
 from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
 from motorbus.families.kst.driver.exchanges import ABSENT, decided, meant, order, upload_row
+from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.refusals import above_zero
 
@@ -56,14 +59,24 @@ def move(
     In position is: two looks in a row within `tolerance` rad. Raises LimitExceeded when `to` is not a finite number,
     is outside the profile's range (nothing is sent then) or outside the travel limits of the servo, Stalled when it
     stays off its target, MotionError after `timeout` seconds (None: from the way). Where the profile has a start rule,
-    the start is sent first and reported as `Started`.
+    the start is sent first and reported as `Started`. When the wait is interrupted or cancelled the servo stops and
+    holds, and a note of the interruption says where; with `wait=False` it goes to its target.
     """
     raw = counts(node, to)
     _checked_waiting(node, tolerance, timeout)
-    yield from send_goal(node, (yield from goal_of(node, raw)))
-    if wait:
-        row = node.table["goal_position"]
-        yield from arrive(node, Move(float(row.to_value(raw)), tolerance, timeout))
+    goal = yield from goal_of(node, raw)
+    if not wait:
+        node.last_move = None
+        yield from send_goal(node, goal)
+        return
+    order = Move(goal.value, tolerance, timeout)
+    device = Moving(node, partial(stop, node), partial(position, node))
+    yield from stopped_if_interrupted(_gone(node, goal, order), device)
+
+
+def _gone(node: Node, goal: Goal, order: Move) -> Operation[None]:
+    yield from send_goal(node, goal)
+    yield from arrive(node, order)
 
 
 def goal_of(node: Node, raw: int) -> Operation[Goal]:

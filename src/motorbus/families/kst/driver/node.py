@@ -22,6 +22,7 @@ class Node:
 
     `at` is the arrival of its last answer on the link's clock (s); `limits` its travel limits in rad as last read,
     None when not read yet. `unsaved` names the rows that were written here and are not known to have been saved.
+    `last_move` identifies the move that was ordered last.
     `kept` are exchanges that bring one quantity, each with the id format (True: 29 bits) in which it asks.
     """
 
@@ -31,6 +32,7 @@ class Node:
         self.limits: tuple[float, float] | None = None
         self.at = -inf
         self.unsaved: set[str] = set()
+        self.last_move: object = None
         self.kept: Final[dict[str, tuple[bool, Exchange[Any]]]] = {}
 
     @property

@@ -1,0 +1,42 @@
+"""Moves of several devices at once: when one of the devices is lost, the others stop."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from motorbus.errors import MotionError, MotorbusError
+
+if TYPE_CHECKING:
+    from motorbus.bus.pump import Bus
+    from motorbus.cli.dry import DryBus
+    from motorbus.core.operation import Operation, Runnable
+
+T = TypeVar("T")
+
+
+class _Lost(BaseException):
+    """Ends the moves beside the one that failed, as an interruption does."""
+
+    def __init__(self, error: MotorbusError) -> None:
+        super().__init__(error.summary)
+        self.error = error
+
+
+def or_all_stop(move: Runnable[T]) -> Operation[T]:
+    """A move among several; an error of anything but its motion, as no reply, interrupts the others."""
+    try:
+        return (yield from move)
+    except MotionError:
+        raise
+    except MotorbusError as error:
+        raise _Lost(error) from None
+
+
+def carried_out(bus: Bus | DryBus, operation: Runnable[T]) -> T:
+    """Carry out an operation with such moves. Raises the error of the device that was lost, with all notes."""
+    try:
+        return bus.run(operation)
+    except _Lost as lost:
+        for note in getattr(lost, "__notes__", ()):
+            lost.error.add_note(note)
+        raise lost.error from None
