@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import math
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+import motorbus
+from motorbus.cli.simulated import Simulated
+from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
@@ -36,6 +46,71 @@ def test_several_are_moved_together_and_all_arrive(run: Run, arm: Simulation) ->
 def test_it_need_not_wait(run: Run, arm: Simulation) -> None:
     (one,) = run("move", f"{arm.url}#1=1", "--no-wait", "--json").document["devices"]
     assert one["present"] == pytest.approx(math.pi, abs=0.05)
+
+
+class Unplugging(PerfectLine):
+    """Unplugs a node 0.6 s from the first frame on."""
+
+    def __init__(self, simulation: Simulation, node: int) -> None:
+        self.simulation, self.node, self.first = simulation, node, -1.0
+
+    def carry(self, sender: Side, data: object, at: float) -> list[Delivery]:
+        self.first = at if self.first < 0 else self.first
+        if at > self.first + 0.6:
+            self.simulation[self.node].unplug()
+        return super().carry(sender, data, at)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3])
+@pytest.mark.parametrize("family", ["feetech", "kst"])
+def test_one_that_is_lost_ends_the_move_of_all_within_a_second(family: str, lost: int, run: Run) -> None:
+    options: dict[str, Any] = {"speed": 0.5} if family == "kst" else {}
+    bounds = [] if family == "kst" else ["--velocity", "0.5"]
+    with motorbus.simulate(family, ids="1-3", **options) as sim:
+        start = run("read", f"{sim.url}#1", "--json").document["position"]
+        sim.line, begun = Unplugging(sim, lost), sim.now
+        ran = run("move", f"{sim.url}#1+2+3={start + 0.7}", *bounds)
+        assert (ran.code, sim.now - begun < 1.6) == (5, True)
+        assert f"error: node {lost} did not answer" in ran.err
+        assert f"note: #{lost} may still be moving: " in ran.err
+        assert f"`motorbus stop {sim.url}#{lost}` stops it" in ran.err
+        for node in {1, 2, 3} - {lost}:
+            sim.wait(sim.now + 2)
+            place = run("read", f"{sim.url}#{node}", "--json").document["position"]
+            assert 0.1 < place - start < 0.6
+            assert f"note: #{node}: holds at {place:.4f} rad" in ran.err
+
+
+def wait_until_moved(control: Path, counts: int) -> None:
+    """Return when the simulated servo 1 is this many counts away from where it is first seen."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(str(control))
+        seen: list[int] = []
+        with line.makefile("rw", encoding="utf-8") as stream:
+            while not seen or abs(seen[-1] - seen[0]) < counts:
+                print("status", file=stream, flush=True)
+                seen.append(json.loads(stream.readline())["nodes"][0]["raw_position"])
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_device_and_the_note_says_where_it_holds(
+    number: signal.Signals, run: Run, tmp_path: Path, state_folder: Path, patient: None
+) -> None:
+    link, control = tmp_path / "bus", tmp_path / "control"
+    with Simulated("feetech", link=link, control=str(control)) as simulated:
+        device = f"{simulated.bus}#1"
+        words = ["move", f"{device}=260deg", "--velocity", "10deg/s"]
+        command = [sys.executable, "-m", "motorbus.cli", *words]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as mover:
+            wait_until_moved(control, 50)
+            mover.send_signal(number)
+            _, said = mover.communicate()
+        places = [run("read", device, "--json").document["position"] for _ in range(5)]
+        shown = f"{places[0]:.4f} rad ({math.degrees(places[0]):.1f}°)"
+        assert (mover.returncode, said) == (10, f"error: cancelled\n  note: #1: holds at {shown}\n")
+        assert places == [places[0]] * 5
+        assert run(*words, "--no-wait").code == 0
+        wait_until_moved(control, 50)
 
 
 def test_a_long_way_needs_agreement(run: Run, arm: Simulation) -> None:
