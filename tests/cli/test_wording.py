@@ -104,7 +104,7 @@ def test_the_bus_of_a_command_that_is_named_is_the_one_at_hand(said: str, meant:
 
 
 def test_after_an_emergency_stop_a_shell_is_told_to_begin_again() -> None:
-    error = verdict.latched()
+    error = verdict.latched("in this process")
     wording.in_words_of_the_shell(error, families.load("stepper"))
     assert error.advice == "when it is safe, give the command again, for the stop has ended this one"
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from motorbus.bus.look import questions
 from motorbus.bus.statistics import Statistics
-from motorbus.bus.stop import StopOutcome, Stopper
+from motorbus.bus.stop import StopOutcome, Stopper, asked_by
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
 from motorbus.core.family import Family, Readdressed
@@ -214,7 +214,7 @@ class BusFace:
     def latch(self) -> None:
         """Refuse motion and torque until `reset`, as an emergency stop that was given elsewhere; sends nothing."""
         with self.turns.lock:
-            self.turns.latch(self.link.now())
+            self.turns.latch(self.link.now(), asked_by())
             self.turns.stopped()
 
     def reset(self) -> None:

@@ -15,7 +15,10 @@ import atexit
 import contextlib
 import json
 import os
+import shlex
 import socket
+import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
@@ -31,12 +34,14 @@ from motorbus.core.family import Stop
 from motorbus.core.operation import Answer, Exchange, Timeout, Tune
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.link.base import Link
+from motorbus.link.lock import program_name
 
 ROUNDS = 5
 TRIES = 3  # of a stop that is interrupted
 ROUND_TIME = 0.25  # s for all frames of one round, beyond what they need
 BREATH = 0.05  # s; the shortest round after which something is missing
 CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
+COMMAND_SHOWN = 60  # characters of a command line in the message of the stop it asked for
 PATIENCE = 5.0  # s that a caller waits for the stop thread
 STOP, END = b"!", b"."  # what wakes the thread
 
@@ -56,6 +61,11 @@ class Wish:
     def __init__(self) -> None:
         self.outcome: StopOutcome | None = None
         self.fulfilled = Event()
+
+
+def asked_by(client: str = "") -> str:
+    """Which process asked for a stop, and the local time, for the errors of what is refused after it."""
+    return f"{f'by {client}' if client else 'in this process'} at {time.strftime('%H:%M:%S')}"
 
 
 def _no_thread() -> LinkError:
@@ -143,13 +153,13 @@ class Stopper:
             raise interruption
         return outcome
 
-    def _insist(self) -> tuple[StopOutcome, BaseException | None]:
+    def _insist(self, client: str = "") -> tuple[StopOutcome, BaseException | None]:
         caught: BaseException | None = None
         for _ in range(TRIES):
             try:
                 if caught is not None:
                     self._let_go()
-                return self._stop(), caught
+                return self._stop(asked_by(client)), caught
             except BaseException as interruption:  # dealt with above, where another one is caught too
                 caught = interruption
         self._let_go()
@@ -166,9 +176,9 @@ class Stopper:
     def _nothing(self, promise: str) -> StopOutcome:
         return StopOutcome((), tuple(self.turns.known), 0, promise)
 
-    def _stop(self) -> StopOutcome:
+    def _stop(self, by: str) -> StopOutcome:
         with self.turns.lock:
-            frames = self.turns.latch(self.link.now())
+            frames = self.turns.latch(self.link.now(), by)
         self._back_to_known_rate()
         acknowledged: list[int] = []
         rounds = 0
@@ -316,9 +326,9 @@ class Stopper:
             self._stop_and_tell()
         return END in words
 
-    def _stop_and_tell(self) -> StopOutcome:
+    def _stop_and_tell(self, client: str = "") -> StopOutcome:
         wishes, self._wishes = self._wishes, []
-        self.outcome = outcome = self._insist()[0]
+        self.outcome = outcome = self._insist(client)[0]
         for wish in wishes:  # who asked after that has woken the thread once more
             wish.outcome = outcome
             wish.fulfilled.set()
@@ -327,8 +337,9 @@ class Stopper:
     def _asked(self, client: socket.socket) -> None:
         with contextlib.suppress(OSError), client:
             client.settimeout(CLIENT_TIME)
-            if client.recv(64).strip() == b"estop":
-                outcome = self._stop_and_tell()
+            word, _, about = client.recv(4096).strip().partition(b" ")
+            if word == b"estop":
+                outcome = self._stop_and_tell(_client(about))
                 client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
 
     def close(self) -> None:
@@ -342,6 +353,23 @@ class Stopper:
             self._thread.join(PATIENCE)
         for end in self._pair or ():
             end.close()
+
+
+def _client(about: bytes) -> str:
+    """Who asks over the socket: "process 12 (motorbus estop)"; "another process" where it does not say."""
+    try:
+        said = json.loads(about)
+        pid, command = int(said["pid"]), str(said["command"])
+    except Exception:  # whatever it says, it asks for a stop
+        return "another process"
+    command = command if len(command) <= COMMAND_SHOWN else f"{command[:COMMAND_SHOWN]}…"
+    return f"process {pid} ({command})"
+
+
+def _request() -> bytes:
+    """What a client sends: the word, its process id and its command line."""
+    command = shlex.join([program_name(), *sys.argv[1:]])[: 2 * COMMAND_SHOWN]
+    return f"estop {json.dumps({'pid': os.getpid(), 'command': command})}\n".encode()
 
 
 @contextlib.contextmanager
@@ -370,12 +398,25 @@ def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
 
     Raises PortNotFound when nobody serves it, LinkError when the process does not answer in time.
     """
+    reply = _ask(path, _request(), timeout) or _ask(path, b"estop\n", timeout)  # as older versions know it
+    if not reply.endswith(b"\n"):
+        raise LinkError("the process that holds the bus ended without answering", received=reply)
+    outcome = json.loads(reply)
+    return StopOutcome(
+        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
+    )
+
+
+def _ask(path: Path, request: bytes, timeout: float) -> bytes:
+    """Send one request to the process that serves this socket; its reply, b"" where it hangs up without one."""
     with socket.socket(socket.AF_UNIX) as client:
         client.settimeout(timeout)
         try:
             client.connect(str(path))
-            client.sendall(b"estop\n")
-            reply = client.makefile("rb").readline()
+            client.sendall(request)
+            return client.makefile("rb").readline()
+        except (ConnectionResetError, BrokenPipeError):
+            return b""
         except (FileNotFoundError, ConnectionRefusedError):
             raise PortNotFound(
                 "no motorbus process offers an emergency stop for this bus",
@@ -383,9 +424,3 @@ def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
             ) from None
         except OSError as error:
             raise LinkError(f"the process that holds the bus did not answer: {error}") from error
-    if not reply.endswith(b"\n"):
-        raise LinkError("the process that holds the bus ended without answering", received=reply)
-    outcome = json.loads(reply)
-    return StopOutcome(
-        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
-    )

@@ -64,6 +64,7 @@ class Turns(Absence, Straight, Silence, Air):
         self.look: Look | None = None
         self.chores: list[Callable[[], None]] = []  # what else whoever pumps does; see `background`
         self.latched = self.stopping = False
+        self.latched_by = ""
         self._queues: tuple[deque[Flight | Retune], ...] = tuple(deque() for _ in Rank)
         self._timers: list[Timer | Listener] = []
         self._claims = Claims()
@@ -79,7 +80,7 @@ class Turns(Absence, Straight, Silence, Air):
                 return
             exchange, rank = ticket.exchange, ticket.exchange.rank
             if self.latched and exchange.effect in GATED and rank is not Rank.STOP:
-                self._settle(ticket, error=verdict.latched())
+                self._settle(ticket, error=verdict.latched(self.latched_by))
                 return
             if rank is Rank.STOP:
                 self._withdraw(exchange)
@@ -348,8 +349,12 @@ class Turns(Absence, Straight, Silence, Air):
                 moment = ticket.deadline
         return moment
 
-    def latch(self, now: float) -> Stop:
-        """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`."""
+    def latch(self, now: float, by: str = "in this process") -> Stop:
+        """Emergency stop: drop what waits, let the rest of a reply pass, refuse motion until `reset`.
+
+        `by` says in errors which process asked for the stop, and when. The first one counts until `reset`.
+        """
+        self.latched_by = self.latched_by if self.latched else by
         self.latched = self.stopping = True
         with contextlib.suppress(Exception):  # if it fails, the frames made before, without positions, do
             self.known.frames = self.family.stop(self.known.fresh(now))
@@ -357,14 +362,14 @@ class Turns(Absence, Straight, Silence, Air):
             for ticket in list(queue):
                 if isinstance(ticket, Flight) and ticket.exchange.effect not in KEPT:
                     queue.remove(ticket)
-                    self._settle(ticket, error=verdict.latched())
+                    self._settle(ticket, error=verdict.latched(self.latched_by))
         for flight in self.flying.values():
             rest = rest_of(flight, self.family, self.rate, now)
             flight.deadline = min(flight.deadline, now + rest + self.latency)
             flight.abandoned = True
-            self._settle(flight, error=verdict.latched())
+            self._settle(flight, error=verdict.latched(self.latched_by))
         for idle in (*self._timers, *self._claims.outside()):
-            self._settle(idle, error=verdict.latched())
+            self._settle(idle, error=verdict.latched(self.latched_by))
             self.abandon(idle)
         return self.known.frames
 

@@ -119,11 +119,10 @@ def _received(flight: Flight) -> bytes:
     return b"".join([*noise, *(reply.data for reply in flight.got.values())])
 
 
-def latched() -> Interrupted:
-    """The error for whatever an emergency stop drops or refuses."""
+def latched(by: str) -> Interrupted:
+    """The error for whatever an emergency stop drops or refuses; `by` says which process asked for it, and when."""
     return Interrupted(
-        "the bus is stopped: an emergency stop is latched",
-        cause="estop() was called, here or by `motorbus estop` from another process",
+        f"the bus is stopped: emergency stop latched {by}",
         advice="when it is safe, call reset() on the bus, in the process that owns it",
     )
 

@@ -32,7 +32,6 @@ COMMANDS: Final[Mapping[str, str]] = {
 PHRASES: Final[Mapping[str, str]] = {
     "see to it, then reset the fault": "see to it, then give the order again",
     "call reset() on the bus, in the process that owns it": "give the command again, for the stop has ended this one",
-    "estop() was called, here or by": "it was stopped, here or by",
     "whose device has train": "whose device can be led in a loop",
     "whose device has disable torque": "whose device can be let go",
     "limp=False writes": "`--no-limp` writes",
