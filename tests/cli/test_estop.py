@@ -9,9 +9,10 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -96,7 +97,7 @@ def torque(bus: str) -> list[float]:
 @pytest.mark.parametrize("named", [True, False], ids=["named", "every bus"])
 def test_a_program_that_loops_is_stopped(named: bool, served: Simulated, run: Run) -> None:
     with program(LOOPING, served.bus) as process:
-        ran = run("estop", *([served.bus] if named else []), "--json")
+        ran = run("estop", served.bus if named else "--all", "--json")
         assert process.stdout is not None
         assert LATCHED.search(process.stdout.readline())
     assert ran.code == 0
@@ -150,9 +151,10 @@ def test_a_bus_that_nobody_holds_is_stopped_from_here(served: Simulated, run: Ru
     with motorbus.open(served.bus) as bus:
         for node in (1, 2, 3):
             motorbus.feetech.Servo(bus, node).enable_torque()
-    ran = run("estop", served.bus)
+    ran = run("estop", f"{served.bus}#1-3")
     assert (ran.code, ran.err) == (0, "")
     assert "sags or falls" in ran.out
+    assert "silent" not in ran.out
     assert torque(served.bus) == [0, 0, 0]
 
 
@@ -179,10 +181,26 @@ def test_a_stop_that_nobody_acknowledged_promises_nothing(devices: str, silent: 
 
 def test_who_can_acknowledge_is_said_where_nobody_was_named(run: Run) -> None:
     ran = run("estop", "feetech:sim,ids=1-6")
-    assert ran.code == 0
+    assert ran.code == 6
     assert "acknowledged by #1\n" in ran.out
     assert "only devices that are named" in ran.out
-    assert "only devices" not in run("estop", "feetech:sim,ids=1-6#1-6").out
+    assert "others not asked, broadcast sent" in ran.out + ran.err
+    assert "silent" not in ran.out
+    ran = run("estop", "feetech:sim,ids=1-6#1-6")
+    assert ran.code == 0
+    assert "only devices" not in ran.out
+
+
+@pytest.mark.parametrize(("device", "asked", "code"), [("#1", [1], 6), ("", [1, 2, 3], 0)])
+def test_devices_of_the_machine_file_that_were_not_asked_are_counted(
+    device: str, asked: list[int], code: int, bench: Bench, run: Run
+) -> None:
+    ran = run("estop", f"{bench.simulations['arm'].url}{device}", "--json")
+    (stop,) = ran.document["buses"]
+    assert (ran.code, stop["acknowledged"]) == (code, asked)
+    assert stop["not_asked"] == [node for node in (1, 2, 3) if node not in asked]
+    if code:
+        assert "2 not asked, broadcast sent" in ran.err
 
 
 def test_a_stop_that_some_acknowledged_says_so_to_programs(run: Run) -> None:
@@ -197,6 +215,44 @@ def test_a_foreign_program_is_named(served: Simulated, run: Run) -> None:
         ran = run("estop", served.bus)
     assert ran.code == 4
     assert str(process.pid) in ran.err
+
+
+@pytest.mark.parametrize("everything", [False, True], ids=["bare", "--all"])
+def test_without_a_bus_real_ports_and_the_machine_file_are_stopped_and_the_others_named(
+    everything: bool, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, patient: None
+) -> None:
+    def serving(name: str) -> Simulated:
+        way: dict[str, Any] = {"tcp": "0"} if name == "tcp" else {"link": tmp_path / name}
+        return Simulated("feetech", ids="1", **way)
+
+    with ExitStack() as stack:
+        monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "foreign"))
+        real = stack.enter_context(
+            serving("real")
+        )  # its simulator is unknown here, so the port counts as real
+        monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+        of_file, link, socket = (stack.enter_context(serving(name)) for name in ("file", "link", "tcp"))
+        here(f'[bus.arm]\naddress = "{of_file.bus}"\n', tmp_path, monkeypatch)
+        buses = [one.bus for one in (real, of_file, link, socket)]
+        holders = [stack.enter_context(program(WATCHING, bus)) for bus in buses]
+        ran = run("estop", *["--all"] * everything, "--json")
+        text = run("estop", *["--all"] * everything)
+    stopped = {one["by"].split()[1] for one in ran.document["buses"] if one["acknowledged"]}
+    left = {one["by"].split()[1] for one in ran.document["not_stopped"]}
+    assert stopped == {str(one.pid) for one in (holders if everything else holders[:2])}
+    assert left == {str(one.pid) for one in ([] if everything else holders[2:])}
+    assert text.out.count("not stopped: simulated") == len(left)
+    assert text.out.count("`--all` stops it too") == len(left)
+
+
+def test_where_only_simulated_buses_are_open_nothing_is_stopped_and_all_is_the_hint(
+    served: Simulated, run: Run
+) -> None:
+    with program(WATCHING, served.bus) as process:
+        ran = run("estop")
+    assert (ran.code, ran.out) == (2, "")
+    assert f"held by process {process.pid}" in ran.err
+    assert "`motorbus estop --all`" in ran.err
 
 
 def test_without_a_bus_there_must_be_one(run: Run) -> None:
@@ -232,7 +288,7 @@ def test_a_broken_machine_file_keeps_nobody_from_being_stopped(
 ) -> None:
     here("no machine", tmp_path, monkeypatch)
     with program(HANGING, served.bus):
-        ran = run("estop", "--json")
+        ran = run("estop", "--all", "--json")
     assert ran.code == 6
     assert set(ran.document["buses"][0]["acknowledged"]) == {1, 2, 3}
     assert "the file is no TOML" in ran.err
@@ -307,7 +363,7 @@ def test_a_suspended_process_is_named_and_the_supply_is_what_is_left(
     with program(WATCHING, served.bus) as process:
         process.send_signal(signal.SIGSTOP)
         try:
-            one, every = run("estop", served.bus), run("estop")
+            one, every = run("estop", served.bus), run("estop", "--all")
         finally:
             process.send_signal(signal.SIGCONT)
     for ran in (one, every):

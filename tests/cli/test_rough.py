@@ -208,7 +208,7 @@ def test_a_bus_is_stopped_without_an_axis_that_can_be_seen(command: str, bench: 
     bench.file.write_text(text[: text.index("[axis.")] + "[axis.a1]\ndevice =", encoding="utf-8")
     ran = run(command, "arm", "--json")
     assert ran.code == 6
-    assert "all; seen were arm" in ran.err
+    assert "who can be seen in a file with an error" in ran.err
     if command == "stop":
         assert [one["id"] for one in ran.document["devices"] if one["done"]] == [1, 2, 3]
     else:

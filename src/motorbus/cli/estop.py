@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 
 from motorbus.cli import faces
 from motorbus.cli.exits import Exit, Partial
+from motorbus.cli.line import same_line
 from motorbus.cli.machine import is_name
 from motorbus.cli.output import Output
 from motorbus.cli.rough import beside_others, forgiving, readable, together, understood
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
 BY_HAND: Final = "cut the power by hand"
+NAME_THEM: Final = "name the devices, as BUS#1-6, and each is asked; or cut the power by hand"
+ALL: Final = "acknowledged by all known"
 
 app = App(
     name="estop",
@@ -44,11 +47,14 @@ but only devices that are named (BUS#1-6), or known because they answered
 before, can acknowledge it. Ends with exit code 0 when all of them did, 6 when
 some did, 5 when nobody did, or the process that holds the bus does not answer,
 3 where the ports are gone. A port that a foreign program holds cannot be
-reached: the error names that program, and the code is 4. Without BUS, every
-bus that a motorbus process of yours holds is stopped, and those of the machine
-file if there is one. By its names, a group or an axis stops its whole buses. A
-line of the file that cannot be understood keeps no other bus from being
-stopped: exit code 6.
+reached: the error names that program, and the code is 4. Devices that were not
+asked are counted: they got the broadcast and confirmed nothing, exit code 6.
+
+Without BUS, every open bus on a real port is stopped, and every bus of the
+machine file, simulated or not. Other simulated buses that are open are named
+and not stopped; --all stops them too. By its names, a group or an axis stops
+its whole buses. A line of the file that cannot be understood keeps no other
+bus from being stopped: exit code 6.
 
 From here KST servos must say where they are before they can be held there. On
 a bus without ids everyone is asked who is there first, and the answers are
@@ -68,6 +74,7 @@ def estop(
     bus: Annotated[str, Parameter(name="BUS[#ID]")] = "",
     /,
     *,
+    everything: Annotated[bool, Parameter(name="--all", negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -76,7 +83,9 @@ def estop(
     Parameters
     ----------
     bus
-        FAMILY:PORT or a name; every bus that a motorbus process holds, or of the machine file, when left out.
+        FAMILY:PORT or a name; every open bus on a real port, and those of the machine file, when left out.
+    everything
+        Stop every other open bus too, also simulated ones.
     options
         Any option of the bus string, as a flag.
     """
@@ -86,14 +95,18 @@ def estop(
         if bus and not wanted:
             raise together(list(unclear.values()))
         failures: list[MotorbusError] = []
-        stops = (
-            _stop_each(wanted, options, output, failures)
-            if bus
-            else _stop_all(wanted, options, output, unclear, failures)
-        )
-        output.document("motorbus.estop/1", {"buses": stops})
+        stops: list[dict[str, Any]] = []
+        left: list[dict[str, Any]] = []
+        if everything or not bus:
+            left = _stop_open(wanted, options, stops, failures, everything=everything)
+        stops += _stop_each(wanted, options, output, failures)
+        output.document("motorbus.estop/1", {"buses": stops, "not_stopped": left})
         for one in stops:
             output.text("\n  ".join(_lines(one)))
+        if not stops:
+            raise together([*unclear.values(), _nothing_to_stop(left)])
+        for one in left:
+            output.text(f"{one['bus']}: not stopped: simulated, held by {one['by']}; `--all` stops it too")
         return _verdict(stops, unclear, failures)
 
 
@@ -116,7 +129,7 @@ def _wanted(words: Iterable[str]) -> tuple[list[Wanted], dict[str, RequestError]
     unclear: dict[str, RequestError] = {}
     for word in words:
         for one in _buses_of(word):
-            axes = understood(_axes_on(word, one.bus), {})
+            axes = understood(() if one.nodes else _axes_on(one.bus), {})
             unclear |= axes.unclear
             named = one.nodes or tuple(node for axis in axes.known for node in target(axis).nodes)
             before = found.get(one.bus, Wanted(one.bus, one.family, (), False))
@@ -137,23 +150,26 @@ def _buses_of(word: str) -> list[Target]:
     return []
 
 
-def _axes_on(word: str, bus: str) -> tuple[str, ...]:
-    """The axes on a bus that is called by its name."""
-    if not is_name(word):
-        return ()
+def _axes_on(bus: str) -> tuple[str, ...]:
+    """The axes of the machine file on this bus, whatever its port is called."""
     machine = readable()
-    return tuple(
-        axis
-        for axis, spec in machine.axes.items()
-        if word in machine.buses and machine.buses[spec.bus].address == bus
-    )
+    found = []
+    for axis, spec in machine.axes.items():
+        with suppress(RequestError):  # an address that is none
+            if same_line(machine.buses[spec.bus].address, bus):
+                found.append(axis)
+    return tuple(found)
 
 
 def _lines(one: dict[str, Any]) -> list[str]:
     heard = f"stop sent; acknowledged by {_list(one['acknowledged'], 'nobody')}"
-    by = f"by {one['by']}; silent: {_list(one['silent'])}"
-    more = [one["promise"], by, one["note"]]
+    silent = [f"silent: {_list(one['silent'])}"] if one["silent"] or not one["others"] else []
+    more = [one["promise"], "; ".join([f"by {one['by']}", *silent, *_others(one)]), one["note"]]
     return [f"{one['bus']}: {one['error'] or heard}", *(line for line in more if line)]
+
+
+def _others(one: Mapping[str, Any]) -> list[str]:
+    return [f"{len(one['not_asked']) or 'others'} {one['others']}"] if one["others"] else []
 
 
 def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
@@ -174,7 +190,10 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
     note = "" if wanted.nodes else "only devices that that process knows can acknowledge"
     if unknown:
         note = f"{by} does not know {_list(unknown)}, so it asked for no acknowledgement"
-    return _facts(wanted.bus, by, outcome._replace(silent=tuple(sorted(unheard))), note)
+    facts = _facts(wanted.bus, by, outcome._replace(silent=tuple(sorted(unheard))), note)
+    if wanted.family.link.only is None:
+        _count_others(facts, wanted, all_known=True)  # it knows every device that it moves
+    return facts
 
 
 def _ask(port: str, owner: Owner | None) -> StopOutcome:
@@ -204,7 +223,7 @@ def _unheard(port: str, owner: Owner | None, error: LinkError) -> NoReply:
 def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, Any]:
     """Nobody offers the stop: send it from here, then have each device that was named confirm it."""
     with opened(wanted.bus, options, output) as opening:
-        unmet = _meet(opening, wanted, output)
+        unmet, asked_all = _meet(opening, wanted, output)
         outcome = opening.estop()
         confirmed, silent = set(outcome.acknowledged), set(outcome.silent)
         for node in wanted.nodes:
@@ -215,26 +234,30 @@ def _stop_ourselves(wanted: Wanted, options: dict[str, str], output: Output) -> 
         acknowledged=tuple(sorted(confirmed)), silent=tuple(sorted(silent - confirmed))
     )
     note = "" if wanted.nodes else f"only devices that are named ({wanted.bus}#1-6) or known can acknowledge"
-    return _facts(wanted.bus, "this process", outcome, note)
+    facts = _facts(wanted.bus, "this process", outcome, note)
+    if opening.family.link.only is None and not asked_all:
+        _count_others(facts, wanted, all_known=bool(wanted.nodes))
+    return facts
 
 
-def _meet(opening: Bus, wanted: Wanted, output: Output) -> MotorbusError | None:
+def _meet(opening: Bus, wanted: Wanted, output: Output) -> tuple[MotorbusError | None, bool]:
     """Where a device can be stopped only at a place that is known, ask it, or everyone, where it is.
 
-    The error where everyone was asked and that failed: whoever is named is stopped all the same.
+    The error where everyone was asked and that failed: whoever is named is stopped all the same. And whether every
+    device of the bus was asked.
     """
     needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
     if not needs or not all(needs):
-        return None
+        return None, False
     _ask_where(opening, wanted.nodes)
     called = faces.offer(opening.family.name, "ping_everyone")
     try:
         found = called(opening) if called and wanted.others else ()
         found = found or (() if wanted.nodes else everyone(wanted.bus, opening, (), output))
     except MotorbusError as error:
-        return error
+        return error, False
     _ask_where(opening, [node for node in dict.fromkeys(found) if node not in wanted.nodes])
-    return None
+    return None, wanted.others
 
 
 def _ask_where(opening: Bus, nodes: Iterable[int]) -> None:
@@ -272,33 +295,45 @@ def _stop_each(
     return stops
 
 
-def _stop_all(
+def _stop_open(
     wanted: list[Wanted],
     options: dict[str, str],
-    output: Output,
-    unclear: Mapping[str, RequestError],
+    stops: list[dict[str, Any]],
     failures: list[MotorbusError],
+    *,
+    everything: bool,
 ) -> list[dict[str, Any]]:
-    """Every bus that a motorbus process holds, then those of the machine file that none of them holds."""
-    from motorbus.link.lock import holders, real_name
+    """Stop every bus that a motorbus process holds and `wanted` does not name; append what came of each to `stops`.
 
-    stops: list[dict[str, Any]] = []
-    held: set[str] = set()
-    for owner in holders():
-        held.add(real_name(owner.port))
+    Returns the simulated buses, which are left alone unless `everything` is asked for. Puts those in `wanted` that are
+    held before those that are to be opened.
+    """
+    from motorbus.link.lock import holders, is_simulated, real_name
+
+    owners = {real_name(owner.port): owner for owner in holders()}
+    wanted.sort(key=lambda one: _port(one.bus, options) not in owners)
+    left: list[dict[str, Any]] = []
+    for port in owners.keys() - {_port(one.bus, options) for one in wanted}:
+        owner = owners[port]
         by = f"process {owner.pid} ({owner.program})"
+        if is_simulated(owner.port) and not everything:
+            left.append({"bus": owner.port, "by": by, "simulated": True})
+            continue
         try:
             stops.append(_facts(owner.port, by, _ask(owner.port, owner)))
         except MotorbusError as error:
             failures.append(error)
             stops.append(_failed(owner.port, by, error))
-    mine = [one for one in wanted if _port(one.bus, options) not in held]
-    if not stops and not mine:
-        raise together([*unclear.values(), _nothing_to_stop()])
-    return stops + _stop_each(mine, options, output, failures)
+    return left
 
 
-def _nothing_to_stop() -> RequestError:
+def _nothing_to_stop(left: list[dict[str, Any]]) -> RequestError:
+    if left:
+        listed = ", ".join(f"{one['bus']} (simulated, held by {one['by']})" for one in left)
+        return RequestError(
+            f"no bus on a real port is open; not stopped: {listed}",
+            advice="`motorbus estop --all` stops simulated buses too; nothing was sent",
+        )
     return RequestError(
         "no motorbus process holds a bus",
         expected="BUS, as feetech:/dev/ttyACM0",
@@ -317,21 +352,33 @@ def _port(bus: str, options: dict[str, str]) -> str:
         return ""
 
 
+def _count_others(facts: dict[str, Any], wanted: Wanted, *, all_known: bool) -> None:
+    """Add which devices of the machine file were not asked, and what was sent to all that were not."""
+    broadcast = any(not exchange.replies for exchange in wanted.family.stop({}).exchanges)
+    known = [node for axis in understood(_axes_on(wanted.bus), {}).known for node in target(axis).nodes]
+    facts["not_asked"] = sorted({*known} - {*facts["acknowledged"], *facts["silent"]})
+    facts["others"] = "not asked, broadcast sent" if broadcast else "not asked, no stop sent"
+    if facts["acknowledged"] and (facts["not_asked"] or not all_known):
+        facts["outcome"] = "acknowledged by some"
+
+
 def _failed(bus: str, by: str, error: MotorbusError) -> dict[str, Any]:
-    heard = {"acknowledged": [], "silent": [], "promise": "", "note": ""}
+    heard = {"acknowledged": [], "silent": [], "not_asked": [], "others": "", "promise": "", "note": ""}
     return {"bus": bus, "by": by, "outcome": "failed", **heard, "error": error.summary}
 
 
 def _facts(bus: str, by: str, outcome: StopOutcome, note: str = "") -> dict[str, Any]:
     """What came of one stop, as plain data. A promise is one of those who acknowledged; nobody, no promise."""
-    some = "some" if outcome.silent else "all known"
-    reached = some if outcome.acknowledged else "nobody"
+    some = "acknowledged by some" if outcome.silent else ALL
+    reached = some if outcome.acknowledged else "acknowledged by nobody"
     return {
         "bus": bus,
         "by": by,
-        "outcome": f"acknowledged by {reached}" if outcome.rounds else "failed",
+        "outcome": reached if outcome.rounds else "failed",
         "acknowledged": sorted(outcome.acknowledged),
         "silent": sorted(outcome.silent),
+        "not_asked": [],
+        "others": "",
         "promise": outcome.promise if outcome.acknowledged else "",
         "note": note,
         "error": "" if outcome.rounds else "no stop was sent",
@@ -347,7 +394,7 @@ def _verdict(
 ) -> Exit:
     lost = beside_others(list(unclear.values()))
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
-    missing = [one for one in stops if not one["error"] and (one["silent"] or not one["acknowledged"])]
+    missing = [one for one in stops if not one["error"] and one["outcome"] != ALL]
     silent = [f"{one['bus']}: {_missing(one)}" for one in missing]
     told = "; ".join([*failed, *silent, *(error.summary for error in lost)])
     if failed and len(failed) == len(stops):
@@ -355,14 +402,17 @@ def _verdict(
     if not any(one["acknowledged"] for one in stops):
         raise NoReply(told, advice=BY_HAND)
     if told:
-        by_hand = [BY_HAND] if failed or silent else []
+        unasked = not any(one["silent"] or not one["acknowledged"] for one in missing)
+        by_hand = [NAME_THEM if unasked and not failed else BY_HAND] if failed or silent else []
         raise Partial(told, advice="; ".join(dict.fromkeys([*by_hand, *(error.advice for error in lost)])))
     return Exit.OK
 
 
 def _missing(one: Mapping[str, Any]) -> str:
+    if one["acknowledged"] and not one["silent"]:
+        return "; ".join(_others(one))
     why = f" ({one['note']})" if one["silent"] and one["note"] else ""
-    return f"no acknowledgement from {_list(one['silent'], 'anybody')}{why}"
+    return f"no acknowledgement from {_list(one['silent'], 'any device')}{why}"
 
 
 def _all_failed(failures: list[MotorbusError], told: str) -> MotorbusError:

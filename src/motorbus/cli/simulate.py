@@ -20,6 +20,7 @@ from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
+from motorbus.link.lock import served_by_simulator
 from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
@@ -250,6 +251,7 @@ def _bytes(stack: ExitStack, ways: Ways) -> tuple[Place, str]:
         raise RequestError("a serial line is served on --link or on --tcp, not on both")
     if ways.tcp:
         listener = stack.enter_context(closing(TcpListener(*parse_endpoint(ways.tcp))))
+        stack.enter_context(served_by_simulator(listener.url))
         return listener, listener.url
     terminal = stack.enter_context(closing(PtyMaster()))
     if ways.link is None:
@@ -268,11 +270,14 @@ def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tup
         yield CanClient(terminal, SlcanAdapter()), f"can://slcan{name}"
     if ways.tcp:
         door = Door(TcpPort(*parse_endpoint(ways.tcp)), SlcanAdapter)
+        stack.enter_context(served_by_simulator(f"socket://{door.port.address}"))
         yield stack.enter_context(closing(door)), f"can://slcan/socket://{door.port.address}"
     if ways.socketcand:
         epoch = time.time() - time.monotonic()
         door = Door(TcpPort(*parse_endpoint(ways.socketcand)), lambda: SocketcandAdapter(epoch=epoch))
-        yield stack.enter_context(closing(door)), f"can://socketcand/{door.port.address}/can0"
+        url = f"can://socketcand/{door.port.address}/can0"
+        stack.enter_context(served_by_simulator(url))
+        yield stack.enter_context(closing(door)), url
     if ways.can:
         yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
 

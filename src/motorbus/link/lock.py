@@ -17,6 +17,7 @@ import stat
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -25,6 +26,7 @@ from motorbus.link.refusal import Owner, busy
 
 SOCKET_LIMIT = 107  # bytes of a path in struct sockaddr_un on Linux, the terminating zero not counted
 JOURNAL = ".journal"
+SIMULATED = ".simulated"
 TRIES = 50  # each a millisecond: how long somebody who only looks may be in the way
 
 
@@ -102,9 +104,9 @@ def _short_folder() -> Path:
 class PortLock:
     """The right to use one port, held by at most one process; `acquire` it, `release` it, or use it in a `with`."""
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, suffix: str = ".lock") -> None:
         self.port = port
-        self.path = state_folder() / f"{_stem(port)}.lock"
+        self.path = state_folder() / f"{_stem(port)}{suffix}"
         self._descriptor: int | None = None
         self._pid = 0
 
@@ -169,6 +171,24 @@ def taken(port: str, kept: PortLock | None = None) -> PortLock:
     """
     lock = PortLock(port)
     return kept.lent() if kept is not None and kept.held and kept.path == lock.path else lock.acquire()
+
+
+@contextlib.contextmanager
+def served_by_simulator(port: str) -> Iterator[None]:
+    """Mark this port as one that a simulator of this process serves; without a state folder it stays unmarked."""
+    mark = None
+    with contextlib.suppress(OSError):
+        mark = PortLock(port, SIMULATED).acquire()
+    try:
+        yield
+    finally:
+        if mark is not None:
+            mark.release()
+
+
+def is_simulated(port: str) -> bool:
+    """A live simulator of this user serves this port; False for every port that is not known as simulated."""
+    return PortLock(port, SIMULATED).owner() is not None
 
 
 def holders() -> list[Owner]:

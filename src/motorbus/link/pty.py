@@ -12,6 +12,7 @@ import secrets
 from pathlib import Path
 
 from motorbus.errors import LinkError, RequestError
+from motorbus.link.lock import served_by_simulator
 from motorbus.link.speed import line_speed
 
 CHUNK = 4096
@@ -27,6 +28,7 @@ class PtyMaster:
     def __init__(self) -> None:
         self._links: list[Path] = []
         self._pulled: list[Path] = []
+        self._mark = contextlib.ExitStack()
         self._open()
 
     def _open(self) -> None:
@@ -41,6 +43,7 @@ class PtyMaster:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.slave_name = os.ttyname(self._slave)
+        self._mark.enter_context(served_by_simulator(self.slave_name))
 
     def fileno(self) -> int:
         """Turns readable when a client has written."""
@@ -120,6 +123,7 @@ class PtyMaster:
                 if str(link.readlink()) == self.slave_name:
                     link.unlink()
         self._links.clear()
+        self._mark.close()
         for descriptor in (self._slave, self._master):
             if descriptor >= 0:
                 os.close(descriptor)
