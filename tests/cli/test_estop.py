@@ -18,6 +18,7 @@ import pytest
 
 import motorbus
 from motorbus.bus import stop
+from motorbus.cli import estop
 from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Bench, Run
 
@@ -49,6 +50,18 @@ WATCHING = """
 import sys, motorbus
 with motorbus.open(sys.argv[1]) as bus:
     print("watching", flush=True)
+    sys.stdin.read()
+"""
+OPENING = """
+import sys, motorbus
+from motorbus.bus.stop import Stopper
+start = Stopper.start
+def late(self):
+    print("locked", flush=True)
+    sys.stdin.readline()
+    start(self)
+Stopper.start = late
+with motorbus.open(sys.argv[1]) as bus:
     sys.stdin.read()
 """
 FOREIGN = """
@@ -243,6 +256,29 @@ def test_without_a_bus_real_ports_and_the_machine_file_are_stopped_and_the_other
     assert left == {str(one.pid) for one in ([] if everything else holders[2:])}
     assert text.out.count("not stopped: simulated") == len(left)
     assert text.out.count("`--all` stops it too") == len(left)
+
+
+def test_a_process_that_is_still_opening_the_port_is_stopped_once_it_offers_that(
+    served: Simulated, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = stop.request_estop
+    monkeypatch.setattr(estop, "OPENING", 30.0)
+    with program(OPENING, served.bus) as process:
+
+        def first_in_vain(path: Path) -> stop.StopOutcome:
+            try:
+                return request(path)
+            except motorbus.PortNotFound:
+                assert process.stdin is not None
+                process.stdin.write("\n")
+                process.stdin.flush()
+                raise
+
+        monkeypatch.setattr(stop, "request_estop", first_in_vain)
+        ran = run("estop", served.bus, "--json")
+    (one,) = ran.document["buses"]
+    assert (ran.code, one["acknowledged"]) == (0, [1])
+    assert f"process {process.pid}" in one["by"]
 
 
 def test_where_only_simulated_buses_are_open_nothing_is_stopped_and_all_is_the_hint(

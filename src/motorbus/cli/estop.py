@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
+OPENING: Final = 1.0
+"""s that a process which is opening a port may need until it offers a stop."""
 BY_HAND: Final = "cut the power by hand"
 NAME_THEM: Final = "name the devices, as BUS#1-6, and each is asked; or cut the power by hand"
 ALL: Final = "acknowledged by all known"
@@ -199,14 +202,20 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
 def _ask(port: str, owner: Owner | None) -> StopOutcome:
     """Let whoever holds this port stop it. Raises PortNotFound for nobody, NoReply for a process that is not heard."""
     from motorbus.bus.stop import request_estop
-    from motorbus.link.lock import socket_path
+    from motorbus.link.lock import PortLock, socket_path
 
-    try:
-        return request_estop(socket_path(port))
-    except PortNotFound:
-        raise
-    except LinkError as error:
-        raise _unheard(port, owner, error) from error
+    limit = time.monotonic() + OPENING
+    while True:
+        try:
+            return request_estop(socket_path(port))
+        except (
+            PortNotFound
+        ):  # a process that is opening the port has its lock first and offers the stop later
+            if PortLock(port).owner() is None or time.monotonic() > limit:
+                raise
+        except LinkError as error:
+            raise _unheard(port, owner, error) from error
+        time.sleep(0.01)
 
 
 def _unheard(port: str, owner: Owner | None, error: LinkError) -> NoReply:
