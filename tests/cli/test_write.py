@@ -140,3 +140,29 @@ def test_a_dry_run_is_told_in_words(run: Run, arm: Simulation) -> None:
 
 def test_a_dry_run_refuses_what_a_real_one_would(run: Run, arm: Simulation) -> None:
     assert run("write", f"{arm.url}#1", "goal_position=9", "--dry-run").code == 8
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("write BUS#1 goal_position=70000", "goal_position: 70000 rad is out of range"),
+        ("write BUS#1 goal_position=1e308deg", "goal_position: 1e308deg is out of range"),
+        ("write BUS#1 goal_position=500deg", "goal_position=500deg: "),
+        ("write BUS#1 torque_limit=150%", "torque_limit: 150% is out of range"),
+        ("write BUS#1 max_temperature=300 --yes", "max_temperature: 300 °C is out of range"),
+        ("write BUS#1 led_mask=70000 --yes", "led_mask: raw value 70000 is out of range 0..255"),
+        (
+            "move BUS#1=500deg --yes",
+            "500deg: node 1: goal position refused: 8.72682 lies outside 0 to 6.28165 rad",
+        ),
+        ("move BUS#1=1e308deg --yes", "1e308deg: goal_position: 1.7453292519943295e+306 rad is out of range"),
+        ("move BUS#1=0 BUS#2=1e9deg --yes", "1e9deg: node 2: "),
+    ],
+)
+def test_a_value_out_of_range_is_named_as_it_was_typed_with_its_unit(
+    words: str, said: str, arm: Simulation, run: Run
+) -> None:
+    ran = run(*words.replace("BUS", arm.url).split())
+    assert ran.err.startswith(f"error: {said}") or f"error: node 1: {said}" in ran.err
+    assert "not a finite number" not in ran.err
+    assert "nothing was sent" in ran.err

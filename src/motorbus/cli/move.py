@@ -22,6 +22,7 @@ from motorbus.cli.moving import How, Known, go, goals_of, how_of, names_axes, po
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Assume, DryRun, Duration, First, Flag, Shape, Speed
 from motorbus.cli.plain import plain
+from motorbus.cli.quantity import as_typed
 from motorbus.cli.robot import robot
 from motorbus.cli.target import Target, able, device, face, offers, opened, takes, target
 from motorbus.core import units
@@ -138,7 +139,7 @@ def _moved_to(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str],
     _, wait, yes, dry_run = asked
     results = []
     for bus, wanted in _wanted(texts).items():
-        with opened(bus, options, output) as opening:
+        with opened(bus, options, output) as opening, as_typed(_typed(texts, bus)):
             bounds = _paced(opening, wanted, asked.bounds)
             ways, rehearsal = _ways(opening, wanted, bounds), dry.DryBus(opening)
             rehearse = partial(_move, rehearsal, wanted, {**bounds, "wait": False})
@@ -246,6 +247,12 @@ def _wanted(texts: tuple[str, ...]) -> dict[str, Goals]:
     return found
 
 
+def _typed(texts: tuple[str, ...], bus: str) -> dict[int, str]:
+    """What was typed for each device of this bus."""
+    parts = [(_named(text.rpartition("=")[0], text), text.rpartition("=")[2]) for text in texts]
+    return {node: position for found, position in parts if found.bus == bus for node in found.nodes}
+
+
 def _is_relative(text: str) -> bool:
     return text.rpartition("=")[0].endswith(("+", "-"))
 
@@ -282,7 +289,7 @@ def _moved_by(texts: tuple[str, ...], asked: _Asked, options: Mapping[str, str],
     way = units.parse(angle, "position") * (-1 if devices.endswith("-") else 1)
     question = f"move #{node} by {units.show(way, 'position')}" if abs(way) > FAR and not yes else ""
     how: dict[str, Any] = {**bounds, "wait": wait}
-    with opened(bus, options, output) as opening:
+    with opened(bus, options, output) as opening, as_typed({node: angle}):
         told = acted(opening, node, "move_by", way, question=question, dry_run=dry_run, output=output, **how)
     if not dry_run:
         facts = {"bus": bus, "id": node, "by": way, "result": plain(told)}

@@ -6,12 +6,15 @@ velocity in two units), so where the device can convert, it does.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motorbus.core import units
-from motorbus.errors import RequestError
+from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from motorbus.core.entry import Entry, Value
 
 
@@ -60,6 +63,18 @@ def to_raw(one: Any, entry: Entry, value: Value) -> int:
     """Value in the row's unit -> raw value, by the settings of this device."""
     raw: int = one.raw(entry, value) if hasattr(one, "raw") else entry.to_raw(value)
     return raw
+
+
+@contextmanager
+def as_typed(words: Mapping[int, str]) -> Iterator[None]:
+    """Name what was typed for a device in the error that refuses its goal."""
+    try:
+        yield
+    except (LimitExceeded, RequestError) as error:
+        nodes = list(words) if error.node is None else [error.node]
+        if len(nodes) == 1 and nodes[0] in words:
+            error.summary = f"{words[nodes[0]]}: {error.summary}"
+        raise
 
 
 def shown(number: Value | None, unit: str) -> str:

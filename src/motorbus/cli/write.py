@@ -93,10 +93,11 @@ def write(
         tell = _Plan(opening, output)
         rehearse = partial(_write, face(rehearsal, node), values, tell)
         memory = faces.offer(family.name, "KEPT") or Storage.EEPROM.value
-        _permit(orders, output, rehearse, memory=memory, expert=expert, yes=yes or dry_run)
-        ways = goals_among(one, [order.entry for order in orders], values)
-        consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
-        told = _write(one, values, tell)
+        with quantity.as_typed({node: assignments[0]} if len(assignments) == 1 else {}):
+            _permit(orders, output, rehearse, memory=memory, expert=expert, yes=yes or dry_run)
+            ways = goals_among(one, [order.entry for order in orders], values)
+            consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
+            told = _write(one, values, tell)
     if dry_run:
         dry.show(rehearsal, output)
     else:
@@ -144,7 +145,8 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
 def _orders(one: Any, wanted: Mapping[str, str], raw: bool) -> list[Order]:
     table = table_of(one)
     return [
-        _order(one, table[name], quantity.typed(table[name], text, raw=raw)) for name, text in wanted.items()
+        _order(one, table[name], quantity.typed(table[name], text, raw=raw), text)
+        for name, text in wanted.items()
     ]
 
 
@@ -160,11 +162,14 @@ def _typed_by_some(entries: Sequence[Entry], text: str, raw: bool) -> None:
         raise refusals[0]
 
 
-def _order(one: Any, entry: Entry, typed: Typed) -> Order:
+def _order(one: Any, entry: Entry, typed: Typed, text: str) -> Order:
     value = quantity.to_value(one, entry, int(typed.number)) if typed.raw else typed.number
+    plain = text[-1:].isdigit() or text.endswith(".")
+    given = text if not plain else f"raw value {text}" if typed.raw else f"{text} {entry.unit}".rstrip()
     try:
-        entry.encode(quantity.to_raw(one, entry, value))  # raises when it is out of range
+        entry.encode(quantity.to_raw(one, entry, value), given)  # raises when it is out of range
     except RequestError as refusal:
+        refusal.summary = entry.out_of_range(given).summary
         if entry.effect is Effect.MOTION:
             raise _beyond(refusal, one.node) from None
         raise

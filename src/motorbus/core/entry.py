@@ -103,15 +103,27 @@ class Entry:
     def writable(self) -> bool:
         return self.access is not Access.READ
 
-    def encode(self, raw: int) -> bytes:
-        """Raw value -> bytes. Raises RequestError when it is outside the row's range or does not fit its coding."""
+    def encode(self, raw: int, given: str = "") -> bytes:
+        """Raw value -> bytes. Raises RequestError when it is outside the row's range or does not fit its coding.
+
+        `given` is the value as the caller wrote it, for the error.
+        """
         if not self.low <= raw <= self.high:
-            raise RequestError(
-                f"{self.name}: raw value {shown(raw)} is out of range {self.low}..{self.high}",
-                expected=f"{self._shown(self.low)} to {self._shown(self.high)}",
-                advice="give a value inside the range; nothing was sent",
-            )
+            raise self.out_of_range(given or f"raw value {shown(raw)}", raw=not given)
         return self._code(raw).to_bytes(self.size, "little" if self.order == "little" else "big")
+
+    def out_of_range(self, given: str, *, raw: bool = False) -> RequestError:
+        """The error for a value outside the row's range."""
+        bounds = f" {self.low}..{self.high}" if raw or not self.unit else ""
+        return RequestError(
+            f"{self.name}: {given} is out of range{bounds}",
+            expected=f"{self._shown(self.low)} to {self._shown(self.high)}",
+            advice="give a value inside the range; nothing was sent",
+        )
+
+    def given(self, value: Value) -> str:
+        """A value in the row's unit, as an error shows it."""
+        return f"{shown(value)} {self.unit}".rstrip()
 
     def _code(self, raw: int) -> int:
         if self.coding is Coding.UNSIGNED or raw >= 0:
@@ -136,7 +148,9 @@ class Entry:
 
     def to_raw(self, value: Value) -> int:
         """Value in the row's unit -> nearest raw value. Raises RequestError when it is not a finite number."""
-        if not (isinstance(value, bool) or is_number(value)) or not math.isfinite(value / self.scale):
+        if is_number(value) and not math.isfinite(value / self.scale):
+            raise self.out_of_range(self.given(value))
+        if not (isinstance(value, bool) or is_number(value)):
             raise RequestError(
                 f"{self.name}: {shown(value)} is not a finite number",
                 expected=f"{self._shown(self.low)} to {self._shown(self.high)}",

@@ -63,7 +63,7 @@ def test_a_program_that_moves_is_stopped_from_another_shell(
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline()
-        (stop,) = run("estop", *([on_slcan.bus] if named else []), "--json").document["buses"]
+        (stop,) = run("estop", on_slcan.bus if named else "--all", "--json").document["buses"]
         out, err = process.communicate(timeout=30)
     assert stop["acknowledged"] == [37]
     assert str(process.pid) in stop["by"]

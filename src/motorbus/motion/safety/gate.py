@@ -381,9 +381,13 @@ def _check(goal: Goal) -> None:
     if not goal.low - _slack(goal.low) <= goal.value <= goal.high + _slack(goal.high):
         raise _refusal(
             goal,
-            f"{goal.value:.6g} lies outside {goal.low:.6g} to {goal.high:.6g}",
+            f"{goal.value:.6g} lies outside {goal.low:.6g} to {goal.high:.6g} {_unit(goal)}".rstrip(),
             "stay inside the limits, or change the limit registers of the device",
         )
+
+
+def _unit(goal: Goal) -> str:
+    return {"position": "rad", "relative": "rad", "velocity": "rad/s", "current": "A"}.get(goal.quantity, "")
 
 
 def _slack(limit: float) -> float:
@@ -393,7 +397,9 @@ def _slack(limit: float) -> float:
 def _refusal(goal: Goal, why: str, advice: str) -> LimitExceeded:
     return LimitExceeded(
         f"node {goal.node}: goal {goal.quantity} refused: {why}",
-        expected="" if goal.low is None or goal.high is None else f"{goal.low:.6g} to {goal.high:.6g}",
+        expected=""
+        if goal.low is None or goal.high is None
+        else f"{goal.low:.6g} to {goal.high:.6g} {_unit(goal)}".rstrip(),
         advice=f"{advice}; nothing was sent",
         node=goal.node,
     )

@@ -42,8 +42,8 @@ class Order(NamedTuple):
 def orders_of(node: Node, table: Table, values: Mapping[str, Value]) -> list[Order]:
     """The raw values to write, each checked against its row and against what a plain write may do."""
     orders = [Order(table[name], node.raw(table[name], value)) for name, value in values.items()]
-    for order in orders:
-        _check(order, node.node)
+    for order, value in zip(orders, values.values(), strict=True):
+        _check(order, value, node.node)
         _refuse_unheeded(node, order.row)
         if order.row.name == node.control.current:
             _check_bound(node, order)
@@ -130,7 +130,7 @@ def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
     raw = node.raw(row, to) if is_number(to) else row.high + 1
     if not row.low <= raw <= row.high:
         raise LimitExceeded(
-            f"node {node.node}: {shown(to)} is no position it could go to",
+            f"node {node.node}: {shown(to)} rad is no position it could go to",
             expected=f"{node.value(row, row.low):.4g} to {node.value(row, row.high):.4g} rad at the very most",
             advice="give a number in rad; nothing was sent",
             node=node.node,
@@ -197,17 +197,17 @@ def _fault(row: Entry, value: Value) -> RequestError | None:
             f"{row.name}: {shown(value)} is not a finite number", advice="give a number; nothing was sent"
         )
     try:
-        _check(Order(row, 0 if row.name in SCALED else row.to_raw(value)))
+        _check(Order(row, 0 if row.name in SCALED else row.to_raw(value)), value)
     except RequestError as error:
         return error
     return None
 
 
-def _check(order: Order, node: int | None = None) -> None:
+def _check(order: Order, value: Value, node: int | None = None) -> None:
     row, raw = order
     if refusal := _refusal(row, raw):
         raise RequestError(f"{row.name}: {refusal[0]}", advice=f"{refusal[1]}; nothing was sent", node=node)
-    row.encode(raw)  # raises RequestError when out of range
+    row.encode(raw, row.given(value))  # raises RequestError when out of range
 
 
 def _refusal(row: Entry, raw: int) -> tuple[str, str] | None:

@@ -96,5 +96,5 @@ def _checked(node: Node, row: Entry, value: Value) -> int:
             f"{row.name} is not written by name: {refusal}", advice="nothing was sent", node=node.node
         )
     raw = counts(node, value) if row.effect is Effect.MOTION else node.raw(row, value)
-    row.encode(raw)  # raises when it is out of range
+    row.encode(raw, row.given(value))  # raises when it is out of range
     return raw

@@ -24,9 +24,8 @@ def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
     entry = profile.table[row]
     counts = profile.counts_per_degree * degrees(radians)
     if not isfinite(counts):
-        raise RequestError(
-            f"{row}: {radians} rad is not a finite angle", advice="give a number; nothing was sent"
-        )
+        what = "out of range" if isfinite(radians) else "not a finite angle"
+        raise RequestError(f"{row}: {radians} rad is {what}", advice="give a number; nothing was sent")
     raw = int(Decimal(f"{counts:.6f}").to_integral_value(ROUND_HALF_UP))
     if not entry.low <= raw <= entry.high:
         raise _outside(profile, entry, counts)

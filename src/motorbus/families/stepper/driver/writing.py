@@ -372,5 +372,5 @@ def _raw(node: Node, row: Entry, value: Value) -> int:
     if refusal:
         raise RequestError(f"{row.name} is not written by name: {refusal}", advice="nothing was sent")
     raw = node.raw(row, value)
-    row.encode(raw)  # raises when it is out of range
+    row.encode(raw, row.given(value))  # raises when it is out of range
     return raw
