@@ -68,7 +68,8 @@ class MotorbusError(Exception):
     def summary(self, told: str) -> None:
         self.args = (told,)
 
-    def __str__(self) -> str:
+    def parts(self) -> list[tuple[str, str]]:
+        """What there is beside the summary, each with its name: what was sent, what came, and so on."""
         parts = (
             ("sent", _shown(self.sent)),
             ("received", _shown(self.received)),
@@ -76,7 +77,10 @@ class MotorbusError(Exception):
             ("likely cause", self.cause),
             ("what to do", self.advice),
         )
-        return "\n".join([self.summary, *(f"  {name}: {text}" for name, text in parts if text)])
+        return [(name, text) for name, text in parts if text]
+
+    def __str__(self) -> str:
+        return "\n".join([self.summary, *(f"  {name}: {text}" for name, text in self.parts())])
 
 
 def _shown(data: object) -> str:

@@ -7,6 +7,7 @@ of that family's name.
 
 from __future__ import annotations
 
+import errno
 import io
 import logging
 import os
@@ -14,9 +15,9 @@ import re
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from inspect import signature
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TextIO
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
@@ -24,7 +25,7 @@ from motorbus import __version__
 from motorbus.cli import faces, flags, machine
 from motorbus.cli.exits import Exit, exit_code
 from motorbus.cli.output import Output
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -73,6 +74,10 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "demo": "Find nine simulated axes of three families, move them together, and draw what they did.",
     },
 }
+UNWRITABLE: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
+"""Errors of a stream on which the output has no room, or that is not open for writing."""
+ENDINGS: Final = ("SIGTERM", "SIGHUP")
+"""Signals that end a program as Ctrl-C does."""
 _FAMILIES: Final = Group("One family", sort_key=8)
 _EVERYWHERE: Final = Group("Everywhere", sort_key=9)
 _PROGRAM: Final = Group("Program", sort_key=10)
@@ -126,21 +131,67 @@ In a folder with a motorbus.toml, buses, axes and groups go by their names:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command line (without the program's name) and return its exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    """Run one command line (without the program's name) and return its exit code.
+
+    Without arguments it is the program's own command line: then signals are ignored once the outcome is known, and
+    what cannot be written is dropped, so that the interpreter ends with this exit code.
+    """
+    if arguments is not None:
+        return _run(list(arguments), last=False)
+    words = sys.argv[1:]
+    try:
+        code = _run(words, last=True)
+    except KeyboardInterrupt as second:  # a signal between the first one and the report of it
+        _ignore_signals()
+        code = _report(second, Exit.CANCELLED, Output(json="--json" in words))
+    for stream in (sys.stdout, sys.stderr):
+        _finish(stream)
+    return code
+
+
+def _run(words: list[str], *, last: bool) -> int:
     _fill_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console that lacks "²" must not end the program
     output = Output(json="--json" in words)
     try:
-        with _ended_like_ctrl_c():
-            return _launch(build(), words, output)
-    except (Exception, KeyboardInterrupt) as error:
-        code = exit_code(error)
-        if code is None:
+        with _ended_like_ctrl_c(last=last):
+            code = _launch(build(), words, output)
+            sys.stdout.flush()
+            return code
+    except SystemExit as end:
+        if end.code != 1:
             raise
-        return _report(error, code, output)
+        # rich ends the program so when the reader of a help page has gone
+        return _report(BrokenPipeError(), Exit.CANCELLED, output)
+    except (Exception, KeyboardInterrupt) as error:
+        known = exit_code(error)
+        if known is None:
+            raise
+        return _report(error, known, output)
+
+
+def _ignore_signals() -> None:
+    """A Ctrl-C that comes twice must not end the interpreter's clean-up with a traceback."""
+    for name in ("SIGINT", *ENDINGS):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+
+
+def _finish(stream: TextIO) -> None:
+    """Write what is left, or drop it: the interpreter would end with code 120 and a traceback."""
+    try:
+        stream.flush()
+    except (OSError, ValueError):
+        _drop(stream)
+
+
+def _drop(stream: TextIO) -> None:
+    with suppress(OSError, ValueError):  # no descriptor, as in a test
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)
 
 
 def _fill_closed_streams() -> None:
@@ -151,9 +202,12 @@ def _fill_closed_streams() -> None:
 
 
 @contextmanager
-def _ended_like_ctrl_c() -> Iterator[None]:
-    """Being told to end, or losing the terminal, cleans up as Ctrl-C does: an EEPROM lock must be closed again."""
-    names = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+def _ended_like_ctrl_c(*, last: bool) -> Iterator[None]:
+    """Being told to end, or losing the terminal, cleans up as Ctrl-C does: an EEPROM lock must be closed again.
+
+    Where this is the `last` thing that the process does, later signals are ignored.
+    """
+    names = [getattr(signal, name) for name in ENDINGS if hasattr(signal, name)]
     taken = [name for name in names if signal.getsignal(name) is signal.SIG_DFL]
     if threading.current_thread() is not threading.main_thread():
         taken = []  # Python lets only the main thread have handlers
@@ -162,14 +216,20 @@ def _ended_like_ctrl_c() -> Iterator[None]:
     try:
         yield
     finally:
-        for name in taken:
-            signal.signal(name, signal.SIG_DFL)
+        if last:
+            _ignore_signals()
+        else:
+            for name in taken:
+                signal.signal(name, signal.SIG_DFL)
 
 
 def _report(error: BaseException, code: Exit, output: Output) -> Exit:
     if isinstance(error, BrokenPipeError):
-        sys.stdout = io.StringIO()  # the reader has gone: nothing to say, and nobody to say it to
+        _drop(sys.stdout)  # its reader has gone: there is nothing to say
         return code
+    if isinstance(error, OSError) and error.errno in UNWRITABLE and error.filename is None:
+        _drop(sys.stdout)
+        error = MotorbusError(f"the output cannot be written: {error.strerror}")
     output.error(error)
     if isinstance(error, CycloptsError) and not output.json:
         chain = " ".join(["motorbus", *(error.command_chain or ())])

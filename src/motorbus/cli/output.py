@@ -7,11 +7,13 @@ here. rich is imported when the first table is drawn, so that JSON and help cost
 from __future__ import annotations
 
 import json
+import re
 import sys
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from motorbus.cli.exits import NeedsConsent, exit_code
+from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,6 +22,10 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
     from rich.table import Table
 
+CUT: Final = 300
+"""Characters of one part of a message; an argument or a file may be of any length."""
+_CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+_PART: Final = re.compile(r"\n(?=  (?:sent|received|expected|likely cause|what to do): )")
 _NO_WRAP: Final = 10_000  # columns of a "terminal" that is a file or a pipe: never fold a row
 
 
@@ -48,7 +54,9 @@ class Output:
             return
         if title:
             self._said = self.simulated
-            self.console().print(self.marked(title), style="bold", markup=False, soft_wrap=True)
+            self.console().print(
+                printable(self.marked(title), limit=None), style="bold", markup=False, soft_wrap=True
+            )
         self.draw(self.grid(columns, rows))
 
     def text(self, text: str) -> None:
@@ -56,7 +64,7 @@ class Output:
         if not self.json:
             self._said = self._said or "simulated" in text
             self.mark()
-            self.console().print(text, markup=False, soft_wrap=True)
+            self.console().print(_lines_of(text), markup=False, soft_wrap=True)
 
     def mark(self) -> None:
         """The first line of what is simulated says so, where nothing before it did."""
@@ -73,10 +81,10 @@ class Output:
         lines = drawn.get().splitlines()
         print("\n".join(line if shown.is_terminal else line.rstrip() for line in lines), flush=True)
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, *, limit: int | None = CUT) -> None:
         """Something worth knowing that is not the result. Nothing else ends because nobody reads that any more."""
         with suppress(OSError):
-            print(text, file=sys.stderr, flush=True)
+            print("\n".join(_parts_of(text, limit)), file=sys.stderr, flush=True)
 
     def console(self) -> Console:
         return console(sys.stdout)
@@ -123,11 +131,12 @@ class Output:
         )
 
     def error(self, error: BaseException) -> None:
-        """One clear error on stderr: prose, or one JSON object with --json."""
-        if self.json:
-            print(json.dumps(_error_facts(error)), file=sys.stderr)
-        else:
-            console(sys.stderr).print(_error_text(error), soft_wrap=True)
+        """One clear error on stderr: prose, or one JSON object with --json. Does nothing where stderr is closed."""
+        with suppress(OSError):
+            if self.json:
+                print(json.dumps(_error_facts(error)), file=sys.stderr, flush=True)
+            else:
+                console(sys.stderr).print(_error_text(error), soft_wrap=True)
 
 
 class Bar:
@@ -165,10 +174,29 @@ def console(file: TextIO) -> Console:
     return Heard(file=file, highlight=False, width=None if file.isatty() else _NO_WRAP)
 
 
+def printable(text: str, *, limit: int | None = CUT) -> str:
+    """A text from outside as a terminal may have it: control characters as \\xNN, its middle cut out at `limit`."""
+    if limit is not None and len(text) > limit:
+        text = f"{text[: limit * 2 // 3]}…{text[-limit // 3 :]}"
+    return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
+def _lines_of(text: str) -> str:
+    """A result of several lines."""
+    return "\n".join(printable(line, limit=None) for line in text.split("\n"))
+
+
+def _parts_of(text: str, limit: int | None = CUT) -> list[str]:
+    """A message with its parts, each on a line of its own. No other line break is one of ours."""
+    return [printable(part, limit=limit) for part in _PART.split(text)]
+
+
 def _cell(value: object) -> Any:
     from rich.text import Text
 
-    return value if hasattr(value, "__rich_console__") else Text("" if value is None else str(value))
+    if hasattr(value, "__rich_console__"):
+        return value
+    return Text("" if value is None else _lines_of(str(value)))
 
 
 def _can_ask() -> bool:
@@ -176,7 +204,7 @@ def _can_ask() -> bool:
 
 
 def _asked(question: str) -> bool:
-    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    print(f"{printable(question)} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
 
@@ -188,12 +216,18 @@ def _error_text(error: BaseException) -> Any:
 
 def _message(error: BaseException) -> str:
     """All of it; a cause or an advice that several have in common is said once."""
-    said = "cancelled" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
-    lines = said.splitlines()
+    if isinstance(error, MotorbusError):
+        lines = [printable(error.summary), *(f"  {name}: {printable(text)}" for name, text in error.parts())]
+    else:
+        lines = [printable(_summary(error))]
     for note in _notes(error):
-        first, *parts = note.splitlines() or [""]
+        first, *parts = _parts_of(note)
         lines += [f"  note: {first}", *(part for part in parts if part not in lines)]
     return "\n".join(lines)
+
+
+def _summary(error: BaseException) -> str:
+    return "cancelled" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
 
 
 def _notes(error: BaseException) -> list[str]:
@@ -203,9 +237,10 @@ def _notes(error: BaseException) -> list[str]:
 
 def _error_facts(error: BaseException) -> dict[str, object]:
     facts: dict[str, object] = {"schema": "motorbus.error/1", "error": type(error).__name__}
-    facts |= {"exit": exit_code(error), **({"notes": _notes(error)} if _notes(error) else {})}
+    notes = ["\n".join(_parts_of(note)) for note in _notes(error)]
+    facts |= {"exit": exit_code(error), **({"notes": notes} if notes else {})}
     if not hasattr(error, "summary"):
-        return {**facts, "summary": _message(error).partition("\n")[0]}
+        return {**facts, "summary": printable(_summary(error))}
     parts = (
         "summary",
         "sent",
@@ -223,6 +258,6 @@ def _error_facts(error: BaseException) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    if isinstance(value, bytes | bytearray):
-        return value.hex(" ").upper()
-    return value if isinstance(value, int | float | str) else str(value)
+    if isinstance(value, int | float):
+        return value
+    return printable(value.hex(" ").upper() if isinstance(value, bytes | bytearray) else str(value))

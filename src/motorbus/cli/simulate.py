@@ -222,7 +222,7 @@ def _ended(output: Output, faulted: Faulted) -> None:
 
 def _note(output: Output, lines: Iterable[str]) -> None:
     for line in lines:
-        output.note(line)
+        output.note(line, limit=None)  # it may hold a script to be used again
 
 
 def _scripted(simulator: object, path: Path | None, family: str) -> None:

@@ -39,7 +39,14 @@ def parse_address(text: str) -> Address:
             expected="FAMILY:PORT, options after commas, ids after #",
             advice="for example feetech:/dev/ttyACM0,baud=1000000 or feetech:/dev/ttyACM0#3",
         )
-    pairs = dict(_option(option, text) for option in options)
+    pairs: dict[str, str] = {}
+    for name, value in (_option(option, text) for option in options):
+        if pairs.setdefault(name, value) != value:
+            raise RequestError(
+                f"{text!r}: the option {name} is given twice, as {pairs[name]} and {value}",
+                expected="each option once",
+                advice="leave one of them out; nothing was sent",
+            )
     return Address(family, port, pairs, parse_ids(ids) if ids else ())
 
 
