@@ -34,6 +34,7 @@ from motorbus.motion.safety import Gate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from contextlib import AbstractContextManager
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
@@ -87,6 +88,25 @@ class DryBus:
         self._waited = 0.0
         self._read: dict[Data, Any] = {}
         self._report: Callable[[object], None] | None = None
+
+    @property
+    def latched(self) -> bool:
+        """As of the bus itself."""
+        return self._bus.latched
+
+    @property
+    def lock(self) -> AbstractContextManager[object]:
+        """As of the bus itself."""
+        return self._bus.lock
+
+    @property
+    def loss_count(self) -> int:
+        """As of the bus itself."""
+        return self._bus.loss_count
+
+    def stop_count(self, node: int | None = None) -> int:
+        """As of the bus itself."""
+        return self._bus.stop_count(node)
 
     def apart(self) -> DryBus:
         """The same bus for another device: what is withheld here and from it hides nothing of the other.
