@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
@@ -48,6 +49,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if _profile(config) == "soak" and config.option.timeout is None:
         config.option.timeout = LONG_RUN
     settings.load_profile(_profile(config))
+    # A shell lets what runs in the background ignore SIGINT, and nohup SIGHUP. Children inherit that, unless it is
+    # a handler of Python's that does nothing.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 @pytest.hookimpl(tryfirst=True)
