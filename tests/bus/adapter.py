@@ -34,6 +34,7 @@ def request(
     *,
     priority: Priority = Priority.POLL,
     goal_of: int | None = None,
+    goal: float = 0.0,
     alternate: Callable[[], Any] | None = None,
     **options: Any,
 ) -> Exchange[Any]:
@@ -62,7 +63,7 @@ def request(
         ANY if expected is None else dues,
         read,
         rank=priority,
-        goals=() if goal_of is None else (Goal(goal_of, "position", 0.0, -1.0, 1.0),),
+        goals=() if goal_of is None else (Goal(goal_of, "position", goal, -1.0, 1.0),),
         other=alternate,
         whole=whole if isinstance(frame, bytes) and dues else None,
         **options,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import Any
 
 import pytest
 
+import motorbus
 from motorbus.core.operation import CanFrame
 from motorbus.errors import (
     ChecksumError,
@@ -93,13 +95,9 @@ def nodes(frames: list[Any]) -> list[int]:
     return [frame.id & 0x7F if isinstance(frame, CanFrame) else frame[2] for frame in frames]
 
 
-# -- one request ---------------------------------------------------------------------------------------------
-
-
 def test_a_request_is_sent_once_and_its_reply_is_the_result(engine: Engine) -> None:
     engine.submit("a", read(1))
     assert engine.sent() == [read_frame(1)]
-    assert engine.result("a") is PENDING
     engine.deliver(said(1, 1234))
     assert engine.result("a") == 1234
     assert engine.sent() == []
@@ -523,9 +521,6 @@ def test_a_notification_without_a_request_is_passed_on_and_disturbs_no_reply(can
     assert [(notice.node, notice.data) for notice in watch] == [(5, report.data)]
 
 
-# -- groups --------------------------------------------------------------------------------------------------
-
-
 def test_a_group_read_without_one_node_has_the_others(engine: Engine) -> None:
     engine.submit("a", group(1, 2, 3))
     assert engine.sent() == [group_frame(1, 2, 3)]
@@ -584,9 +579,6 @@ def test_every_node_is_asked_and_each_reply_counts_until_the_deadline(engine: En
     engine.deliver(status(5))
     engine.advance(2.0)
     assert engine.result("a") == [7, 3, 5]
-
-
-# -- cancelled -----------------------------------------------------------------------------------------------
 
 
 def test_a_request_cancelled_while_it_waits_is_never_sent(engine: Engine) -> None:
@@ -671,12 +663,6 @@ def test_a_stop_is_repeated_up_to_five_times_until_it_is_acknowledged(engine: En
     assert outcome.acknowledged == ((1, 2) if answers else (1,))
     assert outcome.silent == (() if answers else (2,))
     assert outcome.rounds == (answers or 5)
-
-
-def test_a_stop_where_no_node_is_known_is_broadcast_five_times() -> None:
-    engine = Engine()
-    assert engine.estop().acknowledged == ()
-    assert engine.sent() == [write_frame(BROADCAST, TORQUE, 0)] * 5
 
 
 def test_a_latched_stop_refuses_motion_and_torque_until_reset_and_lets_reads_pass(engine: Engine) -> None:
@@ -764,9 +750,6 @@ def test_a_can_node_is_held_at_a_fresh_position_and_asked_for_an_old_one(can: En
     assert can.estop().silent == (4,)
 
 
-# -- interlock -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("work", [move(1), torque(1)])
 def test_a_bus_without_a_gate_refuses_motion_and_torque_but_sends_a_stop(work: Any) -> None:
     engine = Engine(check=None, answer=Servos())
@@ -806,6 +789,18 @@ def test_the_gate_is_asked_before_every_try_of_motion_and_torque() -> None:
     del asked[2:]
     with pytest.raises(LimitExceeded):
         engine.run(move(1))
+
+
+@pytest.mark.parametrize(
+    ("goal", "refusal"), [(1.0, ""), (1.1, "outside"), (-1.1, "outside"), (nan, "finite"), (inf, "finite")]
+)
+def test_the_gate_of_an_opened_bus_refuses_a_goal_beyond_its_limits(goal: float, refusal: str) -> None:
+    with motorbus.simulate("feetech", ids="1") as simulation, motorbus.open(simulation.url) as bus:
+        if not refusal:
+            assert bus.run(move(1, goal=goal)) == "written"
+            return
+        with pytest.raises(LimitExceeded, match=refusal):
+            bus.run(move(1, goal=goal))
 
 
 # -- the link ------------------------------------------------------------------------------------------------
