@@ -166,3 +166,18 @@ def test_a_value_out_of_range_is_named_as_it_was_typed_with_its_unit(
     assert ran.err.startswith(f"error: {said}") or f"error: node 1: {said}" in ran.err
     assert "not a finite number" not in ran.err
     assert "nothing was sent" in ran.err
+
+
+def test_the_question_and_the_result_say_what_becomes_of_the_torque(run: Run, arm: Simulation) -> None:
+    device = f"{arm.url}#1"
+    assert "torque" not in run("write", device, "max_temperature=65").err
+    assert "torque" not in run("write", device, "max_temperature=65", "--yes", "--json").document
+    assert run("torque", "on", device).code == 0
+    assert "then it holds where it is" in run("write", device, "max_temperature=66").err
+    ran = run("write", device, "max_temperature=66", "--yes", "--json")
+    assert ran.document["torque"] == {"on": True, "why": ""}
+    assert held(run, arm, "torque_enable") == 1
+    assert "stays off (operating_mode" in run("write", device, "operating_mode=velocity").err
+    ran = run("write", device, "operating_mode=velocity", "--yes")
+    assert "torque was on before the write and is off now: operating_mode" in ran.out
+    assert held(run, arm, "torque_enable") == 0

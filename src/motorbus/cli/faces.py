@@ -21,6 +21,10 @@ A family's face is the module (or package) of its name in this folder. Apart fro
     planned(event)                                             what an event of `write` says of what is about to be
                                                                written and what that takes, "" if nothing
     written(told)                                              what `write` returned, as plain data
+    torque_after_write(one, values)                            what a write of these registers does to the torque,
+                                                               for the question before it, "" if nothing
+    torque_told(event)                                         what an event of `write` says of the torque after it:
+                                                               {"on", "why", "text"}, None if nothing
     bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
     CUT_OFF                                                    what to do about a change that was cut off, where no
                                                                journal is kept

@@ -29,11 +29,16 @@ app = App(
     name="write",
     usage="Usage: motorbus write BUS#ID NAME=VALUE... [OPTIONS]",
     help_epilogue="""Values are in the unit of the register, or with one of their own: 90deg, 500ms,
-2048raw. What survives power-off needs --yes (a servo may go limp while it is
+2048raw. What survives power-off needs --yes (torque is off while it is
 written), and so does a goal more than 180 degrees away. With --raw every
 number is what stands on the wire; raw numbers for a register that moves the
 device need --expert too. --dry-run reads, shows each frame that would change
 something, and sends none of those.
+
+A FEETECH servo has no torque while its EEPROM is written, so an arm sags. It
+gets its torque back where it is then, unless what a goal means has changed,
+it stands outside its limits, or it was stopped or does not answer: the
+question and the result say when the torque stays off.
 
 Examples:
 
@@ -93,15 +98,21 @@ def write(
         tell = _Plan(opening, output)
         rehearse = partial(_write, face(rehearsal, node), values, tell)
         memory = faces.offer(family.name, "KEPT") or Storage.EEPROM.value
+        torque = faces.offer(family.name, "torque_after_write")
+        kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
+        after = torque(one, values) if kept and torque and (dry_run or not yes) else ""
+        what = f"write {', '.join(kept)} to {memory}, where it survives power-off" + (after and f"; {after}")
         with quantity.as_typed({node: assignments[0]} if len(assignments) == 1 else {}):
-            _permit(orders, output, rehearse, memory=memory, expert=expert, yes=yes or dry_run)
+            _permit(orders, output, rehearse, what=what if kept else "", expert=expert, yes=yes or dry_run)
             ways = goals_among(one, [order.entry for order in orders], values)
             consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
             told = _write(one, values, tell)
     if dry_run:
         dry.show(rehearsal, output)
+        if after:
+            output.note(f"note: {after}; the frame for that is made from what is read then")
     else:
-        _show(one, orders, told, output)
+        _show(one, orders, told, tell.torque, output)
     return Exit.OK
 
 
@@ -113,8 +124,13 @@ class _Plan:
         self._report = bus.report
         self._output = output
         self._said = False
+        self._torque = faces.offer(bus.family.name, "torque_told")
+        self.torque: dict[str, Any] | None = None
 
     def __call__(self, event: object) -> None:
+        if self._torque is not None and (torque := self._torque(event)):
+            self.torque = torque
+            return
         text = self._planned(event) if self._planned is not None else ""
         if text and not self._said:
             self._said = True
@@ -188,11 +204,11 @@ def _permit(
     output: Output,
     rehearse: Callable[[], object],
     *,
-    memory: str,
+    what: str,
     expert: bool,
     yes: bool,
 ) -> None:
-    """`memory` is what the family calls the place of what survives power-off."""
+    """`what` survives power-off, and needs consent; "" where nothing does."""
     moving = [order.entry.name for order in orders if order.raw and order.entry.effect is Effect.MOTION]
     if moving and not expert:
         refused_anyway(rehearse)
@@ -200,19 +216,23 @@ def _permit(
             f"{', '.join(moving)}: a raw value that moves the device",
             advice="give the value in its unit, or say --expert; nothing was sent",
         )
-    kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
-    if kept:
-        what = f"write {', '.join(kept)} to {memory}, where it survives power-off"
+    if what:
         consent_to(what, output, yes=yes, rehearse=rehearse)
 
 
-def _show(one: Any, orders: Sequence[Order], told: Any, output: Output) -> None:
+def _show(
+    one: Any, orders: Sequence[Order], told: Any, torque: dict[str, Any] | None, output: Output
+) -> None:
     rows = registers.facts(
         one, [order.entry for order in orders], {order.entry.name: order.value for order in orders}
     )
     written = faces.offer(one.bus.family.name, "written")
     facts = {} if written is None else {"result": written(told)}
+    if torque is not None:
+        facts["torque"] = {"on": torque["on"], "why": torque["why"]}
     output.document("motorbus.write/1", {"id": one.node, "registers": rows, **facts})
     registers.show(f"Written to #{one.node}", rows, output)
-    if facts:
+    if written is not None:
         output.text(str(told))
+    if torque is not None:
+        output.text(torque["text"])

@@ -79,6 +79,11 @@ def looks(*lines: Line) -> tuple[Line, ...]:
     return tuple(found)
 
 
+def looked(*lines: Line) -> tuple[Line, ...]:
+    """`looks`, and the torque switch of a limp servo 3, which a write by name reads before it writes."""
+    return (*looks(*lines), reads(3, 40, 0))
+
+
 def unheard(line: Line) -> Line:
     """The same request, and nothing comes back."""
     return Line(line.sent, None)

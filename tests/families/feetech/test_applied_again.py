@@ -16,7 +16,7 @@ from tests.families.feetech.driver_script import Played, looks, play, prepared, 
 from tests.families.feetech.maps import met, simulated
 
 OFF, UNLOCK, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
-IDLE, OPEN = reads(3, 64, 0), reads(3, 55, 0)
+IDLE, OPEN, LIMP = reads(3, 64, 0), reads(3, 55, 0), reads(3, 40, 0)
 
 APPLIED: dict[str, Callable[[Any], object]] = {
     "registers": lambda servo: servo.write(max_temperature=61, led_mask=5, min_position_limit=1.0),
@@ -71,7 +71,7 @@ def test_d9_only_registers_that_differ_are_written_and_whole() -> None:
     """Both bytes of a limit go together, and what lies between two that differ stays as it is."""
     play(
         write(prepared(), max_temperature=65, max_voltage=8.0, min_voltage=5.0, max_torque=0.5),
-        *(reads(3, 13, 70, 80, 40, 0xE8, 1), UNLOCK, OFF, IDLE),
+        *(reads(3, 13, 70, 80, 40, 0xE8, 1), LIMP, UNLOCK, OFF, IDLE),
         *(writes(3, 13, 65), reads(3, 13, 65)),
         *(writes(3, 15, 50, 0xF4, 1), reads(3, 15, 50, 0xF4, 1), OPEN, LOCK, LOCKED),
     )
@@ -114,7 +114,7 @@ def test_d9_what_others_wrote_behind_a_closed_lock_cannot_be_seen_and_rewrite_ke
 
 
 @pytest.mark.parametrize("stranger", [False, True])
-@pytest.mark.parametrize("at", range(3, 7))
+@pytest.mark.parametrize("at", range(4, 8))
 def test_d9_what_a_lost_supply_let_vanish_is_written_again_by_anybody(at: int, stranger: bool) -> None:
     """The supply dips before the write, or after it: the write lands behind a lock that has closed by itself."""
     with simulated("sts") as (real, servo):
@@ -140,13 +140,13 @@ def test_d9_what_a_lost_supply_let_vanish_is_written_again_by_anybody(at: int, s
 
 def test_d9_what_this_node_wrote_in_a_sequence_that_failed_is_written_whatever_it_reads() -> None:
     node, one = prepared(), (writes(3, 20, 5), reads(3, 20, 5))
-    failed = Played([*looks(one[0]), UNLOCK, OFF, IDLE, *one, reads(3, 55, 1), OFF, reads(3, 55, 1)])
+    failed = Played([*looks(one[0]), LIMP, UNLOCK, OFF, IDLE, *one, reads(3, 55, 1), OFF, reads(3, 55, 1)])
     failed.script += [writes(3, 20, 4), LOCK, LOCKED]
     with pytest.raises(OutcomeUnknown):
         failed.run(write(node, led_mask=5))
     assert failed.script == []
     assert node.unsure == {20}
-    whole = (reads(3, 20, 5), UNLOCK, OFF, IDLE, *one, OPEN, LOCK, LOCKED)
+    whole = (reads(3, 20, 5), LIMP, UNLOCK, OFF, IDLE, *one, OPEN, LOCK, LOCKED)
     play(write(node, led_mask=5), prepares(), *whole)
     assert node.unsure == set()
     play(write(node, led_mask=5), prepares(), reads(3, 20, 5), LOCKED)

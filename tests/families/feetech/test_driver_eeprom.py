@@ -15,7 +15,7 @@ from tests.families.feetech.driver_script import (
     REG_WRITE,
     Line,
     Played,
-    looks,
+    looked,
     packet,
     play,
     prepared,
@@ -33,7 +33,7 @@ STILL_OPEN = reads(3, 55, 0)
 WRITES = (writes(3, 20, 5, 33), reads(3, 20, 5, 33))
 GIVEN_UP = (OFF, LOCK, LOCKED)
 BEGUN = (OFF, STILL_OPEN, LOCK, LOCKED)
-LOOK = looks(WRITES[0])
+LOOK = looked(WRITES[0])
 WHOLE = (*LOOK, UNLOCK, OFF, IDLE, *WRITES, STILL_OPEN, LOCK, LOCKED)
 
 
@@ -41,8 +41,9 @@ def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
     played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
     assert played.alone == 1
     stores = [one for one in played.exchanges if one.timeout is Timeout.STORE]
-    assert stores == [*played.exchanges[:2], *played.exchanges[3:]]
+    assert stores == [played.exchanges[0], played.exchanges[2], *played.exchanges[4:]]
     assert [exchange.effect for exchange in played.exchanges] == [
+        Effect.NONE,
         Effect.NONE,
         Effect.PERSISTENT,
         Effect.TORQUE,
@@ -53,13 +54,13 @@ def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
         Effect.PERSISTENT,
         Effect.NONE,
     ]
-    assert played.exchanges[2].rank is Rank.STOP
+    assert played.exchanges[3].rank is Rank.STOP
 
 
 def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
     play(
         write(prepared(), position_p=33, max_temperature=65, torque_limit=0.5),
-        *looks(writes(3, 13, 65), writes(3, 21, 33)),
+        *looked(writes(3, 13, 65), writes(3, 21, 33)),
         *(UNLOCK, OFF, IDLE, writes(3, 13, 65), reads(3, 13, 65), writes(3, 21, 33), reads(3, 21, 33)),
         *(STILL_OPEN, LOCK, LOCKED, writes(3, 48, 0xF4, 1)),
     )
@@ -69,7 +70,7 @@ def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
     played = watch(
         write(prepared(), operating_mode=1),
         *(
-            *looks(writes(3, 33, 1)),
+            *looked(writes(3, 33, 1)),
             UNLOCK,
             OFF,
             IDLE,
@@ -87,9 +88,9 @@ def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
 def test_a_reg_write_that_waits_is_replaced_by_one_that_moves_nothing() -> None:
     harmless = Line(packet(3, REG_WRITE, 40, 0), packet(3, 0))
     played = watch(
-        write(prepared(), position_p=33, led_mask=5), *(*WHOLE[:3], reads(3, 64, 1), harmless, *WHOLE[4:])
+        write(prepared(), position_p=33, led_mask=5), *(*WHOLE[:4], reads(3, 64, 1), harmless, *WHOLE[5:])
     )
-    assert played.exchanges[4].effect is Effect.NONE
+    assert played.exchanges[5].effect is Effect.NONE
 
 
 def test_settings_are_read_again_afterwards() -> None:
@@ -97,7 +98,7 @@ def test_settings_are_read_again_afterwards() -> None:
     play(
         write(node, operating_mode=1),
         *(
-            *looks(writes(3, 33, 1)),
+            *looked(writes(3, 33, 1)),
             UNLOCK,
             OFF,
             IDLE,
@@ -201,7 +202,7 @@ def test_a_lock_that_cannot_be_closed_is_told_with_the_error() -> None:
 def test_a_servo_that_acknowledges_nothing_is_read_back_at_every_step() -> None:
     play(
         write(prepared(at_8=0), led_mask=5),
-        *(*looks(writes(3, 20, 5)), unheard(UNLOCK), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
+        *(*looked(writes(3, 20, 5)), unheard(UNLOCK), reads(3, 55, 0), unheard(OFF), reads(3, 40, 0), IDLE),
         *(unheard(writes(3, 20, 5)), reads(3, 20, 5), reads(3, 20, 5)),
         *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
@@ -211,7 +212,7 @@ def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
     play(
         write(prepared(), status_return_level=0),
         *(
-            *looks(writes(3, 8, 0)),
+            *looked(writes(3, 8, 0)),
             UNLOCK,
             OFF,
             IDLE,

@@ -182,7 +182,7 @@ def test_an_action_does_not_carry_out_what_waited_through_it(between: Any, every
         assert "reg_write" in caught.value.advice or "make it again" in caught.value.advice
         later(servo)
         assert real.motion.position(real._now()) == pytest.approx(stood, abs=1)
-        assert real.memory["torque_enable"] == 0
+        assert real.memory["torque_enable"] == (between is limits)
 
 
 def test_a_reg_write_of_another_object_is_stopped_for_all() -> None:

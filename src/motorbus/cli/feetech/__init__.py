@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, second_id, tables, tuning
 from motorbus.cli.feetech.commands import COMMANDS
-from motorbus.cli.feetech.offers import say
+from motorbus.cli.feetech.offers import say, torque_after_write, torque_told
 from motorbus.cli.feetech.orders import app
 from motorbus.cli.feetech.together import move_together, ping_everyone
 
@@ -24,5 +24,7 @@ __all__ = [
     "say",
     "second_id",
     "tables",
+    "torque_after_write",
+    "torque_told",
     "tuning",
 ]

@@ -16,6 +16,7 @@ from motorbus.families.feetech.driver.capping import cap_current, cap_torque
 from motorbus.families.feetech.driver.copying import copyable
 from motorbus.families.feetech.driver.counting import ManyTurns, Recounted, many_turns, set_many_turns
 from motorbus.families.feetech.driver.drive import set_current, set_duty, set_velocity, step
+from motorbus.families.feetech.driver.eeprom import TorqueAfterWrite
 from motorbus.families.feetech.driver.feedback import (
     current,
     load,
@@ -47,6 +48,7 @@ from motorbus.families.feetech.driver.registers import (
     read_raw,
     reg_write,
     rewrite,
+    torque_after_write,
     write,
 )
 from motorbus.families.feetech.driver.renaming import set_id
@@ -93,6 +95,7 @@ __all__ = [
     "States",
     "Suspicion",
     "SyncWriter",
+    "TorqueAfterWrite",
     "TorqueLimit",
     "Train",
     "Zero",
@@ -157,6 +160,7 @@ __all__ = [
     "sync_writer",
     "telemetry",
     "temperature",
+    "torque_after_write",
     "torque_limit",
     "train",
     "velocity",

@@ -12,10 +12,9 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import writable
-from motorbus.families.feetech.driver.motion import ordered
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import shown_mode
-from motorbus.families.feetech.driver.rest import asked_anew
+from motorbus.families.feetech.driver.rest import asked_anew, ordered
 from motorbus.families.feetech.driver.tuning import limiting, set_torque_limit
 from motorbus.families.feetech.table import Mode
 

@@ -14,11 +14,11 @@ from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
-from motorbus.families.feetech.driver.motion import ON, finite, ordered, stops, way
+from motorbus.families.feetech.driver.motion import finite, stops, way
 from motorbus.families.feetech.driver.node import MANY_TURNS, Node
 from motorbus.families.feetech.driver.orders import DUTY, speed_goal, unheeded
 from motorbus.families.feetech.driver.pace import burst, ramp_of
-from motorbus.families.feetech.driver.rest import asked_anew, unpublished_duty, with_bound
+from motorbus.families.feetech.driver.rest import ON, asked_anew, ordered, unpublished_duty, with_bound
 from motorbus.families.feetech.table import Mode
 
 

@@ -13,6 +13,9 @@ Ctrl-C, a cancelled task) the last thing this sequence says is "lock". The lock 
 not whether it is taken; and flash takes time, so these exchanges may take Timeout.STORE.
 
 Cells wear, so what they hold already is not written again (`store`).
+
+A caller that passes `Torque` gets the torque back that this sequence took: goal := present position and torque on, also
+when the write has failed. It stays off when another stop has left for this servo meanwhile, or when it has restarted.
 Source: STS3215 memory table V3.6; measured on hardware by feetech-cli (what the lock does) and by public recovery
 tools (an acknowledgement may take more than 21 ms).
 """
@@ -24,8 +27,18 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Entry, Storage, Table
 from motorbus.core.goal import Later
-from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout, afterwards, outcome
-from motorbus.errors import OutcomeUnknown
+from motorbus.core.operation import (
+    Alone,
+    Effect,
+    Operation,
+    Rank,
+    Report,
+    Stops,
+    Timeout,
+    afterwards,
+    outcome,
+)
+from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
     DOUBTS,
@@ -37,9 +50,64 @@ from motorbus.families.feetech.driver.exchanges import (
     verified,
 )
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.torque import LIMP, disable_torque
+from motorbus.families.feetech.driver.rest import is_limp, torque_on_unless
+from motorbus.families.feetech.driver.torque import LIMP, disable_torque, limp
 
 T = TypeVar("T")
+
+
+class TorqueAfterWrite(NamedTuple):
+    """An event for `Report`: a servo that had torque before a write to EEPROM has it again, or not, and why."""
+
+    node: int
+    on: bool
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.on:
+            return f"node {self.node}: torque is on again, goal := present position"
+        return f"node {self.node}: torque was on before the write and is off now: {self.why}"
+
+
+class Torque:
+    """The torque that a guarded write takes and gives back.
+
+    `stays_off`: why it must not be given back, "" where it may.
+    """
+
+    def __init__(self, stays_off: str = "") -> None:
+        self.stays_off = stays_off
+        self.was_on = False
+        self.opened = False
+        self._node = 0
+        self._stops = -1
+
+    def taken(self, node: Node) -> Operation[None]:
+        """Torque off again, and remember how many stops have left for this servo. Refused when others left since."""
+        self._node = node.node
+        block = limp(node.node)._replace(refusal=self._count)
+        yield from confirmed(node, block, rank=Rank.CONFIGURATION)
+
+    def taken_anew(self, node: Node) -> Operation[None]:
+        """The same after a stop of our own."""
+        self._stops = -1
+        yield from self.taken(node)
+
+    def _count(self, stops: Stops) -> MotorbusError | None:
+        if self._stops < 0:
+            self._stops = stops(self._node)
+        return self.refusal(stops)
+
+    def refusal(self, stops: Stops) -> MotorbusError | None:
+        """The error when another stop has left for this servo since its torque was taken."""
+        if stops(self._node) <= self._stops:
+            return None
+        return RequestError(
+            "it was stopped while its EEPROM was written",
+            advice="enable_torque() switches its torque on",
+            node=self._node,
+        )
+
 
 _STATUS_RETURN_LEVEL: Final = 8
 _ATTEMPTS: Final = 2
@@ -55,7 +123,9 @@ class Change(NamedTuple):
     before: bytes
 
 
-def store(node: Node, table: Table, blocks: Sequence[Block], *, always: bool = False) -> Operation[bool]:
+def store(
+    node: Node, table: Table, blocks: Sequence[Block], *, always: bool = False, torque: Torque | None = None
+) -> Operation[bool]:
     """Make these EEPROM registers hold this for good, with nobody else on the bus meanwhile; gives whether it wrote.
 
     They are read first, and only those are written that hold something else; when none does, there is no unlock and no
@@ -64,18 +134,22 @@ def store(node: Node, table: Table, blocks: Sequence[Block], *, always: bool = F
     What reads back need not be what is kept: a write with the lock closed is obeyed and gone at power-off, and no
     register tells the two apart. So what this node wrote in a sequence that did not come to its end is written whatever
     it reads; what other programs wrote behind a closed lock cannot be known, and `always` is for whoever suspects that.
+
+    With `torque` the servo gets back the torque that this takes from it, and `TorqueAfterWrite` is reported.
     """
-    return (yield from Alone(_stored_unlike(node, table, blocks, always)))
+    return (yield from Alone(_stored_unlike(node, table, blocks, always, torque)))
 
 
-def _stored_unlike(node: Node, table: Table, blocks: Sequence[Block], always: bool) -> Operation[bool]:
+def _stored_unlike(
+    node: Node, table: Table, blocks: Sequence[Block], always: bool, torque: Torque | None
+) -> Operation[bool]:
     lock = table["lock"].address
     changes: list[Change] = []
     for block in blocks:
         changes += yield from _unlike(node, table, block, always)
     if not changes:
         if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) == _OPEN:
-            yield from _locked(node, lock, (), ())
+            yield from _locked(node, lock, (), (), Torque())
         return False
     begun: list[Change] = []
 
@@ -87,7 +161,9 @@ def _stored_unlike(node: Node, table: Table, blocks: Sequence[Block], always: bo
             block = change.block._replace(effect=Effect.PERSISTENT)  # it is limp: nothing can move
             yield from stored(node, block)
 
-    yield from _guarded(node, table, write, begun)
+    if torque is not None:
+        torque.was_on = not (yield from is_limp(node))
+    yield from _guarded(node, table, write, begun, torque or Torque())
     return True
 
 
@@ -123,18 +199,19 @@ def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> Oper
 
     Its settings are forgotten before anybody else has the bus again, so what others made by them meanwhile is refused.
     """
-    return (yield from Alone(_guarded(node, table, work, ())))
+    return (yield from Alone(_guarded(node, table, work, (), Torque())))
 
 
 def _guarded(
-    node: Node, table: Table, work: Callable[[], Operation[T]], begun: Sequence[Change]
+    node: Node, table: Table, work: Callable[[], Operation[T]], begun: Sequence[Change], torque: Torque
 ) -> Operation[T]:
     lock, pending = table["lock"].address, table["reg_write_pending"].address
     trouble: list[BaseException] = []
     doubted, node.unsure = node.unsure, set()
     try:
         done = yield from afterwards(
-            _opened(node, lock, pending, work, trouble), lambda: _locked(node, lock, trouble, begun)
+            _opened(node, lock, pending, work, trouble, torque),
+            lambda: _locked(node, lock, trouble, begun, torque),
         )
         doubted, node.unsure = doubted - node.unsure, set()
         return done
@@ -155,11 +232,19 @@ def moves(table: Table, block: Block) -> bool:
 
 
 def _opened(
-    node: Node, lock: int, pending: int, work: Callable[[], Operation[T]], trouble: list[BaseException]
+    node: Node,
+    lock: int,
+    pending: int,
+    work: Callable[[], Operation[T]],
+    trouble: list[BaseException],
+    torque: Torque,
 ) -> Operation[T]:
     try:
         yield from _put(node, _lock(lock, 0))
+        torque.opened = True
         yield from disable_torque(node)
+        if torque.was_on:
+            yield from torque.taken_anew(node)
         yield from _harmless(node, pending)
         done = yield from work()
         yield from still_open(node, lock)
@@ -211,24 +296,59 @@ def _put(node: Node, block: Block) -> Operation[None]:
 
 
 def _locked(
-    node: Node, lock: int, trouble: Sequence[BaseException], begun: Sequence[Change]
+    node: Node, lock: int, trouble: Sequence[BaseException], begun: Sequence[Change], torque: Torque
 ) -> Operation[None]:
     """Close the lock and see that it is closed. When something has gone wrong already, that is what is raised, and
     a lock that cannot be closed is told with it; whoever may have restarted with torque on is let go before, and what
     it took behind a lock that closed by itself is taken back."""
-    if trouble and (yield from outcome(disable_torque(node))) is None and begun:
-        yield from outcome(_taken_back(node, lock, begun))
+    if trouble:
+        if torque.was_on:
+            yield from _still_ours(node, lock, torque)
+        if (yield from outcome(disable_torque(node))) is None and begun:
+            yield from outcome(_taken_back(node, lock, begun))
     for _ in range(_ATTEMPTS):
         failure = yield from outcome(_closed(node, lock))
         if failure is None:
+            yield from _torque_restored(node, trouble, torque)
             return
     assert failure is not None
+    torque.stays_off = torque.stays_off or "its EEPROM lock may be open"
+    yield from _torque_restored(node, trouble or [failure], torque)
     if not trouble:
         raise failure
     trouble[0].add_note(
         f"the EEPROM lock of node {node.node} may still be open, which makes later writes permanent: "
         f"write(lock=1) closes it ({failure.summary})"
     )
+
+
+def _still_ours(node: Node, lock: int, torque: Torque) -> Operation[None]:
+    """After a failure: may the torque be given back? Not after a stop of another caller, nor after a restart."""
+    stopped = yield from outcome(torque.taken(node))
+    if stopped is not None:
+        torque.stays_off = torque.stays_off or stopped.summary
+    if torque.opened:
+        torque.opened = False  # this may run again after an interrupt, when the lock is closed
+        found = yield from outcome(read_block(node, lock, 1, bytes, timeout=Timeout.STORE))
+        if found != _OPEN:
+            torque.stays_off = torque.stays_off or "it has restarted, or does not answer"
+
+
+def _torque_restored(node: Node, trouble: Sequence[BaseException], torque: Torque) -> Operation[None]:
+    """Goal := present position and torque on where the torque was on; the outcome is reported, or noted on an error."""
+    if not torque.was_on:
+        return
+    why = torque.stays_off
+    if not why:
+        if trouble:
+            yield from outcome(torque.taken_anew(node))
+        failure = yield from outcome(torque_on_unless(node, torque.refusal))
+        why = "" if failure is None else failure.summary
+    event = TorqueAfterWrite(node.node, not why, why)
+    if trouble:
+        trouble[0].add_note(str(event))
+    else:
+        yield from Report(event)
 
 
 def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> Operation[None]:

@@ -60,6 +60,7 @@ class Block(NamedTuple):
 
     `repeatable`: writing it twice does no more than writing it once. `under` are the settings that its goals were
     reckoned by, where it is kept for a while before it is sent; None: those that are known when it is made a packet.
+    `refusal` is a further reason not to send it.
     """
 
     address: int
@@ -68,6 +69,7 @@ class Block(NamedTuple):
     goals: tuple[Goal, ...] = ()
     repeatable: bool = True
     under: Settings | None = None
+    refusal: Refusal | None = None
 
 
 def read_block(
@@ -174,9 +176,17 @@ def acknowledged(
         goals=block.goals if block else (),
         timeout=timeout,
         repeatable=block is not None and block.repeatable,
-        refusal=refusal or changed_since([(node, block.under if block else None)]),
+        refusal=refusal or _refusal_of(node, block),
         later=later,
     )
+
+
+def _refusal_of(node: Node, block: Block | None) -> Refusal:
+    changed = changed_since([(node, block.under if block else None)])
+    if block is None or block.refusal is None:
+        return changed
+    own = block.refusal
+    return lambda stops: changed(stops) or own(stops)
 
 
 def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Refusal:

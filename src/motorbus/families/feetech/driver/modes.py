@@ -17,9 +17,8 @@ from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.bound import leaving_current_mode
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import prepare, writable
-from motorbus.families.feetech.driver.motion import ordered
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.rest import at_rest, unknown_mode, unpublished_duty
+from motorbus.families.feetech.driver.rest import at_rest, ordered, unknown_mode, unpublished_duty
 from motorbus.families.feetech.driver.torque import disable_torque
 from motorbus.families.feetech.table import Mode
 

@@ -13,13 +13,12 @@ from functools import partial
 from typing import Final, TypeVar
 
 from motorbus.core.entry import Table, is_number, shown
-from motorbus.core.goal import torque_on
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.operation import Effect, Operation, Pause, Runnable, outcome
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
-from motorbus.families.feetech.driver.exchanges import Block, confirmed
+from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.feedback import position
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import position_goal, speed_goal
@@ -27,17 +26,16 @@ from motorbus.families.feetech.driver.pace import burst, ramp_of
 from motorbus.families.feetech.driver.rest import (
     asked_anew,
     at_rest,
-    beginning,
-    checked_jump,
     held,
     is_limp,
     not_turns_away,
+    ordered,
     outside,
     surely_on,
     switched_on,
+    torque_on_unless,
     unknown_mode,
 )
-from motorbus.families.feetech.driver.torque import TORQUE_ENABLE
 from motorbus.families.feetech.table import Mode
 
 T = TypeVar("T")
@@ -65,7 +63,6 @@ class Promise(Enum):
     TORQUE_OFF_ACCEPTED = "torque off accepted: it goes limp at once, and an arm sags or falls"
 
 
-ON: Final = Block(TORQUE_ENABLE, b"\1", Effect.TORQUE)
 OLD: Final = 0.1
 """s from the reading of a position to the goal that is made of it. Nothing but the host lies between: milliseconds, a
 few of ten on a machine that is busy. Within it a servo at 50 turns/min, as fast as an STS3215 is without load, comes
@@ -97,19 +94,7 @@ def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
     of many turns that tells its position within one (there `jump` must be as much as all of them); for a `jump` that
     is no finite number from 0 on; MotionError when its torque is off again at once, or it has forgotten its turns.
     """
-    checked_jump(node, jump)
-    table = yield from asked_anew(node)
-    mode = node.known_mode
-    if mode is None:
-        raise unknown_mode(node)
-    if mode is Mode.STEP:
-        yield from confirmed(node, ON._replace(goals=(torque_on(node.node),)))
-    else:
-        block = yield from beginning(node, table, mode, jump)
-        yield from ordered(node, table, block)
-        if mode is Mode.POSITION:
-            yield from not_turns_away(node, table, block, jump)
-    yield from surely_on(node)
+    yield from torque_on_unless(node, None, jump=jump)
 
 
 def stop(node: Node) -> Operation[Promise]:
@@ -196,18 +181,6 @@ def calmed(node: Node, table: Table) -> Operation[None]:
             node=node.node,
         )
     yield from ordered(node, table, block)
-
-
-def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
-    """Write an order and be sure of it; what it says of the bound of the current is known from then on."""
-    row = table[node.control.current] if node.control.current else None
-    told = row is not None and block.address <= row.address < block.address + len(block.data)
-    if row is not None and told:
-        node.bound = None
-    yield from confirmed(node, block)
-    if row is not None and told:
-        at = row.address - block.address
-        node.bound = row.decode(block.data[at : at + row.size])
 
 
 # -- move ----------------------------------------------------------------------------------------------------

@@ -37,10 +37,13 @@ from motorbus.families.feetech.driver.orders import (
     only_block,
     orders_of,
 )
+from motorbus.families.feetech.driver.rest import is_limp
 from motorbus.families.feetech.driver.torque import disable_torque
 
 IDLE: Final = b"\0"
 WAITING: Final = b"\1"
+_REDEFINES_GOALS: Final = frozenset(("operating_mode", "phase", "angular_resolution"))
+"""EEPROM registers that give a goal another meaning."""
 _GAP: Final = 8
 """Bytes between two rows that are cheaper to read than to leave out: a request has 8, a reply 6, and a pause."""
 
@@ -112,15 +115,47 @@ def _end(row: Entry) -> int:
 def write(node: Node, /, **values: Value) -> Operation[None]:
     """Write registers by name, in API units; all are checked before the first is sent.
 
-    Registers in EEPROM are read first, and what differs goes through the guarded sequence: unlock, torque off (the
-    servo goes limp and stays so), write, read back, lock. When all of them hold that already, none is written and it
-    keeps its torque, unless registers that act on the torque are named with them. That others wrote them behind a
-    closed lock, so that they are gone at power-off, cannot be seen: `rewrite` is for that. What changes the meaning of
-    a goal (`control_loop` of HLS) lets it go limp as well. Raises RequestError for what cannot or must not be written
-    so, and for goals together with EEPROM; DeviceError when the register map is not known, VerificationFailed when
-    EEPROM reads back different.
+    Registers in EEPROM are read first, and what differs goes through the guarded sequence: unlock, torque off, write,
+    read back, lock. A servo that had torque gets it back, with the goal at its present position, also when the write
+    fails; an arm sags meanwhile. Torque stays off where a goal would mean something else afterwards
+    (`torque_after_write`), where `enable_torque` refuses, and after a stop or a restart meanwhile. Reports
+    `TorqueAfterWrite`. When all of them hold that already, none is written and it keeps its torque, unless registers
+    that act on the torque are named with them. That others wrote them behind a closed lock, so that they are gone at
+    power-off, cannot be seen: `rewrite` is for that. What changes the meaning of a goal (`control_loop` of HLS) lets
+    it go limp as well. Raises RequestError for what cannot or must not be written so, and for goals together with
+    EEPROM; DeviceError when the register map is not known, VerificationFailed when EEPROM reads back different.
     """
     yield from _written(node, values, always=False)
+
+
+def write_limp(node: Node, values: Mapping[str, Value]) -> Operation[None]:
+    """As `write`, and torque stays off after a write to EEPROM."""
+    yield from _written(node, values, always=False, restore=False)
+
+
+def torque_after_write(node: Node, /, **values: Value) -> Operation[str | None]:
+    """What a write of these registers does to the torque: None when it is off, or none of them is in EEPROM; "" when
+    the servo gets it back; else why it stays off."""
+    check_values(values)
+    table = yield from writable(node)
+    orders = orders_of(node, table, values)
+    if not any(order.row.storage is Storage.EEPROM for order in orders) or (yield from is_limp(node)):
+        return None
+    return _stays_off(node, orders)
+
+
+def _stays_off(node: Node, orders: Sequence[Order]) -> str:
+    """Why the torque must stay off after these, "" where it may come back."""
+    raws = {order.row.name: order.raw for order in orders}
+    settings = node.settings
+    for order in orders:
+        if order.row.name in _REDEFINES_GOALS or limps(order.row):
+            return f"{order.row.name} changes what a goal means"
+    if raws.keys() & {"min_position_limit", "max_position_limit"}:
+        unlimited = settings is None or settings.many_turns or settings.limits is None
+        if unlimited or raws.get("max_position_limit") == 0:
+            return "position limits of 0 change what a goal means"
+    return "torque_enable is written too" if "torque_enable" in raws else ""
 
 
 def rewrite(node: Node, /, **values: Value) -> Operation[None]:
@@ -131,7 +166,9 @@ def rewrite(node: Node, /, **values: Value) -> Operation[None]:
     yield from _written(node, values, always=True)
 
 
-def _written(node: Node, values: Mapping[str, Value], *, always: bool) -> Operation[None]:
+def _written(
+    node: Node, values: Mapping[str, Value], *, always: bool, restore: bool = True
+) -> Operation[None]:
     check_values(values)
     table = yield from writable(node)
     orders = orders_of(node, table, values)
@@ -140,7 +177,9 @@ def _written(node: Node, values: Mapping[str, Value], *, always: bool) -> Operat
     live = [order for order in orders if order.row.storage is not Storage.EEPROM]
     limp = any(limps(order.row) for order in live)
     if kept:
-        wrote = yield from eeprom.store(node, table, _kept(node, table, orders, kept), always=always)
+        torque = eeprom.Torque(_stays_off(node, orders)) if restore else None
+        stored = _kept(node, table, orders, kept)
+        wrote = yield from eeprom.store(node, table, stored, always=always, torque=torque)
         limp |= not wrote and any(order.row.effect is Effect.TORQUE for order in live)
     if limp:
         yield from disable_torque(node)

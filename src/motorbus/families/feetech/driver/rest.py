@@ -13,11 +13,11 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.entry import Table, is_number, shown
-from motorbus.core.goal import Stays
-from motorbus.core.operation import Goal, Operation
+from motorbus.core.goal import Stays, torque_on
+from motorbus.core.operation import Effect, Goal, Operation, Refusal
 from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
-from motorbus.families.feetech.driver.exchanges import PRESENT, Block, outdated, read_block
+from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, outdated, read_block
 from motorbus.families.feetech.driver.identity import prepare, writable
 from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.driver.orders import no_limits, shown_mode
@@ -27,6 +27,7 @@ from motorbus.families.feetech.table import Mode
 
 _QUANTITY: Final = {Mode.VELOCITY: "velocity", Mode.PWM: "load", Mode.CURRENT: "current"}
 _ON: Final = b"\1"
+ON: Final = Block(TORQUE_ENABLE, b"\1", Effect.TORQUE)
 _COMMANDS: Final = 8
 """Bytes from the torque switch to the goal velocity, registers 40 to 47 in every map."""
 _HERE, _AWAY = "here", "away"
@@ -63,6 +64,23 @@ def surely_on(node: Node) -> Operation[None]:
 
 
 # -- torque on -----------------------------------------------------------------------------------------------
+
+
+def torque_on_unless(node: Node, refusal: Refusal | None, *, jump: float = 0.0) -> Operation[None]:
+    """`enable_torque`, with a further reason not to send the packet that switches the torque on."""
+    checked_jump(node, jump)
+    table = yield from asked_anew(node)
+    mode = node.known_mode
+    if mode is None:
+        raise unknown_mode(node)
+    if mode is Mode.STEP:
+        yield from confirmed(node, ON._replace(goals=(torque_on(node.node),), refusal=refusal))
+    else:
+        block = yield from beginning(node, table, mode, jump)
+        yield from ordered(node, table, block._replace(refusal=refusal))
+        if mode is Mode.POSITION:
+            yield from not_turns_away(node, table, block, jump)
+    yield from surely_on(node)
 
 
 def beginning(node: Node, table: Table, mode: Mode, jump: float) -> Operation[Block]:
@@ -129,6 +147,18 @@ def checked_jump(node: Node, jump: float) -> None:
             advice="leave it out to allow none; nothing was sent",
             node=node.node,
         )
+
+
+def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
+    """Write an order and be sure of it; what it says of the bound of the current is known from then on."""
+    row = table[node.control.current] if node.control.current else None
+    told = row is not None and block.address <= row.address < block.address + len(block.data)
+    if row is not None and told:
+        node.bound = None
+    yield from confirmed(node, block)
+    if row is not None and told:
+        at = row.address - block.address
+        node.bound = row.decode(block.data[at : at + row.size])
 
 
 # -- stay ----------------------------------------------------------------------------------------------------

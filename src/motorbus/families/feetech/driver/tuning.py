@@ -1,9 +1,9 @@
 """How strong, how stiff and how careful a servo is: torque limit, gains of its loops, protection; as verbs.
 
 Which registers a servo has for this is a question of its map, and asking for what it lacks is refused by name. What
-lies in EEPROM goes through the guarded sequence, after which the servo is limp, unless it holds that already (`write`);
-what lies in RAM acts at once and is gone after power-off. Registers 34 and 35 are gains of the current loop on HLS and
-protection on STS: here they are found by what they are, never by where they are.
+lies in EEPROM goes through the guarded sequence, after which the servo is limp, unless it holds that already
+(see `write`); what lies in RAM acts at once and is gone after power-off. Registers 34 and 35 are gains of the current
+loop on HLS and protection on STS: here they are found by what they are, never by where they are.
 Source: FD 1.9.8.5; STS3215 memory table V3.6; HLS memory table; SCS memory table 1902.
 """
 
@@ -20,7 +20,7 @@ from motorbus.families.feetech.driver.exchanges import Block, verified
 from motorbus.families.feetech.driver.identity import writable
 from motorbus.families.feetech.driver.motion import calmed
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.registers import read, read_raw, write
+from motorbus.families.feetech.driver.registers import read, read_raw, write_limp
 from motorbus.families.feetech.driver.rest import asked_anew
 from motorbus.families.feetech.table import CONTROL
 
@@ -317,7 +317,7 @@ def _lacks(node: Node, table: Table, part: str, has: Iterable[str]) -> RequestEr
 
 def _put(node: Node, table: Table, values: Mapping[str, Value]) -> Operation[None]:
     """Write by name; EEPROM is read back by the guarded sequence, RAM here."""
-    yield from write(node, **values)
+    yield from write_limp(node, values)
     for name, value in values.items():
         row = table[name]
         if row.storage is Storage.RAM:
