@@ -110,3 +110,15 @@ def test_it_ends_where_a_port_is_not_looked_for(
     monkeypatch.setattr(monitor, "_pause", pulled)
     ran = run("monitor", f"{arm.url}#1", "--reconnect", "no", "--count", "12", "--json")
     assert ran.code == 3
+
+
+def test_a_bus_of_the_file_is_its_axes_without_a_scan_and_a_silent_one_has_its_row(
+    run: Run, bench: Bench
+) -> None:
+    bench.simulations["arm"][2].unplug()
+    ran = run("monitor", "arm", "--count", "1", "--json", "-vv")
+    rows = ran.records
+    assert [(row["axis"], "error" in row) for row in rows] == [("a1", False), ("a2", True), ("a3", False)]
+    assert ran.code == 6
+    asked = {line.split()[line.split().index("tx") + 3] for line in ran.err.splitlines() if " tx " in line}
+    assert asked == {"01", "02", "03"}

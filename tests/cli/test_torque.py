@@ -27,11 +27,49 @@ def test_on_does_not_jump_to_the_old_goal(run: Run, arm: Simulation) -> None:
     assert run("read", f"{arm.url}#1", "goal_position", "--json").document["registers"][0]["raw"] == 2048
 
 
-def test_a_bus_without_ids_means_everyone(run: Run, arm: Simulation) -> None:
+EVERYONE_OFF = "FF FF FE 04 03 28 00 D2"
+
+
+def sent(err: str) -> list[str]:
+    """The frames of a command that was run with -vv."""
+    return [line.partition(" tx ")[2] for line in err.splitlines() if " tx " in line]
+
+
+def test_a_whole_bus_is_switched_off_by_one_broadcast_and_nothing_else(run: Run, arm: Simulation) -> None:
     assert run("torque", "on", f"{arm.url}#1-3").code == 0
-    ran = run("torque", "off", arm.url, "--json")
-    assert [(one["id"], one["done"]) for one in ran.document["devices"]] == [(1, True), (2, True), (3, True)]
+    ran = run("torque", "off", arm.url, "--json", "-vv")
+    (row,) = ran.document["devices"]
+    assert (ran.code, row["id"], row["done"]) == (0, None, True)
+    assert "no device acknowledges a broadcast" in row["promise"]
+    assert sent(ran.err) == [EVERYONE_OFF]
     assert all(limp(run, arm, node) for node in (1, 2, 3))
+
+
+def test_a_bus_of_the_file_is_broadcast_first_then_its_axes_answer_or_have_their_row(
+    run: Run, bench: Bench
+) -> None:
+    arm = bench.simulations["arm"]
+    assert run("torque", "on", "a1", "a2", "a3").code == 0
+    arm[2].unplug()
+    for bus, first in (("arm", []), (bench.machine.buses["arm"].address, [(None, None, True)])):
+        ran = run("torque", "off", bus, "--json", "-vv")
+        told = [(one.get("axis"), one["id"], one["done"]) for one in ran.document["devices"]]
+        assert told == [*first, ("a1", 1, True), ("a2", 2, False), ("a3", 3, True)]
+        assert ran.code == 6
+        frames = sent(ran.err)
+        assert frames[0] == EVERYONE_OFF
+        assert {frame.split()[2] for frame in frames[1:]} == {"01", "02", "03"}
+
+
+def test_a_dry_run_of_a_whole_bus_shows_the_broadcast(run: Run, arm: Simulation) -> None:
+    (one,) = run("torque", "off", arm.url, "--dry-run", "--json").document["withheld"]
+    assert one["data"] == EVERYONE_OFF
+
+
+def test_kst_servos_have_no_torque_switch_to_broadcast_to(run: Run) -> None:
+    ran = run("torque", "off", "kst:sim,ids=0x25")
+    assert ran.code == 2
+    assert "have no torque switch" in ran.err
 
 
 def test_one_that_is_gone_does_not_keep_the_others_stiff(run: Run, arm: Simulation) -> None:

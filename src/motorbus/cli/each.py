@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from motorbus.cli import faces
 from motorbus.cli.dry import DryBus, show
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.machine import axes_called, name_of
+from motorbus.cli.machine import axes_at, axes_called, is_address, name_of
 from motorbus.cli.target import able, everyone, face, gathered, offers, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.errors import LinkError, MotorbusError, NoReply, PortBusy
+from motorbus.errors import LinkError, MotorbusError, PortBusy
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from motorbus.bus.pump import Bus
     from motorbus.cli.output import Output
 
     Look = Callable[[Sequence[dict[str, Any]], Mapping[str, str], Output], list[MotorbusError]]
+
+
+BROADCAST: Final = "torque off was broadcast to every device on the bus; no device acknowledges a broadcast"
 
 
 def each(
@@ -35,9 +39,10 @@ def each(
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
 
     Where a family has no such verb nothing is opened: RequestError. A bus that fails keeps nobody on another waiting. A
-    bus that is called by its name means the devices of its axes, be they silent, and whoever else answers. A dry run
-    shows what would be sent, and sends none of it. `unknown` are errors of words that meant nobody. `look` is asked
-    when everyone was visited: what it finds wrong with what was achieved is raised before anything else.
+    bus that is called by its name means its axes in the file, and its address every device that answers. Where one
+    broadcast does it, a whole bus gets that first and is not scanned. A dry run shows what would be sent, and sends
+    none of it. `unknown` are errors of words that have no meaning here. `look` is asked when every device was visited:
+    what it finds wrong with what was achieved is raised before anything else.
     """
     results: list[dict[str, Any]] = []
     errors: list[MotorbusError] = []
@@ -45,12 +50,22 @@ def each(
     for name in wanted:
         offers(target(name).family, verb)
     for name, nodes in wanted.items():
+        everyone_at_once = None if nodes else faces.offer(target(name).family.name, f"{verb}_everyone")
         expected = nodes or tuple(node for bus, node in called if bus == name)
+        if everyone_at_once is not None and not expected:
+            called |= {(name, node): axis for node, axis in axes_at(name).items()}
+            expected = tuple(node for bus, node in called if bus == name)
         there: list[dict[str, Any]] = []
         try:
             with opened(name, options, output) as bus:
                 rehearsal = DryBus(bus)
-                for node in _visited(name, bus, expected, output, others=not nodes):
+                if everyone_at_once is not None:
+                    (rehearsal.apart() if dry_run else bus).run(everyone_at_once())
+                    if any(is_address(word) and target(word).bus == name for word in devices):
+                        there.append({"bus": name, "id": None, "done": True, "promise": BROADCAST})
+                elif not expected:
+                    expected = everyone(name, bus, (), output)
+                for node in expected:
                     carrier = rehearsal.apart() if dry_run else bus
                     there.append({"bus": name, "id": node, **_tried(carrier, node, verb, errors)})
                 if dry_run:
@@ -59,7 +74,9 @@ def each(
             _advise(error, name)
             if len(wanted) == 1 and not there and not unknown:
                 raise
-            there += _unvisited(name, expected[len(there) :] or (None,), error, errors)
+            seen = {one["id"] for one in there}
+            rest = tuple(node for node in expected if node not in seen)
+            there += _unvisited(name, rest or (None,), error, errors)
         results += [{**one, **_named(called, name, one["id"])} for one in there]
     doubts = look(results, options, output) if look is not None and not dry_run else []
     if not dry_run:
@@ -69,22 +86,6 @@ def each(
     if doubts:
         raise _with_notes(doubts[0], [*doubts[1:], *errors, *unknown])
     return _verdict([*errors, *unknown], len(results) + len(unknown))
-
-
-def _visited(
-    name: str, bus: Bus, expected: tuple[int, ...], output: Output, *, others: bool
-) -> Iterator[int]:
-    """Those who ought to be there, answer or not, and then the others who answer. Raises NoReply for nobody at all."""
-    yield from expected
-    if not others:
-        return
-    try:
-        found = everyone(name, bus, (), output)
-    except NoReply:
-        if not expected:
-            raise
-        return
-    yield from (node for node in found if node not in expected)
 
 
 def _advise(error: MotorbusError, bus: str) -> None:

@@ -4,6 +4,7 @@ A family's face is the module (or package) of its name in this folder. Apart fro
 
     move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, begun in the same instant where the
                                                                family can; when one device is lost the others stop
+    disable_torque_everyone()                                  the request that does it on a whole bus in one broadcast
     ping_everyone(bus)                                         the nodes that answer one broadcast
     budget_frames(family, node)                                what a loop says to a node ("read", "write"): for each
                                                                frame of that exchange all that it may be

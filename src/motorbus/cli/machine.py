@@ -180,6 +180,16 @@ def axes_called(words: Iterable[str]) -> dict[tuple[str, int], str]:
     return found
 
 
+def axes_at(address: str) -> dict[int, str]:
+    """The axes of the machine file on the bus at this address, by id; none without a file, or where it has an error."""
+    try:
+        known = machine() if machine_file().path is not None else None
+    except RequestError:
+        return {}
+    axes = known.axes.items() if known is not None else ()
+    return {spec.node: name for name, spec in axes if known and known.buses[spec.bus].address == address}
+
+
 def name_of(address: str) -> str:
     """What a bus is called in the machine file; its address where there is none, or it is not in there."""
     try:

@@ -31,6 +31,8 @@ app = App(
     help_epilogue="""Of an axis of the machine file, `axis at` is its own position, in its own unit;
 everything else is what its device tells, in the angles of the device.
 
+A bus of the machine file means its axes, its address every device that answers.
+
 Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again, and so does one whose
 port is gone: a note says so, and another when it is there again (with
@@ -86,7 +88,11 @@ def monitor(
         raise RequestError("--count and --duration must not be below 0")
     if listen:
         return traffic.listen(devices, count, duration, options, output)
-    wanted, called = gathered(devices), axes_called(devices)
+    called = axes_called(devices)
+    wanted = {
+        bus: nodes or tuple(node for there, node in called if there == bus)
+        for bus, nodes in gathered(devices).items()
+    }
     specs = {key: (name, machine().axes[name]) for key, name in called.items()}
     with ExitStack() as stack, _shown(output, _Columns(_usual(wanted), specs)) as show:
         watched = _watched(wanted, stack, options, output)

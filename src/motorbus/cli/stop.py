@@ -22,9 +22,9 @@ is told to end its project and to stop its motor; that both were accepted is
 all that is ever known of it.
 
 By the names of a machine file: an axis, a group, or a bus, which means its
-axes and whoever else answers on it; with no name at all, every axis of the
-machine. Everyone is visited, whatever happens to another: who is silent, and a
-name that nobody knows, are told of with exit code 6.
+axes in the file; with no name at all, every axis of the machine. All are
+visited, whatever happens to another: a silent device, and a name that is not
+in the file, have their line and exit code 6.
 
 A device that accepts a stop has heard it, and no more. With --verify each is
 looked at afterwards, and what was seen is told beside its promise. One that

@@ -22,7 +22,9 @@ app = App(
     name="torque",
     usage="Usage: motorbus torque on|off BUS[#ID]|AXIS... [OPTIONS]",
     help_epilogue="""`on` first makes the goal the present position, so nothing jumps. `off` visits
-every device whatever happens to some, and lets an arm sag.
+every device whatever happens to some, and lets an arm sag. `off` for a whole
+FEETECH bus broadcasts first, which no servo acknowledges; then it visits the
+axes that the machine file has on that bus.
 
 Axes of a machine file get their torque with the cap that the file gives them,
 and keep it when this command ends, whatever `exit` says there. Those of a
@@ -53,7 +55,7 @@ def torque(
     switch
         on or off
     devices
-        FAMILY:PORT for every device that answers, FAMILY:PORT#ID for some, or axes.
+        FAMILY:PORT for every device on the bus, FAMILY:PORT#ID for some, or axes.
     dry_run
         Read as usual; show the frames that would change something, and send none of those.
     options

@@ -11,10 +11,12 @@ from motorbus.cli.feetech.commands import COMMANDS
 from motorbus.cli.feetech.offers import say, torque_after_write, torque_told
 from motorbus.cli.feetech.orders import app
 from motorbus.cli.feetech.together import move_together, ping_everyone
+from motorbus.families.feetech.driver import disable_torque_everyone
 
 __all__ = [
     "COMMANDS",
     "app",
+    "disable_torque_everyone",
     "duplicates",
     "many_turns",
     "modes",

@@ -58,7 +58,11 @@ from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
 from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
 from motorbus.families.feetech.driver.states import States, sync_read_raw, sync_read_states
-from motorbus.families.feetech.driver.torque import disable_torque, disable_torque_all
+from motorbus.families.feetech.driver.torque import (
+    disable_torque,
+    disable_torque_all,
+    disable_torque_everyone,
+)
 from motorbus.families.feetech.driver.train import Train, limits, train
 from motorbus.families.feetech.driver.tuning import (
     Gains,
@@ -111,6 +115,7 @@ __all__ = [
     "current",
     "disable_torque",
     "disable_torque_all",
+    "disable_torque_everyone",
     "duplicates",
     "enable_torque",
     "factory_restore",

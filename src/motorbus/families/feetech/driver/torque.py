@@ -47,6 +47,11 @@ def disable_torque(node: Node) -> Operation[None]:
     yield from verified(node, LIMP, doubt)
 
 
+def disable_torque_everyone() -> Exchange[None]:
+    """Torque off for every servo on the line, in one broadcast; no servo acknowledges it."""
+    return unanswered(wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, rank=Rank.STOP)
+
+
 def disable_torque_all(ids: Iterable[int | Node]) -> Operation[dict[int, MotorbusError]]:
     """Torque off for all of these: at once by SYNC WRITE, then one after the other until acknowledged.
 
