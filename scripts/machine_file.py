@@ -67,13 +67,15 @@ shoulder = "10 deg"
 slide = "30 mm"
 ```
 
-- A number with a unit stands in quotes: `"90 deg"`, `"2 turn"`, `"30 mm"`, `"0.4 A"`. A number without one is in the
-  unit of the API: rad, m, s, A.
+- A number with a unit stands in quotes: `"90 deg"`, `"2 turn"`, `"30 mm"`, `"0.4 A"`. Angles, lengths, velocities and
+  accelerations need their unit: a bare number is refused. A current without a unit is in A.
 - The name of a bus, an axis, a group or a pose begins with a lower case letter and goes on with lower case letters,
   digits, `_` and `-`, 40 in all at most. No two buses, axes and groups share one.
 - A key that is not on this page is an error, and so is whatever cannot be meant. There is one message, with the place
   in the file, what may stand there and what to do, and nothing has been opened.
 """
+
+BARE: Final = {"current": "in A", "load": "a fraction of 1"}
 
 CONVERSION: Final = """## Positions and angles
 
@@ -219,12 +221,10 @@ def _estops() -> Iterator[str]:
 
 
 def _units() -> Iterator[str]:
-    yield "## Units\n\nWhat a number may be said in, and what it is without a unit.\n"
+    yield "## Units\n\nThe units of a number, and what a number without a unit is.\n"
     measures = [key.measure for key in keys.AXIS.values() if key.measure]
     quantities = dict.fromkeys(quantity for measure in measures for quantity in measure)
-    rows = [
-        [one, keys.api_unit(one) or "a fraction of 1", ", ".join(units.SCALES[one])] for one in quantities
-    ]
+    rows = [[one, BARE.get(one, "refused"), ", ".join(units.SCALES[one])] for one in quantities]
     yield from listed(("quantity", "without a unit", "units"), rows)
 
 

@@ -113,7 +113,7 @@ def test_a_leader_beyond_the_follower_s_limits_leaves_it_where_it_may_be() -> No
     ],
 )
 def test_pairs_that_cannot_be_are_refused(pairs: dict[str, str], match: str) -> None:
-    axes = {"a4": {"travel": "5 mm", "unit": "mm", "low": "0 mm", "high": "4 mm"} | LINEAR}
+    axes = {"a4": {"travel": "5 mm", "unit": "mm", "low": "0 mm", "high": "2 mm"} | LINEAR}
     with machine(arm="1-4", lift=True, axes=axes) as (made, _), Robot.of(made) as robot:
         wanted = {leader: {"slide": "a4"}.get(name, name) for leader, name in pairs.items()}
         with pytest.raises(RequestError, match=match):

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+import motorbus
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Identity
 from motorbus.core.operation import Operation, Pause
@@ -218,3 +219,45 @@ def test_a_device_of_which_nobody_has_said_what_it_can_do_is_refused() -> None:
         axis.device = device
         robot.conductor.run(recognition.recognise(robot))
         assert "position" in axis.able
+
+
+@pytest.mark.parametrize(
+    ("asked", "limits", "says"),
+    [
+        (
+            {"arm": "1"},
+            {"high": "181 deg"},
+            "axis.a1.high: 181.0 deg is outside the travel of arm#1 (STS3215)",
+        ),
+        ({"arm": "1"}, {"zero": "0 deg"}, "axis.a1.low: -150.0 deg is outside the travel of arm#1"),
+        ({"arm": "1"}, {"gear": 3.0}, "-60.0 deg to 60.0 deg"),
+        ({"can": "0x25"}, {"low": "-91 deg"}, "axis.c1.low: -91.0 deg is outside the travel of can#0x25"),
+    ],
+)
+def test_limits_beyond_the_travel_of_the_device_are_refused_with_both(
+    asked: dict[str, str], limits: dict[str, Any], says: str
+) -> None:
+    with (
+        machine(**asked, axes=dict.fromkeys(("a1", "c1"), limits)) as (made, _),  # type: ignore[arg-type]
+        pytest.raises(RequestError) as caught,
+    ):
+        Robot.of(made)
+    assert says in str(caught.value)
+    assert caught.value.expected
+    assert "nothing was sent but questions" in caught.value.advice
+
+
+@pytest.mark.parametrize("limits", [{"low": "-180 deg", "high": "180 deg"}, {"sign": -1}, {"gear": 1.2}])
+def test_limits_up_to_the_ends_of_the_travel_are_taken(limits: dict[str, Any]) -> None:
+    with machine(arm="1", axes={"a1": limits}) as (made, _), Robot.of(made) as robot:
+        assert robot["a1"].model == "STS3215"
+
+
+def test_a_servo_of_many_turns_has_limits_of_many_turns() -> None:
+    limits = {"zero": "0 deg", "low": "-5 turn", "high": "5 turn"}
+    with machine(arm="1", axes={"a1": limits}) as (made, sims):
+        with motorbus.open(made.buses["arm"].address) as bus:
+            motorbus.feetech.Servo(bus, 1).write(min_position_limit=0, max_position_limit=0)
+        with Robot.of(made) as robot:
+            assert robot["a1"].model == "STS3215"
+        assert sims["arm"][1].memory["max_position_limit"] == 0

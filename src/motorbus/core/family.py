@@ -389,6 +389,7 @@ class Family(Protocol):
             jog(device, velocity, seconds)  home(device, *, deadline)   for a while; to its switch
             run(device, number, *, timeout)                             a program that is stored in it
             limits(device)                      its own lowest and highest position, rad; read when not known
+            travel(device)                      between which positions, rad, any limits of it must lie; None: not known
             cap_torque(device, fraction)  cap_current(device, ampere)   bound what it pushes with, until power-off
             train(devices, *, rate) -> Operation[Train]                 several, to be led in a loop; rate in bit/s
             keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]

@@ -20,6 +20,8 @@ from motorbus.motion.machine.refusal import of_file
 from motorbus.motion.several import everyone, of_each, raised
 
 ASKED: Final = "nothing was sent but questions"
+_SLACK: Final = 1e-6
+"""Of the travel: a limit in degrees is rounded."""
 
 
 def recognise(body: Body) -> Abreast[None]:
@@ -42,23 +44,28 @@ def recognise(body: Body) -> Abreast[None]:
 
 
 class Asked(NamedTuple):
-    """What a device is, and its own limits, or why it has none, where it has to be known whether it can be parked."""
+    """What a device is; its own limits, or why it has none, where it has to be known whether it can be parked; and its
+    travel, where the file has limits."""
 
     identity: Identity
     limits: Device | MotorbusError = None
+    travel: Device = None
 
 
 def _asked(axis: AxisVerbs) -> Operation[Asked]:
     identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
     identity = yield from identify
     able = axis.bus.family.axis(identity.model)
+    travel: Device = None
+    if axis.spec.device_limits is not None and "travel" in able:
+        travel = yield from able["travel"](axis.device)
     if axis.spec.exit != "park" or "limits" not in able:
-        return Asked(identity)
+        return Asked(identity, travel=travel)
     try:
         limits: Device = yield from able["limits"](axis.device)
     except (RequestError, DeviceError) as error:
-        return Asked(identity, error)
-    return Asked(identity, limits)
+        return Asked(identity, error, travel)
+    return Asked(identity, limits, travel)
 
 
 def _unheard(axis: AxisVerbs, body: Body, silence: NoReply) -> NoReply:
@@ -88,7 +95,7 @@ def _judged(axis: AxisVerbs, told: Any) -> MotorbusError | None:
             expected="a device that moves",
             advice=f"take the axis out of the file, or use its own commands; {ASKED}",
         )
-    return _lacking(axis) or _unreachable(axis, told.limits)
+    return _lacking(axis) or _beyond(axis, told.travel) or _unreachable(axis, told.limits)
 
 
 def _lacking(axis: AxisVerbs) -> RequestError | None:
@@ -107,6 +114,25 @@ def _lacking(axis: AxisVerbs) -> RequestError | None:
                 f"axis.{axis.name}.{key}: {spec.device} ({axis.model}) does not have {what}",
                 expected=f"a key that its device can follow, as {instead}" if another else "no such key",
                 advice=f"write {instead}; {ASKED}" if another else f"{instead} of the file; {ASKED}",
+                node=spec.node,
+            )
+    return None
+
+
+def _beyond(axis: AxisVerbs, travel: Device) -> RequestError | None:
+    """The error for limits of the file beyond the travel of the device (rad of it)."""
+    spec = axis.spec
+    if travel is None:
+        return None
+    first, last = sorted(spec.from_device(end) for end in travel)
+    slack = _SLACK * (last - first)
+    for key, value in (("low", spec.low), ("high", spec.high)):
+        if value is not None and not first - slack <= value <= last + slack:
+            return RequestError(
+                f"axis.{axis.name}.{key}: {spec.show(value)} is outside the travel of {spec.device} ({axis.model}), "
+                f"{spec.show(first)} to {spec.show(last)}",
+                expected=f"{spec.show(first)} to {spec.show(last)}",
+                advice=f"change {key}, or zero, sign or gear of the axis; {ASKED}",
                 node=spec.node,
             )
     return None

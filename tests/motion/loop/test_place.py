@@ -124,13 +124,14 @@ def test_no_order_is_farther_from_the_measured_position_than_max_step(axis: Any,
 
 @pytest.mark.parametrize("direct", [False, True])
 def test_nor_than_where_its_goals_are_at_its_greatest_speed_with_all_that_it_may_lag(direct: bool) -> None:
-    with machine(arm="1", axes={"a1": {"gear": 2.0}}) as (made, _), Robot.of(made) as robot:
+    limits = {"low": "-90 deg", "high": "90 deg"}
+    with machine(arm="1", axes={"a1": {"gear": 2.0, **limits}}) as (made, _), Robot.of(made) as robot:
         one = place(robot["a1"], direct=direct)
         most = LATE * radians(90) + NEAR / 2
 
         def pushes() -> None:
             for number in range(1, 200):
-                one.asked = number * 0.9 * STEP if direct else 2.5
+                one.asked = number * 0.9 * STEP if direct else 1.5
                 one.judge(1)
                 one.step(1)
 

@@ -41,7 +41,7 @@ torque = 0.5
 # Handle with care.
 [axis.elbow]
 device = "arm#2"
-low = -2
+low = "-2 rad"
 high = "2 rad"
 exit = "park"
 park = "0 deg"
@@ -141,17 +141,28 @@ BROKEN = (
     Broken('zero = "180 deg"', 'zero = "180 grd"', "axis.shoulder.zero: position '180 grd' has", "deg"),
     Broken('zero = "180 deg"', 'zero = ""', "axis.shoulder.zero: position '' is empty", "a number"),
     Broken('zero = "180 deg"', 'zero = "2048 raw"', "axis.shoulder.zero: position '2048 raw'", "with one of rad"),
-    Broken('zero = "180 deg"', DEEP, "axis.shoulder.zero: a table is no position", "a finite number in rad"),
+    Broken('zero = "180 deg"', DEEP, "axis.shoulder.zero: a table is no position", "a finite number with its unit"),
     Broken('zero = "180 deg"', "zero = {deg = 180}", "axis.shoulder.zero: a table is no position", 'zero = "180 deg"'),
-    Broken("low = -2", "low = inf", "axis.elbow.low: inf is no position", "a finite number in rad"),
-    Broken("low = -2", "low = 2024-05-01", "axis.elbow.low: '2024-05-01' is no position", "a finite number"),
-    Broken("low = -2", 'low = "-20 mm"', "axis.elbow.low: position '-20 mm' has the unit", 'has travel = "5 mm"'),
+    Broken('low = "-2 rad"', "low = inf", "axis.elbow.low: inf is no position", "a finite number with"),
+    Broken('low = "-2 rad"', "low = 2024-05-01", "axis.elbow.low: '2024-05-01' is no position", "a finite number"),
+    Broken('low = "-2 rad"', 'low = "-20 mm"', "axis.elbow.low: position '-20 mm' has the unit", 'has travel = "5 mm"'),
     Broken('low = "0 mm"', 'low = "0 deg"', "axis.slide.low: length '0 deg' has the unit", "leave travel out"),
     Broken('low = "0 mm"', 'low = "1,5 mm"', "axis.slide.low: length '1,5 mm' has a decimal comma", "point"),
     Broken('travel = "5 mm"', 'travel = "0 mm"', "axis.slide.travel: '0 mm' is out of range", "1e-06 to 1000", False),
     Broken('"120 deg/s"', '"120 deg"', "axis.shoulder.max_velocity: velocity '120 deg' has", "deg/s"),
     Broken('"120 deg/s"', '"-120 deg/s"', "axis.shoulder.max_velocity: '-120 deg/s' is out", "above 0"),
-    Broken('"500 deg/s2"', "0", "axis.shoulder.max_acceleration: 0 is out of range", "above 0"),
+    Broken('"500 deg/s2"', '"0 deg/s2"', "axis.shoulder.max_acceleration: '0 deg/s2' is out", "above 0", False),
+    # bare numbers
+    Broken('low = "-90 deg"', "low = -90", "axis.shoulder.low: -90 has no unit", 'write low = "-90 deg" (-1.5708 rad)'),
+    Broken('low = "-90 deg"', 'low = "-90"', "axis.shoulder.low: -90 has no unit", 'or low = "-90 rad" (-5156.62 deg)'),
+    Broken('zero = "180 deg"', "zero = 0", "axis.shoulder.zero: 0 has no unit", 'zero = "0 deg"'),
+    Broken('"120 deg/s"', "120", "axis.shoulder.max_velocity: 120 has no", 'write max_velocity = "120 deg/s"'),
+    Broken('"500 deg/s2"', "500", "axis.shoulder.max_acceleration: 500 has no unit", '"500 rad/s2" (28647.9 deg/s2)'),
+    Broken('max_step = "10 deg"', "max_step = 10", "axis.shoulder.max_step: 10 has no unit", 'max_step = "10 deg"'),
+    Broken('park = "0 deg"', "park = 0.5", "axis.elbow.park: 0.5 has no unit", 'park = "0.5 rad" (28.6479 deg)'),
+    Broken('high = "120 mm"', "high = 120", "axis.slide.high: 120 has no unit", 'high = "120 mm" (0.12 m)'),
+    Broken('travel = "5 mm"', "travel = 5", "axis.slide.travel: 5 has no unit", 'travel = "5 mm"'),
+    Broken('elbow = "-20 deg"', "elbow = -20", "pose.ready.elbow: -20 has no unit", 'elbow = "-20 deg"'),
     Broken('exit = "hold"', 'exit = "torque-off"', "axis.shoulder.exit: 'torque-off' is", "did you mean torque_off?"),
     Broken("guard = false", 'guard = "no"', "axis.elbow.guard: 'no' is not possible", "true"),
     Broken("guard = false", "guard = 0", "axis.elbow.guard: 0 is not possible", "write it as guard = false"),

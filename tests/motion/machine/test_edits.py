@@ -45,7 +45,7 @@ LEFT = 'axes = ["shoulder", "elbow"]    # top to bottom'
             ['-exit = "park"', '-park = "0 deg"', '+exit = "leave"'],
         ),
         ({"axis.shoulder.park": "1 deg"}, ['+park = "1 deg"']),
-        ({"axis.slide.max_step": 0.001}, ["+max_step = 0.001"]),
+        ({"axis.slide.max_step": "1 mm"}, ['+max_step = "1 mm"']),
         ({"axis.shoulder.sign": 1}, ["-sign = -1", "+sign = 1"]),
         ({"pose.ready.slide": None}, ['-slide = "30 mm"']),
         ({"pose.ready": None}, ["-[pose.ready]", SHOULDER, '-elbow = "-20 deg"', '-slide = "30 mm"']),
@@ -67,17 +67,17 @@ CHANGES = st.fixed_dictionaries(
     {},
     optional={
         "name": st.sampled_from(["a", None]),
-        "axis.shoulder.zero": st.sampled_from(["1 deg", 0.5, None]),
-        "axis.shoulder.max_step": st.sampled_from([None, 0.1]),
+        "axis.shoulder.zero": st.sampled_from(["1 deg", "0.5 rad", None]),
+        "axis.shoulder.max_step": st.sampled_from([None, "0.1 rad"]),
         "axis.elbow.zero": st.just("3 deg"),
         "axis.elbow.unit": st.just("rad"),
         "axis.slide.high": st.just("200 mm"),
-        "axis.wrist": st.sampled_from([{"device": "arm#3"}, {"device": "gimbal#1", "travel": 1}]),
+        "axis.wrist": st.sampled_from([{"device": "arm#3"}, {"device": "gimbal#1", "travel": "1 m"}]),
         "bus.third": st.just({"address": "x:y"}),
         "group.right": st.just({"axes": ["elbow"]}),
         "group.left": st.just({"axes": ["slide"]}),
         "pose.ready": st.sampled_from([{"slide": "1 mm"}, None]),
-        "pose.rest": st.just({"elbow": 0, "slide": 0}),
+        "pose.rest": st.just({"elbow": "0 rad", "slide": "0 m"}),
     },
 )
 
@@ -126,7 +126,7 @@ def test_comments_stay_with_what_they_are_about() -> None:
 
 def test_the_first_of_its_kind_comes_last() -> None:
     text = 'format = 1 # one\n\n[bus.a]\naddress = "x:y"\n# the end\n'
-    after = edited(text, {"axis.b": {"device": "a#1"}, "pose.c": {"b": 1}, "group.d": {"axes": ["b"]}})
+    after = edited(text, {"axis.b": {"device": "a#1"}, "pose.c": {"b": "1 rad"}, "group.d": {"axes": ["b"]}})
     assert after.startswith(text)
     assert Machine.parse(after).poses == {"c": {"b": 1.0}}
 
@@ -139,10 +139,10 @@ def test_a_file_may_be_written_from_nothing() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        'format = 1\nbus = {a = {address = "x:y"}}\naxis = {b = {device = "a#1", zero = 1}} # here',
-        'format = 1\n[bus]\na = {address = "x:y"}\n[axis]\nb = {device = "a#1", zero = 1} # here',
+        'format = 1\nbus = {a = {address = "x:y"}}\naxis = {b = {device = "a#1", zero = "1 rad"}} # here',
+        'format = 1\n[bus]\na = {address = "x:y"}\n[axis]\nb = {device = "a#1", zero = "1 rad"} # here',
         'format = 1\n[axis.b]\ndevice = "a#1"\n[bus.a]\naddress = "x:y"\n[axis.c]\ndevice = "a#2"\n# here',
-        'format = 1\n[axis]\n[axis.b]\n"device" = "a#1"\n\'zero\' = 1 # here\n[bus."a"]\naddress = "x:y"',
+        'format = 1\n[axis]\n[axis.b]\n"device" = "a#1"\n\'zero\' = "1 rad" # here\n[bus."a"]\naddress = "x:y"',
     ],
 )  # fmt: skip
 def test_other_ways_to_write_a_file(text: str) -> None:
@@ -153,12 +153,12 @@ def test_other_ways_to_write_a_file(text: str) -> None:
 
 
 def test_a_table_among_keys_with_points_is_left_to_the_person() -> None:
-    text = 'format = 1\nbus.a.address = "x:y"\naxis.b.device = "a#1"\naxis.b.zero = 1 # here\n'
-    after = edited(text, {"axis.b.zero": 2, "axis.b.gear": 2})
+    text = 'format = 1\nbus.a.address = "x:y"\naxis.b.device = "a#1"\naxis.b.zero = "1 rad" # here\n'
+    after = edited(text, {"axis.b.zero": "2 rad", "axis.b.gear": 2})
     assert sorted(changed(after, text)) == [
         "+axis.b.gear = 2",
-        "+axis.b.zero = 2 # here",
-        "-axis.b.zero = 1 # here",
+        '+axis.b.zero = "2 rad" # here',
+        '-axis.b.zero = "1 rad" # here',
     ]
     with pytest.raises(RequestError, match="cannot be edited without changing more"):
         edited(text, {"axis.c.device": "a#2"})
@@ -175,7 +175,13 @@ def test_ends_of_lines_and_a_mark_at_the_start_stay() -> None:
 @given(axes(), st.sampled_from(["shoulder", "elbow", "wrist"]))
 def test_whatever_an_axis_may_be_it_can_become(spec: Any, name: str) -> None:
     text = edited(GOOD, {"pose.ready": None, "group.left": None})
-    table = {key: getattr(spec, key) for key in keys.AXIS if getattr(spec, key) is not None}
+    table = {
+        key: f"{value!r} {keys.api_unit(row.measure.of(spec.linear))}"
+        if row.measure and row.needs_unit
+        else value
+        for key, row in keys.AXIS.items()
+        if (value := getattr(spec, key)) is not None
+    }
     after = edited(text, {f"axis.{name}": {**table, "device": "arm#77"}})
     found = Machine.parse(after)
     assert found.axes[name].gear == spec.gear

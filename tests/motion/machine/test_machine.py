@@ -139,9 +139,7 @@ def test_whoever_opens_buses_may_judge_their_addresses() -> None:
 
 
 def test_what_a_file_need_not_say_has_its_usual_value() -> None:
-    text = (
-        'format = 1\n[bus.a]\naddress = "x:y"\n[axis.b]\ndevice = "a#1"\n[axis.c]\ndevice = "a#2"\ntravel = 1'
-    )
+    text = 'format = 1\n[bus.a]\naddress = "x:y"\n[axis.b]\ndevice = "a#1"\n[axis.c]\ndevice = "a#2"\ntravel = "1 m"'
     turning, linear = Machine.parse(text).axes.values()
     assert turning == AxisSpec(device="a#1", unit="deg", max_velocity=pi / 2, max_acceleration=2 * pi)
     assert (linear.unit, linear.max_velocity, linear.max_acceleration) == ("mm", 0.05, 0.2)

@@ -76,8 +76,8 @@ def test_a_value_of_a_pose_is_explained_as_one() -> None:
     assert caught.value.advice.startswith('write it as slide = "30 mm" (where this axis is in the pose)')
 
 
-def test_a_number_needs_no_unit_and_a_unit_no_blank() -> None:
-    text = GOOD.replace('"120 deg/s"', "2").replace('max_step = "10 deg"', 'max_step = "10deg"')
+def test_a_unit_needs_no_blank_and_a_fraction_no_unit() -> None:
+    text = GOOD.replace('"120 deg/s"', '"2rad/s"').replace('max_step = "10 deg"', 'max_step = "10deg"')
     shoulder = read(text).axes["shoulder"]
     assert (shoulder.max_velocity, round(shoulder.max_step or 0, 4)) == (2.0, 0.1745)
     assert read(GOOD.replace("torque = 0.5", 'torque = "50 %"')).axes["shoulder"].torque == 0.5

@@ -64,17 +64,17 @@ def test_it_takes_whatever_is_written(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("said", "taken"),
     [
-        ('low = "-90 deg"', True), ('low = "-90deg"', True), ('low = " 1e3 rad "', True), ('low = ".5"', True),
+        ('low = "-90 deg"', True), ('low = "-90deg"', True), ('low = " 1e3 rad "', True), ('low = ".5"', False),
         ('low = "90°"', True), ('low = "deg"', False), ('low = "90 mm"', False), ('low = "--90 deg"', False),
-        ('low = "1,5 deg"', False), ("low = true", False), ("low = 2e6", False), ('low = "٣ deg"', False),
-        ('max_velocity = "-5 deg/s"', False), ('max_velocity = "+5 deg/s"', True), ("max_velocity = 0", False),
+        ('low = "1,5 deg"', False), ("low = true", False), ("low = 2", False), ('low = "٣ deg"', False),
+        ('max_velocity = "-5 deg/s"', False), ('max_velocity = "+5 deg/s"', True), ("max_velocity = 90", False),
         ('max_acceleration = "5 rad/s^2"', True), ('max_acceleration = "5 rad/s"', False),
         ('torque = "50 %"', True), ("torque = 1.5", False), ("sign = 2", False), ("gear = 1e-9", False),
     ],
 )  # fmt: skip
 def test_a_value_of_an_axis_that_turns(said: str, taken: bool) -> None:
-    text = f'format = 1\n[axis.a]\ndevice = "x#1"\nhigh = 3\n{said}'
-    text += "\nlow = 1" if "low" not in said else ""
+    text = f'format = 1\n[axis.a]\ndevice = "x#1"\nhigh = "3 rad"\n{said}'
+    text += "\nlow = '1 rad'" if "low" not in said else ""
     assert (refuses(tomllib.loads(text)) == []) is taken
 
 
@@ -84,7 +84,7 @@ def test_defaults_are_those_of_reading() -> None:
         for axis in AXES
     )
     assert turning == {
-        "zero": 0.0, "sign": 1, "gear": 1.0, "unit": "deg", "max_velocity": "90 deg/s",
+        "zero": "0 deg", "sign": 1, "gear": 1.0, "unit": "deg", "max_velocity": "90 deg/s",
         "max_acceleration": "360 deg/s2", "exit": "hold", "guard": True,
     }  # fmt: skip
     assert linear == turning | {"unit": "mm", "max_velocity": "50 mm/s", "max_acceleration": "200 mm/s2"}

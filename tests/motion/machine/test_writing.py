@@ -15,7 +15,7 @@ from tests.motion.machine.files import GOOD, axis
 
 FRESH = """\
 # A machine: its buses, what moves on them, and how far and how fast it may.
-# Numbers have a unit, in quotes; without one they are in rad, m and s.
+# Angles, lengths and velocities have a unit, in quotes.
 format = 1
 name = "bench"
 

@@ -107,6 +107,7 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "move": driver.move,
     "stop": driver.stop,
     "limits": driver.limits,
+    "travel": driver.travel,
     "cap_torque": driver.cap_torque,
     "cap_current": driver.cap_current,
     "train": driver.train,

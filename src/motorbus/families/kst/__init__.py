@@ -88,6 +88,7 @@ _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
     "move": driver.move,
     "stop": driver.stop,
     "limits": driver.limits,
+    "travel": driver.travel,
     "train": driver.train,
 }
 _FELT: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {

@@ -37,6 +37,11 @@ class Key(NamedTuple):
     example: tuple[str, str]
 
     @property
+    def needs_unit(self) -> bool:
+        """Whether a number needs a unit: an angle or a length, and what is measured in them."""
+        return self.measure is not None and self.measure.turning not in ("current", "load")
+
+    @property
     def needed(self) -> bool:
         """Whether a file must have it."""
         return self.default is NODEFAULT and not any(self.usual)

@@ -99,8 +99,11 @@ class BusSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 Zero: TypeAlias = Annotated[
     float,
-    _key("angle of the device at which the axis is at 0", '"180 deg"', ANGLE, ge=-FARTHEST, le=FARTHEST),
-]
+    _key(
+        "angle of the device at which the axis is at 0", '"180 deg"', ANGLE,
+        usual=("0 deg", "0 deg"), ge=-FARTHEST, le=FARTHEST,
+    ),
+]  # fmt: skip
 Sign: TypeAlias = Annotated[Literal[1, -1], _key("1, or -1 where the axis turns against the device", "-1")]
 Gear: TypeAlias = Annotated[
     float, _key("turns of the device for one turn of the axis", "3.0", ge=1e-6, le=1e6)

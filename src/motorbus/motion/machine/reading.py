@@ -231,18 +231,48 @@ def _choice(place: Place) -> Any:
 
 
 def _amount(place: Place) -> float:
-    """A quantity in the API's unit, from a number or from text with a unit."""
+    """A quantity in the API's unit, from text with a unit, or from a number where its unit cannot be mistaken."""
     written, quantity = place.written, place.quantity
     if isinstance(written, str):
         try:
-            return units.parse(written, quantity)
+            found = units.parse(written, quantity)
         except RequestError as error:
             advice = _other_kind(place.linear) if _fits_other(place) else ""
             raise place.refused(error.summary, error.expected, advice) from None
+        if place.key.needs_unit and _is_bare(written):
+            raise _without_unit(place, float(written))
+        return found
     if is_number(written):
+        if place.key.needs_unit:
+            raise _without_unit(place, float(written))
         return float(written)
+    if place.key.needs_unit:
+        raise place.refused(f"{said(written)} is no {quantity}", "a finite number with its unit, in quotes")
     unit = f"number in {keys.api_unit(quantity)}" if keys.api_unit(quantity) else "fraction of 1"
     raise place.refused(f"{said(written)} is no {quantity}", f"a finite {unit}, or with its unit in quotes")
+
+
+def _is_bare(written: str) -> bool:
+    try:
+        float(written)
+    except ValueError:
+        return False
+    return True
+
+
+def _without_unit(place: Place, value: float) -> RequestError:
+    """The error for a number without its unit, with the same number in both units that may be meant."""
+    scales = units.SCALES[place.quantity]
+    api = keys.api_unit(place.quantity).replace("²", "2")
+    small = next(unit for unit in ("deg", "deg/s", "deg/s2", "mm", "mm/s", "mm/s2") if unit in scales)
+    in_small = f"{value * scales[small]:.6g} {api}"
+    in_api = f"{value / scales[small]:.6g} {small}"
+    name, number = place.key.name, f"{value:.12g}"
+    return place.refused(
+        f"{number} has no unit",
+        f"a {place.quantity} with its unit, in quotes",
+        f'write {name} = "{number} {small}" ({in_small}) or {name} = "{number} {api}" ({in_api})',
+    )
 
 
 def _fits_other(place: Place) -> bool:

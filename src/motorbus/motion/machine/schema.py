@@ -92,7 +92,7 @@ def _property(made: dict[str, Any], key: Key, linear: bool) -> dict[str, Any]:
     number = next(part for part in (made, *made.get("anyOf", ())) if part.get("type") == "number")
     return {
         "description": f"{key.says}; {key.range(linear)}",
-        "anyOf": [_bare(number), _text(key, linear)],
+        **({"anyOf": [_bare(number), _text(key, linear)]} if not key.needs_unit else _text(key, linear)),
         **usual,
     }
 
@@ -102,10 +102,14 @@ def _bare(number: dict[str, Any]) -> dict[str, Any]:
 
 
 def _text(key: Key, linear: bool) -> dict[str, Any]:
-    """A number with its unit, or without, as text; the sign is all that a pattern can say of a range."""
+    """A number with its unit as text, without it where none is needed; the sign is all that a pattern can say of a
+    range."""
     positive = key.meta.gt == 0 or (key.meta.ge or -1) > 0
     some = "|".join(unit.replace("^", r"\^") for unit in key.units(linear))
-    return {"type": "string", "pattern": rf"^\s*{'[+]?' if positive else '[+-]?'}{_NUMBER}\s*({some})?\s*$"}
+    return {
+        "type": "string",
+        "pattern": rf"^\s*{'[+]?' if positive else '[+-]?'}{_NUMBER}\s*({some}){'' if key.needs_unit else '?'}\s*$",
+    }
 
 
 def _group(made: dict[str, Any]) -> dict[str, Any]:
@@ -114,7 +118,7 @@ def _group(made: dict[str, Any]) -> dict[str, Any]:
 
 
 def _pose() -> dict[str, Any]:
-    ways = [{"type": "number"}, _text(keys.POSE, linear=False), _text(keys.POSE, linear=True)]
+    ways = [_text(keys.POSE, linear=False), _text(keys.POSE, linear=True)]
     return {
         "title": "a pose",
         "description": keys.FILE["pose"].says,

@@ -14,7 +14,7 @@ from motorbus.motion.machine.model import FORMAT, AxisSpec, Description
 
 HEAD: Final = (
     "# A machine: its buses, what moves on them, and how far and how fast it may.",
-    "# Numbers have a unit, in quotes; without one they are in rad, m and s.",
+    "# Angles, lengths and velocities have a unit, in quotes.",
 )
 COLUMN: Final = 30
 """Before it no comment begins, so that those of most lines stand below each other."""

@@ -63,7 +63,7 @@ from motorbus.families.feetech.driver.torque import (
     disable_torque_all,
     disable_torque_everyone,
 )
-from motorbus.families.feetech.driver.train import Train, limits, train
+from motorbus.families.feetech.driver.train import Train, limits, train, travel
 from motorbus.families.feetech.driver.tuning import (
     Gains,
     Protection,
@@ -168,6 +168,7 @@ __all__ = [
     "torque_after_write",
     "torque_limit",
     "train",
+    "travel",
     "velocity",
     "voltage",
     "write",

@@ -18,14 +18,15 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
 from motorbus.families.feetech.driver.group import AIR, distinct, prepare_all
-from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.identity import known, writable
 from motorbus.families.feetech.driver.loop import known_row, position_reads
 from motorbus.families.feetech.driver.motion import enable_torque
 from motorbus.families.feetech.driver.mould import mould
-from motorbus.families.feetech.driver.node import CHANGES, Node
+from motorbus.families.feetech.driver.node import CHANGES, MANY_TURNS, Node
 from motorbus.families.feetech.driver.orders import Order, blocks, no_limits, position_goal
 from motorbus.families.feetech.driver.pace import speed_at_least
 from motorbus.families.feetech.driver.rest import asked_anew
+from motorbus.families.feetech.table import Mode
 
 
 def train(servos: Sequence[Node], *, rate: int, air: float = AIR) -> Operation[Train]:
@@ -52,6 +53,24 @@ def limits(node: Node) -> Operation[tuple[float, float]]:
     if node.limits is None:
         raise no_limits(node)
     return node.limits
+
+
+def travel(node: Node) -> Operation[tuple[float, float] | None]:
+    """Lowest and highest position, rad, that its encoder and its registers can express, whatever its limits are.
+
+    None in other than position mode, and when its map is not known.
+    """
+    met = node.settings is not None
+    table = yield from known(node)
+    settings = node.settings
+    if not met:
+        node.forget_settings()  # they are read anew when the servo is used
+    if not node.writable or settings is None or settings.mode is not Mode.POSITION:
+        return None
+    count = table["goal_position"].scale * settings.factors["goal_position"]
+    if settings.many_turns:
+        return -MANY_TURNS * count, MANY_TURNS * count
+    return 0.0, settings.turn * count
 
 
 def raise_first(errors: Iterable[MotorbusError]) -> None:

@@ -56,7 +56,7 @@ from motorbus.families.kst.driver.identity import (
 )
 from motorbus.families.kst.driver.keeping import save
 from motorbus.families.kst.driver.listening import Heard
-from motorbus.families.kst.driver.motion import Promise, Started, limits, move, stop
+from motorbus.families.kst.driver.motion import Promise, Started, limits, move, stop, travel
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned, provision
 from motorbus.families.kst.driver.rates import BitRates, scan_bit_rates
@@ -124,6 +124,7 @@ __all__ = [
     "telemetry",
     "temperature",
     "train",
+    "travel",
     "travel_limits",
     "version",
     "window",

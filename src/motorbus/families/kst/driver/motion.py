@@ -92,6 +92,13 @@ def limits(node: Node) -> Operation[tuple[float, float]]:
     return node.limits
 
 
+def travel(node: Node) -> Operation[tuple[float, float]]:
+    """Lowest and highest position of its profile, rad; nothing is sent."""
+    yield from ()
+    row = node.table["goal_position"]
+    return float(row.to_value(row.low)), float(row.to_value(row.high))
+
+
 def send_goal(node: Node, goal: Goal) -> Operation[None]:
     """Order a target, with the start first where the profile has that rule; it is sent each time, for a servo that
     lost its supply has forgotten it, and it costs a short frame."""
