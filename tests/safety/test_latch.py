@@ -99,7 +99,7 @@ def _loop(robot: Robot) -> None:
                 break
 
 
-READY = "[pose.ready]\na1 = 0.1\nc1 = 0.1\n"
+READY = '[pose.ready]\na1 = "0.1 rad"\nc1 = "0.1 rad"\n'
 PARTS: dict[str, Any] = {
     "arm": "1-2",
     "can": "0x25",

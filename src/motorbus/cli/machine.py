@@ -7,7 +7,7 @@ user. It is looked for and read when a name asks for it: an address, which has a
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cached_property
 from pathlib import Path
@@ -186,8 +186,14 @@ def axes_at(address: str) -> dict[int, str]:
         known = machine() if machine_file().path is not None else None
     except RequestError:
         return {}
-    axes = known.axes.items() if known is not None else ()
-    return {spec.node: name for name, spec in axes if known and known.buses[spec.bus].address == address}
+    from motorbus.cli.line import same_line
+
+    found = {}
+    for name, spec in known.axes.items() if known is not None else ():
+        with suppress(RequestError):  # an address that cannot be parsed is no bus at all
+            if known is not None and same_line(known.buses[spec.bus].address, address):
+                found[spec.node] = name
+    return found
 
 
 def name_of(address: str) -> str:

@@ -31,7 +31,7 @@ app = App(
     help_epilogue="""Of an axis of the machine file, `axis at` is its own position, in its own unit;
 everything else is what its device tells, in the angles of the device.
 
-A bus of the machine file means its axes; an address, every device that answers.
+A bus of the machine file means its axes; an address, all devices.
 
 Reads only. Runs until Ctrl-C unless --count or --duration ends it. A device
 that does not answer keeps its row and is asked again, and so does one whose

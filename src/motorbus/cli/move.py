@@ -44,7 +44,7 @@ servos; `motorbus torque on` first elsewhere. A way of more than 180 degrees
 needs --yes. The goal must lie inside the limits of the device. Several devices
 of one bus begin in the same instant where their family can do that. Ctrl-C
 and SIGTERM stop them, and the message says where they hold. When one of
-several no longer answers, the others stop. With --no-wait they all go on.
+several no longer answers, the others stop. With --no-wait they keep moving.
 
 += and -= go by an angle from where the device stands: all that devices can do
 which do not know their position, as a stepper controller. One device at a

@@ -23,8 +23,9 @@ app = App(
     usage="Usage: motorbus torque on|off BUS[#ID]|AXIS... [OPTIONS]",
     help_epilogue="""`on` first makes the goal the present position, so nothing jumps. `off` visits
 every device whatever happens to some, and lets an arm sag. `off` for a whole
-FEETECH bus broadcasts first, which no servo acknowledges; then it visits the
-axes that the machine file has on that bus.
+FEETECH bus broadcasts first (after one read that tests the port for echo),
+which no servo acknowledges; then it visits the axes that the machine file has
+on that bus.
 
 Axes of a machine file get their torque with the cap that the file gives them,
 and keep it when this command ends, whatever `exit` says there. Those of a

@@ -126,7 +126,7 @@ def test_what_is_possible_is_heard(run: Run, servos: Simulation, monkeypatch: py
 
 def test_a_servo_that_refuses_is_told_with_its_own_words(run: Run) -> None:
     with motorbus.simulate("kst", ids="37", profile="kst") as simulation:
-        ran = run("read", f"{simulation.url},profile=kst-ext#37", "status")
+        ran = run("read", simulation.url.replace("profile=kst", "profile=kst-ext") + "#37", "status")
     assert ran.code == 7
     assert "does not exist" in ran.err
 

@@ -115,7 +115,7 @@ def step(
     twice as far: raises OutcomeUnknown when it was not acknowledged, and where it stands tells whether it went. With
     `wait` it returns when the servo has arrived, and the way is followed turn by turn; bounds, tolerance and errors as
     in `move`. The limits of the servo should be 0 in this mode; what they do otherwise is not published. When the wait
-    is interrupted the servo goes on, for no goal means "stay" here: a note says so, and disable_torque() ends it.
+    is interrupted the servo keeps moving, since no goal of step mode holds: a note says so; disable_torque() ends it.
     """
     finite(node, by, velocity, acceleration, tolerance, timeout)
     table = yield from asked_anew(node)

@@ -88,11 +88,6 @@ class Torque:
         block = limp(node.node)._replace(refusal=self._count)
         yield from confirmed(node, block, rank=Rank.CONFIGURATION)
 
-    def taken_anew(self, node: Node) -> Operation[None]:
-        """The same after a stop of our own."""
-        self._stops = -1
-        yield from self.taken(node)
-
     def _count(self, stops: Stops) -> MotorbusError | None:
         if self._stops < 0:
             self._stops = stops(self._node)
@@ -242,9 +237,12 @@ def _opened(
     try:
         yield from _put(node, _lock(lock, 0))
         torque.opened = True
-        yield from disable_torque(node)
-        if torque.was_on:
-            yield from torque.taken_anew(node)
+        if not torque.was_on:
+            yield from disable_torque(node)
+        else:
+            if (yield from is_limp(node)):
+                torque.stays_off = "another caller has switched it off"
+            yield from torque.taken(node)
         yield from _harmless(node, pending)
         done = yield from work()
         yield from still_open(node, lock)
@@ -304,7 +302,8 @@ def _locked(
     if trouble:
         if torque.was_on:
             yield from _still_ours(node, lock, torque)
-        if (yield from outcome(disable_torque(node))) is None and begun:
+        is_off = torque.was_on and not torque.stays_off  # `taken` has just been acknowledged
+        if (is_off or (yield from outcome(disable_torque(node))) is None) and begun:
             yield from outcome(_taken_back(node, lock, begun))
     for _ in range(_ATTEMPTS):
         failure = yield from outcome(_closed(node, lock))
@@ -340,8 +339,6 @@ def _torque_restored(node: Node, trouble: Sequence[BaseException], torque: Torqu
         return
     why = torque.stays_off
     if not why:
-        if trouble:
-            yield from outcome(torque.taken_anew(node))
         failure = yield from outcome(torque_on_unless(node, torque.refusal))
         why = "" if failure is None else failure.summary
     event = TorqueAfterWrite(node.node, not why, why)
