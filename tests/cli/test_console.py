@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.output import CUT
+from motorbus.cli.output import LONGEST
 from tests.cli.conftest import Run
 
 MOTORBUS = [sys.executable, "-m", "motorbus.cli"]
@@ -108,16 +108,16 @@ def test_a_second_signal_adds_nothing(first: str, second: str, gap: float) -> No
 def test_words_of_any_kind_are_shown_without_control_characters_and_cut(
     as_json: bool, words: list[str], run: Run
 ) -> None:
-    for filling in (SCRIPT, "x" * 100_000):
+    for filling in (SCRIPT, "x" * 100_000, "x " * 50_000):
         ran = run(*(word.replace("%", filling) for word in words), *["--json"] * as_json)
         assert ran.code != 0
         lines = ran.err.splitlines()
         assert all(line.isprintable() for line in lines), ran.err
         assert not any(line.startswith("\x1b") for line in lines)
         if as_json:
-            assert all(len(str(part)) <= CUT * 4 + 1 for part in json.loads(ran.err).values())
+            assert all(len(str(part)) <= LONGEST * 4 + 1 for part in json.loads(ran.err).values())
         else:
-            assert all(len(line) < CUT * 4 + 20 for line in lines)
+            assert all(len(line) < LONGEST * 4 + 20 for line in lines)
         if filling is SCRIPT:
             assert "\\x1b" in ran.err
 

@@ -46,7 +46,6 @@ COMMON = [
 ]
 FEETECH = [
     "ping BUS --broadcast",
-    "estop BUS",
     "feetech reg-write BUS#1 goal_position=HERE",
     "feetech reg-write BUS#1 goal_position=HERE --dry-run",
     "feetech action BUS",

@@ -139,6 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _run(list(arguments), last=False)
     words = sys.argv[1:]
+    sys.unraisablehook = _unraisable
     try:
         code = _run(words, last=True)
     except KeyboardInterrupt as second:  # a signal between the first one and the report of it
@@ -170,6 +171,12 @@ def _run(words: list[str], *, last: bool) -> int:
         if known is None:
             raise
         return _report(error, known, output)
+
+
+def _unraisable(about: sys.UnraisableHookArgs) -> None:
+    """A second Ctrl-C that strikes in a destructor, or a callback of a weak reference, is no news."""
+    if about.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(about)
 
 
 def _ignore_signals() -> None:

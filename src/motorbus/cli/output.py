@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 CUT: Final = 300
-"""Characters of one part of a message; an argument or a file may be of any length."""
+"""Characters of an unbroken word in a message: an argument, or a line of a file, may be of any length."""
+LONGEST: Final = 1000
+"""Characters of one part of a message, so that a list of devices, or the advice behind a long path, is whole."""
+_LONG_WORD: Final = re.compile(rf"\S{{{CUT + 1},}}")
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _PART: Final = re.compile(r"\n(?=  (?:sent|received|expected|likely cause|what to do): )")
 _NO_WRAP: Final = 10_000  # columns of a "terminal" that is a file or a pipe: never fold a row
@@ -81,7 +84,7 @@ class Output:
         lines = drawn.get().splitlines()
         print("\n".join(line if shown.is_terminal else line.rstrip() for line in lines), flush=True)
 
-    def note(self, text: str, *, limit: int | None = CUT) -> None:
+    def note(self, text: str, *, limit: int | None = LONGEST) -> None:
         """Something worth knowing that is not the result. Nothing else ends because nobody reads that any more."""
         with suppress(OSError):
             print("\n".join(_parts_of(text, limit)), file=sys.stderr, flush=True)
@@ -174,11 +177,15 @@ def console(file: TextIO) -> Console:
     return Heard(file=file, highlight=False, width=None if file.isatty() else _NO_WRAP)
 
 
-def printable(text: str, *, limit: int | None = CUT) -> str:
-    """A text from outside as a terminal may have it: control characters as \\xNN, its middle cut out at `limit`."""
-    if limit is not None and len(text) > limit:
-        text = f"{text[: limit * 2 // 3]}…{text[-limit // 3 :]}"
+def printable(text: str, *, limit: int | None = LONGEST) -> str:
+    """A text from outside as a terminal may have it: control characters as \\xNN, and what is too long cut."""
+    if limit is not None:
+        text = _middle_cut(_LONG_WORD.sub(lambda word: _middle_cut(word[0], CUT), text), limit)
     return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
+def _middle_cut(text: str, limit: int) -> str:
+    return text if len(text) <= limit else f"{text[: limit * 2 // 3]}…{text[-limit // 3 :]}"
 
 
 def _lines_of(text: str) -> str:
@@ -186,7 +193,7 @@ def _lines_of(text: str) -> str:
     return "\n".join(printable(line, limit=None) for line in text.split("\n"))
 
 
-def _parts_of(text: str, limit: int | None = CUT) -> list[str]:
+def _parts_of(text: str, limit: int | None = LONGEST) -> list[str]:
     """A message with its parts, each on a line of its own. No other line break is one of ours."""
     return [printable(part, limit=limit) for part in _PART.split(text)]
 
