@@ -19,7 +19,9 @@ DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **dict.fromkeys(
         ("state", "position", "velocity", "load", "current", "voltage", "temperature"), (("device",), ())
     ),
-    **dict.fromkeys(("health", "enable_torque", "disable_torque", "stop", "limits"), (("device",), ())),
+    **dict.fromkeys(
+        ("health", "enable_torque", "disable_torque", "stop", "limits", "travel"), (("device",), ())
+    ),
     "move": (("device", "to"), ("wait",)),
     "move_by": (("device", "angle"), ("velocity", "wait")),
     "jog": (("device", "velocity", "seconds"), ()),

@@ -20,6 +20,8 @@ from tests.conftest import Figures, Rounds
 from tests.faults.life import FAMILIES, Footprint, Life, footprint
 from tests.support.mounts import served
 
+pytestmark = pytest.mark.soak
+
 FULL = 10_000
 BLOCKS = 2_000
 """Blocks of Python's memory that may come and go; one that is lost in each cycle would be more than that."""

@@ -105,7 +105,7 @@ def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tal
     return Tally(total, succeeded, false)
 
 
-@pytest.mark.parametrize("bytewise", [False, True])
+@pytest.mark.parametrize("bytewise", [True])
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "read_project"])
 def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> None:
     total, succeeded, false = suffer(name, every_fault(length_of(name), EDGES), bytewise=bytewise)

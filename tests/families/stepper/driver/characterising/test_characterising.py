@@ -24,6 +24,8 @@ from tests.families.stepper.driver.characterising.studies import (
     wrong,
 )
 
+pytestmark = pytest.mark.soak
+
 PARTS = 4
 NOTICE = bytes.fromhex("EE DD")
 HEAVY = 500
