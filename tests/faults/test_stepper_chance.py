@@ -16,7 +16,6 @@ from motorbus.core.operation import Data
 from motorbus.families.stepper import wire
 from motorbus.link.base import Delivery, Side
 from tests.conftest import Figures, Rounds
-from tests.families.stepper.test_faults import Ledger
 from tests.support.lines import Mischief
 from tests.support.rigs.stepper import Rig
 
@@ -25,6 +24,27 @@ DOUBLES = 3
 """Projects that may come wrong: 0.04 are to be expected, and four or more in one of eight million such runs."""
 CALLS = {"L3": 580_000, "L7": 700_000}
 """So many calls have 10^6 exchanges and more; where bytes are changed, dumps are read five times and not twice."""
+
+
+class Ledger:
+    """How many calls went how, and how many of those that no fault touched did not go at once."""
+
+    def __init__(self, rig: Rig, line: Mischief) -> None:
+        self.rig = rig
+        self.line = line
+        self.failed_untouched = 0
+        self.again_untouched = 0
+        self.last: list[tuple[bool, bool]] = []
+
+    def call(self) -> None:
+        """One more."""
+        faults, again = self.line.count, self.rig.tried_again
+        waits = any(at > self.rig.link.now() + 1e-6 for at, *_ in self.rig.link._under_way)
+        done = self.rig.anything()
+        touched = waits or self.line.count > faults
+        if not touched:
+            self.failed_untouched += not done
+            self.again_untouched += self.rig.tried_again > again
 
 
 class Spoilt(Mischief):
