@@ -1,6 +1,6 @@
 """How much of each test is run: all but the long ones, the long ones (`--soak`), or a quick few (`--quick`).
 
-A test that counts asks the fixture `rounds` how often; so the same test runs 10^4 times in `make test`, its full
+A test that counts asks the fixture `rounds` how often; so the same test runs 3 000 times in `make test`, its full
 count in `make soak` and a hundred times on the other interpreters. Here is too what makes all of them together quick.
 """
 
@@ -10,6 +10,7 @@ import gc
 import os
 import signal
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Protocol
 
@@ -20,14 +21,14 @@ from motorbus.link import adapters
 from tests.net import NET, ROOT
 
 HERE = Path(__file__).parent
-USUAL_ROUNDS = 10_000
+USUAL_ROUNDS = 3_000
 QUICK_ROUNDS = 100
 LONG_RUN = 3_600
 """s that a long run may last that does not say otherwise; it ends a hang, and a slow machine is none."""
-# What decides whether another interpreter is supported: the floors that every byte passes through.
-QUICK_FOLDERS = ("core", "bus", "families", "conformance")
+# Every command of every family passes through these on the other interpreters.
+QUICK_FOLDERS = ("core", "bus", "conformance", "golden")
 
-settings.register_profile("test", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=50, print_blob=True)
 settings.register_profile("quick", settings.get_profile("test"), max_examples=10)
 settings.register_profile("soak", deadline=None, max_examples=5_000, print_blob=True)
 
@@ -59,8 +60,9 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     wanted = {"soak": _is_soak, "quick": _is_quick, "test": _is_usual}[_profile(config)]
+    in_net = cache(_is_in_net)
     for item in items:
-        if any(item.path.is_relative_to(ROOT / path) for path in NET):
+        if in_net(item.path):
             item.add_marker("net")
         if "rounds" in getattr(item, "fixturenames", ()) and _profile(config) == "soak":
             item.add_marker("soak")
@@ -78,6 +80,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """Tens of thousands of tests stay until the end; the collector need not go through them again and again."""
     gc.collect()
     gc.freeze()
+
+
+def _is_in_net(path: Path) -> bool:
+    return any(path.is_relative_to(ROOT / part) for part in NET)
 
 
 def _is_soak(item: pytest.Item) -> bool:
@@ -114,7 +120,7 @@ class Rounds(Protocol):
 
 @pytest.fixture(scope="session")
 def rounds(pytestconfig: pytest.Config) -> Rounds:
-    """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`, 10 000 at most in `make test`.
+    """`rounds(100_000)`: how often to repeat here; the full count only in `make soak`, 3 000 at most in `make test`.
 
     What takes long may say that fewer are usual: `rounds(100_000, 2_500)`.
     """

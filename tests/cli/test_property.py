@@ -20,7 +20,7 @@ from tests.safety.calls import AXES, BOUNDS, SLACK, SURELY
 from tests.safety.decoders import COUNT, TENTH, FeetechWitness, KstWitness, Witness
 from tests.support.machines import machine
 
-SLOW = 100
+SLOW = 30
 """A line of the shell takes so much longer than a call."""
 LINES = 100
 """Of one seed; after so many there is a new machine."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
@@ -59,6 +62,18 @@ def test_a_bus_of_the_file_is_broadcast_first_then_its_axes_answer_or_have_their
         frames = sent(ran.err)
         assert frames[0] == EVERYONE_OFF
         assert {frame.split()[2] for frame in frames[1:]} == {"01", "02", "03"}
+
+
+def test_axes_of_a_port_by_another_path_are_told_as_well(
+    run: Run, served: Simulated, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = f'format = 1\n[bus.arm]\naddress = "{served.bus}"\n[axis.a2]\ndevice = "arm#2"\n'
+    Path("motorbus.toml").write_text(text, encoding="utf-8")
+    family, _, port = served.bus.partition(":")
+    Path("other").symlink_to(port)
+    ran = run("torque", "off", f"{family}:{tmp_path / 'other'}", "--json")
+    assert [(one.get("axis"), one["id"]) for one in ran.document["devices"]] == [(None, None), ("a2", 2)]
 
 
 def test_a_dry_run_of_a_whole_bus_shows_the_broadcast(run: Run, arm: Simulation) -> None:

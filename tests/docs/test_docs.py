@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from motorbus import errors
-from motorbus.cli import build, parse
+from motorbus.cli import build, main, parse
 from tests.docs.test_readme import LINES as README
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,11 +44,10 @@ def commands() -> list[str]:
 
 
 @pytest.mark.parametrize("text", [pytest.param(text, id=where) for where, text in blocks("python")])
-def test_python_runs(text: str) -> None:
-    ended = subprocess.run(
-        [sys.executable, "-W", "error", "-c", text], capture_output=True, text=True, timeout=60
-    )
-    assert (ended.returncode, ended.stderr) == (0, "")
+def test_python_runs(text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ROOT)
+    exec(compile(text, "<page>", "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().err == ""
 
 
 def test_there_are_commands_to_judge() -> None:
@@ -67,12 +64,10 @@ def test_a_command_parses(line: str) -> None:
 @pytest.mark.parametrize(
     "line", [line for line in commands() if WITHOUT_HARDWARE.search(line) and line not in README]
 )
-def test_a_command_that_needs_no_hardware_succeeds(line: str) -> None:
+def test_a_command_that_needs_no_hardware_succeeds(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Those of the README are run by its own tests."""
     among = ["--among", "1-9"] if CHANGED.search(line) else []
-    command = [sys.executable, "-m", "motorbus.cli", *shlex.split(line)[1:], *among]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 0, ended.stderr
+    assert main([*shlex.split(line)[1:], *among]) == 0, capsys.readouterr().err
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

@@ -1,24 +1,25 @@
-"""What the README shows works as it stands there: every command is run, on simulated devices behind real ports.
+"""Every command of the README and of the page on a machine runs as written, on simulated devices behind real ports.
 
-Its Python runs in `test_docs`. Here the ports of its commands are exchanged for pseudo-terminals with simulated devices
-of the same ids behind them, and nothing else is. The same goes for the page on a machine.
+The ports of a command are replaced by pseudo-terminals with simulated devices of the same ids. A command runs in this
+process, except one that ends by a signal or needs a person. The Python of the README runs in `test_docs`.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
+from motorbus.cli import main
 from motorbus.cli.exits import Exit
 from motorbus.cli.simulated import Simulated
 from motorbus.motion.machine import Machine
@@ -102,18 +103,39 @@ def write_machine(folder: Path, address: str) -> None:
     (folder / "motorbus.toml").write_text(text, encoding="utf-8")
 
 
-def carried_out(line: str, folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    """The command, run as a user would run it, and ended as a user would end it."""
-    command = [sys.executable, "-m", "motorbus.cli", *shlex.split(line)[1:], *more]
-    environment = {
-        **os.environ,
-        "XDG_STATE_HOME": str(folder / "state"),
-        "XDG_CONFIG_HOME": str(folder / "config"),
-    }
+class Ran(NamedTuple):
+    """Exit code and output of a command."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Shell = Callable[..., Ran]
+
+
+@pytest.fixture
+def shell(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shell:
+    """`shell(line, *more)`: run the command in `folder`, with user folders of its own."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("XDG_STATE_HOME", str(folder / "state"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder / "config"))
+
+    def run(line: str, *more: str) -> Ran:
+        words = [*shlex.split(line)[1:], *more]
+        if FOR_EVER.search(line) or (more and WITH_HANDS.search(line)):
+            return run_process(line, words, folder)
+        capsys.readouterr()
+        return Ran(main(words), *capsys.readouterr())
+
+    return run
+
+
+def run_process(line: str, words: list[str], folder: Path) -> Ran:
+    """Run the command in a process of its own; send Ctrl-C, or do what it asks its user to do."""
     with subprocess.Popen(
-        command,
+        [sys.executable, "-m", "motorbus.cli", *words],
         cwd=folder,
-        env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -124,11 +146,11 @@ def carried_out(line: str, folder: Path, *more: str) -> subprocess.CompletedProc
         first = process.stdout.readline() if FOR_EVER.search(line) else ""
         if first:
             process.send_signal(signal.SIGINT)
-        if more and WITH_HANDS.search(line):
+        if WITH_HANDS.search(line):
             assert "take the supply" in process.stderr.readline()
             power_cycle(folder / "kst.control")
         out, err = process.communicate(timeout=60)
-    return subprocess.CompletedProcess(command, process.returncode, first + out, err)
+    return Ran(process.returncode, first + out, err)
 
 
 def power_cycle(control: Path) -> None:
@@ -158,22 +180,20 @@ def test_there_are_commands_to_run() -> None:
     assert sum(bool(NAMED.search(line)) for line in LINES) >= 8
 
 
-def worked(line: str, ports: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
+def worked(line: str, ports: dict[str, str], folder: Path, shell: Shell) -> Ran:
     """The command on these ports; where a person would have been asked, that person says yes."""
     meant = shortened(line).replace("/tmp/", f"{folder}/")
     for family, address in ports.items():
         meant = PORTS[family][0].sub(address, meant)
     if meant.startswith("motorbus stepper run"):
-        assert (
-            carried_out(f"motorbus stepper write feed.toml {ports['stepper']} --yes", folder).returncode == 0
-        )
-    ran = carried_out(meant, folder)
+        assert shell(f"motorbus stepper write feed.toml {ports['stepper']} --yes").returncode == 0
+    ran = shell(meant)
     if ran.returncode == Exit.NO_REPLY:  # a busy machine gave the simulator's process no time; once is enough
-        ran = carried_out(meant, folder)
-    return carried_out(meant, folder, "--yes") if "nobody agreed" in ran.stderr else ran
+        ran = shell(meant)
+    return shell(meant, "--yes") if "nobody agreed" in ran.stderr else ran
 
 
-def judge(line: str, ran: subprocess.CompletedProcess[str]) -> None:
+def judge(line: str, ran: Ran) -> None:
     """It succeeded; figures of a loop are told too when a host that was held up has lost a reading."""
     held_up = "loop-stats" in line and ran.returncode == Exit.PARTIAL and "readings lost" in ran.stderr
     assert ran.returncode == 0 or held_up, ran.stderr
@@ -181,13 +201,15 @@ def judge(line: str, ran: subprocess.CompletedProcess[str]) -> None:
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder: Path) -> None:
+def test_a_command_of_the_readme_works(line: str, ports: dict[str, str], folder: Path, shell: Shell) -> None:
     if NAMED.search(line):
         write_machine(folder, ports["feetech"])
-    judge(line, worked(line, ports, folder))
+    judge(line, worked(line, ports, folder, shell))
 
 
 @pytest.mark.parametrize("line", lines(MACHINE_PAGE))
-def test_a_command_of_the_page_on_a_machine_works(line: str, ports: dict[str, str], folder: Path) -> None:
+def test_a_command_of_the_page_on_a_machine_works(
+    line: str, ports: dict[str, str], folder: Path, shell: Shell
+) -> None:
     (folder / "motorbus.toml").write_bytes((ROOT / "examples" / "motorbus.toml").read_bytes())
-    judge(line, worked(line, ports, folder))
+    judge(line, worked(line, ports, folder, shell))

@@ -21,7 +21,7 @@ from tests.conftest import Figures
 from tests.support.lines import BYTE
 from tests.support.rigs.stepper import KEPT, MOTIONS, STOPS, FalseWord, Rig
 
-EDGES = (0x00, 0x01, 0x02, 0x03, 0x08, 0x0D, 0x3E, 0x5E, 0x80, 0xAA, 0xDD, 0xEE, 0xFF)
+EDGES = (0x00, 0x02, 0x5E, 0xEE, 0xFF)
 """Values that mean something somewhere in a reply."""
 COMMANDS = tuple(ORDERS)
 UNNAMED = ("set_segment_loop", "set_project_loop")
@@ -105,10 +105,9 @@ def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tal
     return Tally(total, succeeded, false)
 
 
-@pytest.mark.parametrize("bytewise", [True])
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "read_project"])
-def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> None:
-    total, succeeded, false = suffer(name, every_fault(length_of(name), EDGES), bytewise=bytewise)
+def test_single_byte_faults_with_telling_values(name: str) -> None:
+    total, succeeded, false = suffer(name, every_fault(length_of(name), EDGES), bytewise=True)
     assert false == []
     assert total == 6 * (2 + len(EDGES) - 1) + 7 * len(EDGES)
     if ORDERS[name].repeatable and name not in STOPS:
@@ -117,22 +116,20 @@ def test_single_byte_faults_with_telling_values(name: str, bytewise: bool) -> No
         assert 0 < succeeded < total, "a byte too many in front does no harm"
 
 
-@pytest.mark.parametrize(
-    ("name", "bytewise"), [("read_input", False), ("stop_motor", True), ("set_step_delay", False)]
-)
-def test_every_single_byte_fault(name: str, bytewise: bool) -> None:
-    total, _, false = suffer(name, every_fault(6, range(256)), bytewise=bytewise)
+@pytest.mark.parametrize("name", ["read_input", "set_step_delay"])
+def test_every_fifth_single_byte_fault(name: str) -> None:
+    total, _, false = suffer(name, every_fault(6, range(0, 256, 5)))
     assert false == []
-    assert total == 6 * (2 + 255) + 7 * 256
+    assert total == 6 * (2 + 51) + 7 * 52
 
 
 @pytest.mark.parametrize("bytewise", [False, True])
 def test_single_byte_faults_of_a_dump(bytewise: bool) -> None:
-    places = chain(range(30), range(30, 227, 13 if bytewise else 5), range(222, 227))
+    places = chain(range(30), range(30, 227, 19), range(222, 227))
     faults = (fault for at in places for fault in every_fault(226, (0x01, 0xEE, 0xFF), range(at, at + 1)))
     total, succeeded, false = suffer("read_project", faults, bytewise=bytewise)
     assert false == []
-    assert succeeded == total > 300
+    assert succeeded == total > 200
 
 
 @pytest.mark.soak

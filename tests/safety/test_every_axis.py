@@ -165,7 +165,7 @@ def test_08_nobody_is_skipped_whoever_fails(
     face: Callable[[str, Fates], None], verb: str, rounds: Callable[[int], int]
 ) -> None:
     random = Random(VERBS.index(verb))
-    for _ in range(max(1, rounds(100_000) // 400)):
+    for _ in range(max(1, rounds(100_000) // 500)):
         face(verb, drawn(random))
 
 

@@ -30,7 +30,7 @@ def names() -> list[str]:
 
 def load(name: str) -> Family:
     """The family of this name. Raises RequestError when there is none."""
-    if name in _inside():
+    if name.isidentifier() and _is_whole(name):
         return _family(import_module(f"{__name__}.{name}").FAMILY)
     for point in _outside():
         if point.name == name:

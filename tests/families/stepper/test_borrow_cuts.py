@@ -90,16 +90,16 @@ def refused(line: Line1, cut: Cut) -> None:
 @pytest.mark.parametrize("options", READINGS)
 @pytest.mark.parametrize("verb", WORKS)
 def test_at_every_request(verb: str, options: dict[str, Any], rounds: Callable[[int], int]) -> None:
-    """All of them where the memory is as assumed; where it is not there are many more, all only in the long runs."""
+    """Every cut in `make soak`; some of them, evenly apart, in `make test`."""
     work, more = WORKS[verb]
-    most = 1_000_000 if not options or rounds(1_000_000) == 1_000_000 else 25
+    most = 1_000_000 if rounds(1_000_000) == 1_000_000 else 20
     unfinished = 0
     for number, cut in enumerate(cuts(lambda: Line1(**options, **more), lambda line: work, most)):
         line = wrecked(cut, work, {**options, **more})
         if number % 3 == 1:
             line.simulated.power_cycle()
         unfinished += mended(line, verb, cut)
-    assert unfinished > min(most // 2, 30)
+    assert unfinished > min(most // 3, 30)
 
 
 def mended(line: Line1, verb: str, cut: Cut) -> bool:
@@ -121,7 +121,7 @@ def mended(line: Line1, verb: str, cut: Cut) -> bool:
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("options", READINGS)
 def test_at_every_request_of_the_recovery(options: dict[str, Any], rounds: Callable[[int], int]) -> None:
-    most = 1_000_000 if rounds(1_000_000) == 1_000_000 else 30
+    most = 1_000_000 if rounds(1_000_000) == 1_000_000 else 12
     for cycle in (False, True):
 
         def wreck(cycle: bool = cycle) -> Line1:

@@ -68,7 +68,7 @@ def judged(there: Bench, told: Written | MotorbusError) -> str:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: "-".join(map(str, kind.values())))
 def test_at_every_exchange_of_a_write(kind: dict[str, Any]) -> None:
     seen = set()
-    for moment in moments(length_of(kind), 28, KINDS.index(kind) / len(KINDS)):
+    for moment in moments(length_of(kind), 9, KINDS.index(kind) / len(KINDS)):
         there = lived(kind)
         cut_at(there, moment)
         told = there.run(outcome(write_project(there.device, program(PICK))))
@@ -84,7 +84,7 @@ def test_at_every_exchange_of_a_write(kind: dict[str, Any]) -> None:
 @pytest.mark.parametrize("view", ["working", "stored"])
 def test_while_what_was_left_is_saved(view: str, boot: int) -> None:
     kind = {"read_view": view, "selected_at_boot": boot}
-    for moment in moments(3.0 if view == "stored" else 0.85, 30):
+    for moment in moments(3.0 if view == "stored" else 0.85, 12):
         there = lived(kind)
         there.device.write_project(program(PICK), save=False)
         cut_at(there, moment)
@@ -94,7 +94,7 @@ def test_while_what_was_left_is_saved(view: str, boot: int) -> None:
 
 @pytest.mark.parametrize("cut", ["old", "empty"])
 def test_while_a_project_is_cleared(cut: str) -> None:
-    for moment in moments(0.85, 40):
+    for moment in moments(0.85, 16):
         there = lived({"save_cut": cut})
         cut_at(there, moment)
         told = there.run(outcome(clear(there.device, 2)))

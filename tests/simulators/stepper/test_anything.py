@@ -79,7 +79,7 @@ def play(
 
 
 @given(switches(), projects(), SCRIPTS)
-@settings(max_examples=300)
+@settings(max_examples=150)
 def test_whatever_is_said_it_answers_in_frames_or_not_at_all(
     options: dict[str, Any], project: table.Project, script: list[tuple[float, tuple[str, Any]]]
 ) -> None:
