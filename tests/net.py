@@ -28,6 +28,7 @@ NET: Final = (
     "tests/safety/test_kill.py",
     "tests/safety/test_promises.py",
     "tests/safety/test_promises_from_9.py",
+    "tests/safety/test_repeated_orders.py",
     "tests/safety/test_signals.py",
     "tests/simulators",
 )

@@ -341,6 +341,14 @@ def test_single_reads_alternate_the_length_of_their_reply(engine: Engine) -> Non
     assert lengths == [(1, first), (2, first), (1, second), (1, first), (2, second)]
 
 
+def test_blocking_reads_alternate_the_length_of_their_reply(engine: Engine) -> None:
+    engine.wire.answer = Servos()
+    reading = read(1, alternate=True)
+    assert [engine.run(reading) for _ in range(6)] == [100] * 6
+    lengths = [frame[6] for frame in engine.sent()]
+    assert lengths == [lengths[0], 5 - lengths[0]] * 3
+
+
 def test_a_copy_of_the_last_reply_is_not_the_next_one(engine: Engine) -> None:
     engine.submit("a", read(1, alternate=True))
     count = replies(engine) - 6

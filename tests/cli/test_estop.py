@@ -20,6 +20,9 @@ import motorbus
 from motorbus.bus import stop
 from motorbus.cli import estop
 from motorbus.cli.simulated import Simulated
+from motorbus.core.operation import Data
+from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
 LOOPING = """
@@ -176,6 +179,25 @@ def test_devices_that_are_named_confirm_it(served: Simulated, run: Run) -> None:
     assert ran.code == 6
     (stop,) = ran.document["buses"]
     assert (stop["acknowledged"], stop["silent"], stop["by"]) == ([1], [9], "this process")
+
+
+class LosesOne(PerfectLine):
+    """Loses the first reply of device 2."""
+
+    lost = False
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.DEVICE and isinstance(data, bytes) and data[2] == 2 and not self.lost:
+            self.lost = True
+            return []
+        return super().carry(sender, data, at)
+
+
+def test_a_named_device_whose_acknowledgement_is_lost_is_stopped_again(run: Run, arm: Simulation) -> None:
+    arm.line = line = LosesOne()
+    (stop,) = run("estop", f"{arm.url}#1-3", "--json").document["buses"]
+    assert line.lost
+    assert (stop["acknowledged"], stop["silent"]) == ([1, 2, 3], [])
 
 
 @pytest.mark.parametrize(("devices", "silent"), [("", []), ("#8+9", [8, 9])], ids=["unnamed", "named"])

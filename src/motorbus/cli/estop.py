@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""
+TRIES: Final = 5
+"""Stops sent to a named device until it acknowledges, as in the rounds of an open bus."""
 OPENING: Final = 1.0
 """s that a process which is opening a port may need until it offers a stop."""
 BY_HAND: Final = "cut the power by hand"
@@ -277,6 +279,11 @@ def _ask_where(opening: Bus, nodes: Iterable[int]) -> None:
 
 
 def _confirms(opening: Bus, node: int) -> bool:
+    """Stop this node, up to `TRIES` times; whether it has acknowledged."""
+    return any(_stop_node(opening, node) for _ in range(TRIES))
+
+
+def _stop_node(opening: Bus, node: int) -> bool:
     """Send this node what its family stops it with; has it acknowledged?"""
     answers = []
     exchanges = opening.family.stop({node: None}).exchanges

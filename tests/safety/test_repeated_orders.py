@@ -1,0 +1,82 @@
+"""An order that a control loop repeats is judged each time, alone or in one burst with a read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import pi
+from typing import Any
+
+import pytest
+
+from motorbus.errors import LimitExceeded
+from motorbus.families.feetech import sync_read_positions, sync_write_positions, sync_writer
+from motorbus.session.robot import Robot
+from tests.safety.points import known, sent
+from tests.support.machines import listened, machine
+
+AXES = {name: {"low": "-60 deg", "high": "60 deg", "max_step": "15 deg"} for name in ("a1", "a2")}
+SYNC_WRITE = 0x83
+WAYS: dict[str, Callable[[Any, Any, Any], object]] = {
+    "alone": lambda bus, order, nodes: bus.run(order),
+    "with a read": lambda bus, order, nodes: bus.volley(order, sync_read_positions(nodes)),
+}
+
+
+def instructions(sims: Any) -> list[int]:
+    """The instruction bytes of all frames sent so far."""
+    return [data[4] for data in sent(sims) if isinstance(data, bytes)]
+
+
+def goals(sims: Any) -> int:
+    return instructions(sims).count(SYNC_WRITE)
+
+
+@contextmanager
+def ordered() -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Two servos whose loop has sent one order: bus, nodes, writer of orders, simulations."""
+    with machine(arm="1-2", axes=AXES) as (made, sims), Robot.of(made) as robot:
+        listened(sims)
+        nodes = [known(robot["a1"]), known(robot["a2"])]
+        writer = sync_writer(nodes, "goal_position")
+        robot.positions()
+        robot.buses["arm"].run(writer([pi, pi]))  # type: ignore[attr-defined]
+        robot.positions()
+        yield robot.buses["arm"], nodes, writer, sims
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize("angle", [0.4, 1.5], ids=["beyond its step", "beyond its limit"])
+def test_a_goal_that_the_gate_refuses_is_not_sent(way: Any, angle: float) -> None:
+    with ordered() as (bus, nodes, writer, sims):
+        before = goals(sims)
+        with pytest.raises(LimitExceeded):
+            way(bus, writer([pi, pi + angle]), nodes)
+        assert goals(sims) == before
+        way(bus, writer([pi, pi + 0.05]), nodes)
+        assert goals(sims) == before + 1
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_old_positions_are_read_again_before_the_goal_is_sent(way: Any) -> None:
+    with ordered() as (bus, nodes, writer, sims):
+        bus.link.advance(9.0)
+        before = len(instructions(sims))
+        way(bus, writer([pi, pi + 0.05]), nodes)
+        frames = instructions(sims)[before:]
+        assert frames[0] in (0x02, 0x82)
+        assert SYNC_WRITE in frames
+
+
+def test_a_limit_of_the_device_inside_that_of_the_axis_counts() -> None:
+    axes = {"a1": {"low": "-60 deg", "high": "60 deg", "max_step": "60 deg"}}
+    with machine(arm="1", axes=axes) as (made, sims):
+        sims["arm"][1].memory["max_position_limit"] = 2248  # 0.307 rad above the middle
+        with Robot.of(made) as robot:
+            bus: Any = robot.buses["arm"]
+            device = known(robot["a1"])
+            robot.positions()
+            bus.run(sync_write_positions([device], [pi + 0.02]))
+            robot.positions()
+            with pytest.raises(LimitExceeded):
+                bus.run(sync_write_positions([device], [pi + 0.4]))
