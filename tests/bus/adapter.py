@@ -1,4 +1,4 @@
-"""Binds the vocabulary of the engine tests (submit, deliver, advance, cancel, stop, sent, result) to the bus.
+"""Binds the vocabulary of the engine tests (submit, deliver, advance, cancel, stop, sent, result) to two engines.
 
 The one file of the engine tests that names classes of the bus. Time is virtual; nothing here waits.
 """
@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
+from motorbus.bus import blocking, engine
 from motorbus.bus.crank import crank
 from motorbus.bus.pump import Bus
 from motorbus.bus.run import Run
 from motorbus.bus.stop import StopOutcome
+from motorbus.bus.tasks import TaskTree
 from motorbus.core.goal import Goal
 from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen, Operation
 from motorbus.core.operation import Effect as Effect
@@ -120,7 +122,18 @@ class Wire:
 
 
 class Engine:
-    """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none)."""
+    """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none).
+
+    `implementation` is the engine under test.
+    """
+
+    implementation: ClassVar[type[Engine]]
+    link: MemoryLink
+    bus: Any
+    calls: dict[str, Any]
+
+    def __new__(cls, *_: Any, **__: Any) -> Engine:
+        return object.__new__(Engine.implementation)
 
     def __init__(
         self,
@@ -136,9 +149,8 @@ class Engine:
         self.family = FAMILIES[family]
         self.link = MemoryLink(self.wire, rate=self.family.link.rate)
         self.link.listen_only = listen_only
-        self.bus = Bus(self.link, self.family, admit=check)
-        self.bus.latency = latency
-        self.calls: dict[str, Run[Any]] = {}
+        self.calls = {}
+        self.bus = self.open(check, latency)
         self.wire.echoes = echo
         if answer is not None:
             self.wire.answer = answer
@@ -148,6 +160,9 @@ class Engine:
                 self.bus.run(test)
         self.wire.answer = lambda frame: []
         self.sent()
+
+    def open(self, check: Callable[[Any], None] | None, latency: float) -> Any:
+        raise NotImplementedError
 
     @property
     def now(self) -> float:
@@ -160,19 +175,17 @@ class Engine:
     @property
     def deadline(self) -> float:
         """Seconds until the engine acts by itself."""
-        return self.bus.turns.due() - self.now
+        raise NotImplementedError
 
     def submit(self, name: str, work: Any) -> None:
-        self.calls[name] = Run(self.bus.turns, work, now=self.link.now)
-        self.advance()
+        raise NotImplementedError
 
     def run(self, work: Any) -> Any:
         """Carry it out as a blocking caller does."""
         return self.bus.run(work)
 
     def cancel(self, name: str) -> None:
-        self.calls[name].interrupt(Cancelled())
-        self.advance()
+        raise NotImplementedError
 
     def deliver(self, *data: Data, after: float = 0.0005) -> None:
         """These arrive after so many seconds, each by itself."""
@@ -181,15 +194,7 @@ class Engine:
 
     def advance(self, seconds: float = 0.0) -> None:
         """Let time pass, and do all that is to be done meanwhile."""
-        end, same = self.now + seconds, 0
-        while same < 2:
-            before = self.now, len(self.wire.sent), self.bus.turns.settled
-            for call in self.calls.values():
-                call.advance()
-            crank(self.link, self.bus.turns, end)
-            self.link.advance(0.0)
-            same = same + 1 if before == (self.now, len(self.wire.sent), self.bus.turns.settled) else 0
-        assert self.now >= end - 1e-9
+        raise NotImplementedError
 
     def sent(self) -> list[Any]:
         """Everything sent since the last look."""
@@ -198,13 +203,10 @@ class Engine:
 
     def result(self, name: str) -> Any:
         """The value of a call or its error, PENDING while it has not ended."""
-        call = self.calls[name]
-        if not call.advance():
-            return PENDING
-        return call.root.value if call.told() is None else call.told()
+        raise NotImplementedError
 
     def estop(self) -> StopOutcome:
-        outcome = self.bus.estop()
+        outcome: StopOutcome = self.bus.estop()
         self.advance()
         return outcome
 
@@ -218,6 +220,155 @@ class Engine:
 
     def counts(self, node: int) -> Any:
         return self.bus.statistics.nodes[node]
+
+
+class OldEngine(Engine):
+    """The engine that `motorbus.open` uses."""
+
+    bus: Bus
+
+    def open(self, check: Callable[[Any], None] | None, latency: float) -> Bus:
+        bus = Bus(self.link, self.family, admit=check)
+        bus.latency = latency
+        return bus
+
+    @property
+    def deadline(self) -> float:
+        return self.bus.turns.due() - self.now
+
+    def submit(self, name: str, work: Any) -> None:
+        self.calls[name] = Run(self.bus.turns, work, now=self.link.now)
+        self.advance()
+
+    def cancel(self, name: str) -> None:
+        self.calls[name].interrupt(Cancelled())
+        self.advance()
+
+    def advance(self, seconds: float = 0.0) -> None:
+        end, same = self.now + seconds, 0
+        while same < 2:
+            before = self.now, len(self.wire.sent), self.bus.turns.settled
+            for call in self.calls.values():
+                call.advance()
+            crank(self.link, self.bus.turns, end)
+            self.link.advance(0.0)
+            same = same + 1 if before == (self.now, len(self.wire.sent), self.bus.turns.settled) else 0
+        assert self.now >= end - 1e-9
+
+    def result(self, name: str) -> Any:
+        call = self.calls[name]
+        if not call.advance():
+            return PENDING
+        return call.root.value if call.told() is None else call.told()
+
+
+class NewBus:
+    """What the tests ask of a bus, over the engine that replaces the old one."""
+
+    def __init__(self, blocking: blocking.Bus) -> None:
+        self._blocking = blocking
+        self._engine = blocking.engine
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._engine, name)
+
+    def run(self, work: Any, report: Any = None) -> Any:
+        return self._blocking.run(work, report)
+
+    def estop(self) -> Any:
+        return self._blocking.estop()
+
+    @property
+    def echoes(self) -> bool:
+        return bool(self._engine.echo.present)
+
+    def expect_echo(self, test: Any) -> None:
+        self._engine.echo.test = test
+
+
+class Check:
+    """An interlock of one function."""
+
+    def __init__(self, check: Callable[[Any], None]) -> None:
+        self._check = check
+
+    def check(self, request: Exchange[Any], now: float) -> None:
+        self._check(request)
+
+    def required_reads(self, request: Exchange[Any]) -> Sequence[Any]:
+        return ()
+
+    def stopped(self, nodes: Sequence[int]) -> None:
+        pass
+
+
+class NewEngine(Engine):
+    """The engine that replaces it."""
+
+    settled = False
+
+    def open(self, check: Callable[[Any], None] | None, latency: float) -> NewBus:
+        self.engine = engine.Engine(
+            self.family,
+            rate=self.link.rate,
+            latency=latency,
+            listen_only=self.link.listen_only,
+            interlock=None if check is None else Check(check),
+        )
+        self.blocking = blocking.Bus(self.link, self.engine)
+        return NewBus(self.blocking)
+
+    @property
+    def deadline(self) -> float:
+        return self.engine.next_deadline() - self.now
+
+    def submit(self, name: str, work: Any) -> None:
+        self.calls[name] = TaskTree(self.engine, work, now=self.link.now, settled=self._settle)
+        self.advance()
+
+    def _settle(self) -> None:
+        self.settled = True
+
+    def cancel(self, name: str) -> None:
+        self.calls[name].cancel(Cancelled())
+        self.advance()
+
+    def _state(self) -> tuple[Any, ...]:
+        finished = [call.root.finished for call in self.calls.values()]
+        return self.now, len(self.wire.sent), len(self.engine.queue), len(self.engine.in_flight), finished
+
+    def advance(self, seconds: float = 0.0) -> None:
+        end, same = self.now + seconds, 0
+        while same < 3:
+            before, self.settled = self._state(), False
+            for call in self.calls.values():
+                call.advance()
+            if self.engine.gone is not None:
+                self._look_for_link(end)
+            else:
+                self.blocking.send()
+                if self.settled:
+                    continue
+                self.blocking.receive(min([end, *(call.next_moment() for call in self.calls.values())]))
+                if self.engine.gone is None:
+                    self.link.advance(0.0)
+            same = same + 1 if before == self._state() else 0
+        assert self.now >= end - 1e-9
+
+    def _look_for_link(self, end: float) -> None:
+        try:
+            self.link.renew(0)
+        except LinkLost as error:
+            self.engine.lost(error)
+            self.link.rest(end)
+        else:
+            self.engine.reconnected(self.now, self.engine.latency)
+
+    def result(self, name: str) -> Any:
+        call = self.calls[name]
+        if not call.advance():
+            return PENDING
+        return call.root.value if call.error() is None else call.error()
 
 
 __all__ = ["PENDING", "Cancelled", "Effect", "Engine", "LinkLost", "Priority", "Timeout", "request"]

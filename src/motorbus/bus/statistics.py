@@ -62,6 +62,11 @@ class Statistics:
         for due in dues:
             self.of(due.node).sent += 1
 
+    def retried(self, dues: tuple[Due, ...] | Any_) -> None:
+        """A request that calls for these replies is sent again."""
+        for due in () if dues is ANY else dues:
+            self.of(due.node).retries += 1
+
     def answered(self, dues: Iterable[Due], seconds: float) -> None:
         """A good reply of each of these, all of them after this time."""
         bucket = bucket_of(seconds)[0]

@@ -1,0 +1,721 @@
+"""The engine of a bus: requests in, frames out, data in, replies out. No I/O and no clock.
+
+One request is in flight per lane, on as many lanes as the window of the family allows. An attempt is recorded in
+`in_flight` before its request is written and removed when its reply is accepted or its time is over; nothing else
+records doubt. A deadline is fixed when the request leaves; only requests on other lanes, which share the wire, extend
+it. A link is first in, first out.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Callable, Sequence
+from itertools import count
+from math import inf
+from typing import Any, Final, TypeVar
+
+from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
+from motorbus.bus.echo import Echo
+from motorbus.bus.interlock import Interlock
+from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Wait
+from motorbus.bus.policy import carry_out
+from motorbus.bus.positions import GATED, LastPositions, is_stopped_by, moves
+from motorbus.bus.prepared import Prepared
+from motorbus.bus.statistics import Statistics, bucket_of
+from motorbus.bus.sync import SyncTable
+from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.core.family import Family
+from motorbus.core.operation import (
+    ANY,
+    EVERY_LANE,
+    Answer,
+    Data,
+    Due,
+    Effect,
+    Event,
+    Exchange,
+    Noise,
+    Notice,
+    Rank,
+    Reply,
+    Timeout,
+)
+from motorbus.errors import LinkError, LinkLost, MotorbusError
+
+T = TypeVar("T")
+
+MARGIN: Final = {Timeout.SCAN: 0.002, Timeout.REPLY: 0.02, Timeout.STORE: 0.02}
+"""s that the host may be late; short for a scan, where silence is the usual answer."""
+KEPT_BY_STOP: Final = (Effect.PERSISTENT, Effect.IDENTITY)
+"""Effects of requests that a stop lets follow it, so that a guarded change can close its lock."""
+UNCOUNTED: Final = 64
+"""Prepared requests with replies that are not yet in the statistics."""
+
+
+class Engine:
+    """The engine of one bus. `rate` in bit/s and `latency` in s describe the link; `paced`: frames take their time.
+
+    `time` (s) is the latest moment that the engine was told.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        *,
+        rate: int,
+        latency: float = 0.0,
+        paced: bool = False,
+        listen_only: bool = False,
+        interlock: Interlock | None = None,
+    ) -> None:
+        self.family = family
+        self.window = family.link.window
+        self.paced = paced
+        self.interlock = interlock
+        self.always_listening = self.listening = listen_only
+        self.diagnosis: Callable[[], str] = str
+        self.trace: Feed[TraceRecord] = Feed()
+        self.notices: Feed[Notice] = Feed()
+        self.statistics = Statistics(self.count_prepared)
+        self.sync = SyncTable(family)
+        self.echo = Echo()
+        self.receiver = family.receiver()
+        self.positions = LastPositions(family, rate)
+        self.in_flight: dict[int, Attempt] = {}
+        self.queue: list[Job] = []
+        self.listeners: list[Callable[[Notice], None]] = []
+        self.exclusive: object = None
+        self.latched = self.stopping = False
+        self.latched_by = ""
+        self.losses = 0
+        self.gone: LinkLost | None = None
+        self.loss: LinkLost | None = None
+        """The last one; `gone` is None again when the port is back."""
+        self.free_at = self.time = 0.0
+        self.timing = 0
+        self._rate, self._latency = rate, latency
+        self._serial = count()
+        self._unacknowledged: list[Attempt] = []
+        self._uncounted: list[Prepared] = []
+        self.ready = False
+        self.last: Prepared | None = None
+        """The prepared request that was carried out last, if nothing else happened since."""
+
+    @property
+    def rate(self) -> int:
+        """Bit rate (bit/s)."""
+        return self._rate
+
+    @rate.setter
+    def rate(self, rate: int) -> None:
+        self._rate = rate
+        self.timing += 1
+
+    @property
+    def latency(self) -> float:
+        """s that the adapter may hold data back; part of every deadline."""
+        return self._latency
+
+    @latency.setter
+    def latency(self, seconds: float) -> None:
+        self._latency = seconds
+        self.timing += 1
+
+    @property
+    def quiet_time(self) -> float:
+        """s of silence before a node out of sync is probed."""
+        return self.family.quiet_time(self._rate)
+
+    def air_time(self, request: Exchange[Any]) -> float:
+        """s on the wire of this request and its replies."""
+        return self.family.air_time(request, self._rate)
+
+    def reply_timeout(self, request: Exchange[Any]) -> float:
+        """s from the end of the air time to the deadline."""
+        return self.family.turnaround(request) + self._latency + MARGIN[request.timeout]
+
+    @property
+    def idle(self) -> bool:
+        """Nothing is in flight or waits to be sent."""
+        return not (self.in_flight or self.queue)
+
+    def check_ready(self) -> bool:
+        """Set and return `ready`: a prepared request may be sent at once.
+
+        Nothing is in flight, waits, or must be looked at first. It stays so until something else is done here.
+        """
+        self.ready = not (self.in_flight or self.queue or self.stopping or self.listening or self.gone) and (
+            self.exclusive is None and self.echo.is_out and not self.receiver.held
+        )
+        return self.ready
+
+    # -- jobs --------------------------------------------------------------------------------------------------
+
+    def submit(self, job: Job, now: float) -> None:
+        """Queue a job; it is sent by priority, in order within one."""
+        self.time, self.ready = now, False
+        self.note_last()
+        job.serial = next(self._serial)
+        if isinstance(job, RequestJob):
+            if self.latched and job.request.effect in GATED and job.priority is not Rank.STOP:
+                job.settle(error=failures.latched(self.latched_by))
+                return
+            if job.priority is Rank.STOP:
+                self._stop_waiting(job.request)
+            job.policy = carry_out(self, job.request)
+            insort(self.queue, job)
+        elif isinstance(job, ExclusiveJob) and self.exclusive is not None and self.exclusive is job.owner:
+            job.settle()
+        else:
+            insort(self.queue, job)
+
+    def cancel(self, job: Job, error: BaseException | None = None) -> None:
+        """Its caller no longer waits. A request in flight keeps its lane until its reply or its deadline."""
+        self._remove(job)
+        for attempt in self.in_flight.values():
+            if attempt.job is job:
+                attempt.job = None
+        job.settle(error=error or failures.abandoned())
+
+    def release(self, owner: object) -> None:
+        """This owner no longer has the bus alone."""
+        if self.exclusive is owner:
+            self.exclusive = None
+
+    def _resume(self, job: RequestJob, attempt: Attempt | None = None) -> None:
+        """Continue the policy of a job: with a finished attempt, or after a wait."""
+        assert job.policy is not None
+        self._remove(job)
+        try:
+            step = job.policy.send(attempt)
+            while isinstance(step, Wait) and step.until <= self.time:
+                step = job.policy.send(None)
+        except StopIteration as end:
+            self._decode(job, end.value)
+        except MotorbusError as error:
+            job.settle(error=error)
+        else:
+            job.step = step
+            insort(self.queue, job)
+
+    def _decode(self, job: RequestJob, answer: Answer) -> None:
+        request = job.request
+        try:
+            value = answer if request.read is None else request.read(answer)
+        except Exception as error:  # a refusal of the device, or an error of the driver
+            job.settle(error=error)
+            return
+        if request.replies:
+            self.positions.accept(request, answer)
+        job.settle(value)
+
+    def _remove(self, job: Job) -> None:
+        if job in self.queue:
+            self.queue.remove(job)
+
+    # -- what is sent ------------------------------------------------------------------------------------------
+
+    def next_frame(self, now: float) -> Data | RateJob | None:
+        """What to do now: write this data, or change the rate; None: nothing before `next_deadline`.
+
+        After a write call `written`, after a change of rate `rate_changed`.
+        """
+        self.time = now
+        for job in list(self.queue):
+            if not self._may_use_bus(job):
+                continue
+            if isinstance(job, RequestJob):
+                data = self._try_to_send(job, now)
+                if data is not None:
+                    return data
+            elif self.in_flight:
+                return None
+            else:
+                self.queue.remove(job)
+                if isinstance(job, RateJob):
+                    return job
+                self.exclusive = job.owner
+                job.settle()
+        return None
+
+    def _may_use_bus(self, job: Job) -> bool:
+        if job.priority is Rank.STOP:
+            return True
+        return not self.stopping and (self.exclusive is None or self.exclusive is job.owner)
+
+    def _try_to_send(self, job: RequestJob, now: float) -> Data | None:
+        """Begin the next attempt of this job, if its lane is free and it may leave."""
+        if job.request.lane in self.in_flight or len(self.in_flight) >= self.window:
+            return None
+        if self.paced and now < self.free_at:
+            return None
+        if not isinstance(job.step, Send):
+            if job.step is not None and now < job.step.until:
+                return None
+            self._resume(job)
+        if job.done or not isinstance(job.step, Send):
+            return None
+        step, request = job.step, job.step.request
+        unprobed = step.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
+        doubtful = [] if unprobed else self.sync.doubtful(request)
+        if any(node not in step.excluded for node in doubtful):
+            self._resume(job)
+            return None
+        self._remove(job)
+        try:
+            if step.is_probe:
+                self._check_speaks(request)
+            else:
+                self.check(job)
+        except MotorbusError as error:
+            job.settle(error=error)
+            return None
+        self.begin(Attempt(request, job, step.excluded, is_probe=step.is_probe), now)
+        return request.request
+
+    def check(self, job: RequestJob) -> None:
+        """Raise the error for which this request must not leave now."""
+        request = job.request
+        self._check_speaks(request)
+        if request.rank is Rank.STOP:
+            return
+        gated = request.effect in GATED
+        if gated and self.latched:
+            raise failures.latched(self.latched_by)
+        if moves(request):
+            if job.stops is not None and self.positions.stops_for(request) != job.stops:
+                raise failures.stopped()
+            if self.losses != job.losses:
+                raise failures.outlived(request)
+        if gated or (request.later is not None and self.interlock is not None):
+            if self.interlock is None:
+                raise failures.no_interlock(request)
+            if request.refusal is not None and (error := request.refusal(self.positions.stop_count)):
+                raise error
+            self.interlock.check(request, self.time)
+
+    def _check_speaks(self, request: Exchange[Any]) -> None:
+        if self.listening:
+            raise failures.listen_only(request)
+
+    def begin(self, attempt: Attempt, now: float) -> None:
+        """Record an attempt before its request is written."""
+        request = attempt.request
+        if self.receiver.held:  # it cannot belong to a reply to a request that has not left
+            for event in self.receiver.flush():
+                self._take(event, now)
+        start, air = max(now, self.free_at), self.air_time(request)
+        attempt.sent_at = now
+        attempt.echo_excluded = attempt.echo_excluded and self.echo.present is False
+        if request.replies != ():
+            self.sync.mark_sent(request, now)
+            attempt.deadline = start + air + self.reply_timeout(request)
+            self._share_wire(attempt, air)
+            self.in_flight[request.lane] = attempt
+        else:
+            self.free_at = start + air
+            self._unacknowledged.append(attempt)
+        if request.effect or request.goals:
+            self.positions.sent(request)
+        if isinstance(request.request, bytes):
+            self.echo.sent(request.request, attempt.is_probe or request is self.echo.test)
+        self.statistics.asked(request.replies)
+        if self.trace.subscriptions:
+            self.trace.put(TraceRecord(now, "tx", request.request))
+
+    def adopt(self, attempt: Attempt) -> None:
+        """A prepared request that was written goes on as any other attempt."""
+        request = attempt.request
+        self.note_last()
+        self.sync.mark_sent(request, attempt.sent_at)
+        self.statistics.asked(request.replies)
+        if isinstance(request.request, bytes):
+            self.echo.sent(request.request, testing=False)
+
+    def written(self) -> None:
+        """The data of `next_frame` was written: a request without reply has ended."""
+        attempts, self._unacknowledged = self._unacknowledged, []
+        for attempt in attempts:
+            assert attempt.job is not None
+            self._decode(attempt.job, attempt.answer(self.time))
+
+    def _share_wire(self, attempt: Attempt, air: float) -> None:
+        """Whichever lane goes first, each attempt may have to wait for all the others once."""
+        if self.window == 1:
+            return
+        attempt.air = air
+        attempt.beside = len(self.in_flight)
+        for other in self.in_flight.values():
+            attempt.deadline += other.air
+            if other.beside < self.window - 1 and other.job is not None:
+                other.deadline += air
+                other.beside += 1
+
+    def _stop_waiting(self, stop: Exchange[Any]) -> None:
+        """A stop is queued: requests that would move its nodes end, also one in flight that may be repeated."""
+        jobs = [*self.queue, *(attempt.job for attempt in self.in_flight.values())]
+        for job in jobs:
+            if isinstance(job, RequestJob) and is_stopped_by(stop, job.request):
+                self.cancel(job, failures.stopped())
+
+    def rate_changed(self, job: RateJob, error: MotorbusError | None = None) -> None:
+        """The link has the new rate, or has refused it."""
+        before = self.rate
+        if error is None and job.tune.rate:
+            self.rate = job.tune.rate
+            self.listening = job.tune.listen_only or self.always_listening
+            self.receiver = self.family.receiver()
+        job.settle(before, error)
+
+    def alternate(self, request: Exchange[Any]) -> Exchange[Any]:
+        """The same request with a reply of another length, where the last reply of its node was as long.
+
+        So a copy of the last reply is not taken for the next one.
+        """
+        if request.other is None or request.replies is ANY or len(request.replies) != 1:
+            return request
+        due = request.replies[0]
+        node = self.sync.nodes.get(due.node)
+        return request.other() if node is not None and node.length == due.length else request
+
+    # -- what comes in -----------------------------------------------------------------------------------------
+
+    def feed(self, chunks: Sequence[Data], now: float, looked: float | None = None) -> None:
+        """Take what the link delivered by `now`, then end what was overdue when the link was looked at."""
+        self.time, self.ready = now, False
+        self.note_last()
+        for data in chunks:
+            if self.trace.subscriptions:
+                self.trace.put(TraceRecord(now, "rx", data))
+            if isinstance(data, bytes):
+                self._feed_bytes(data, now)
+            else:
+                self._take_all(self.receiver.feed(data), now)
+        self._end_complete(now)
+        self.expire(now if looked is None else looked)
+
+    def _feed_bytes(self, data: bytes, now: float) -> None:
+        rest = self.echo.strip(data)
+        if self.echo.broken:
+            self._echo_broke(now)
+        if rest:
+            self._take_all(self.receiver.feed(rest), now)
+        if self.echo.returned and not any(
+            attempt.echo_excluded or attempt.fault == "echo" for attempt in self.in_flight.values()
+        ):
+            self.echo.doubted()
+            self._fail_all_by_echo()
+
+    def _take_all(self, events: Sequence[Event], now: float) -> None:
+        if len(self.in_flight) == 1:
+            (attempt,) = self.in_flight.values()
+            if attempt.only_replies(events, self.echo.recent):
+                return
+        for event in events:
+            self._take(event, now)
+
+    def _take(self, event: Event, now: float) -> None:
+        if isinstance(event, Reply):
+            self._take_reply(event, now)
+        elif isinstance(event, Notice):
+            self.statistics.other["notices"] += 1
+            notice = event._replace(at=now)
+            self.notices.put(notice)
+            for listener in tuple(self.listeners):
+                listener(notice)
+        else:
+            self._take_noise(event, now)
+
+    def _take_reply(self, reply: Reply, now: float) -> None:
+        attempt = self.in_flight.get(reply.lane)
+        if attempt is None:
+            self._take_unexpected(None, reply, now)
+        elif reply.data in self.echo.recent and not attempt.echo_excluded:
+            self.echo.doubted()
+            attempt.fault = "echo"
+            self.statistics.other["echo"] += 1
+        elif attempt.complete:
+            if attempt.is_excluded(reply):
+                self._is_late(reply)
+            else:
+                attempt.surplus |= not self._take_for_all(reply)
+        elif not self._is_older(attempt, reply) and not attempt.take(reply):
+            self._take_unexpected(attempt, reply, now)
+
+    def _is_older(self, attempt: Attempt, reply: Reply) -> bool:
+        """A request that leaves without a probe can meet an owed reply of its own kind."""
+        unprobed = attempt.request.rank is Rank.STOP or attempt.request.replies is ANY
+        return unprobed and self._is_late(reply)
+
+    def _is_late(self, reply: Reply) -> bool:
+        late = self.sync.take_owed(reply.lane, reply.key, len(reply.data))
+        self.statistics.other["late"] += late
+        return late
+
+    def _take_for_all(self, reply: Reply) -> bool:
+        """A request to all nodes takes every reply that no other request expects."""
+        attempt = self.in_flight.get(EVERY_LANE)
+        return attempt is not None and attempt.take(reply)
+
+    def _take_unexpected(self, attempt: Attempt | None, reply: Reply, now: float) -> None:
+        if self._is_late(reply) or self._take_for_all(reply):
+            return
+        dues = () if attempt is None or attempt.request.replies is ANY else attempt.request.replies
+        if attempt is not None and not attempt.is_probe and any(due.key == reply.key for due in dues):
+            attempt.exclude(reply)
+            self.statistics.other["unexpected"] += 1
+        else:
+            self.statistics.other["foreign"] += 1
+            self.sync.mark_recent(now, self.quiet_time, reply.lane)
+
+    def _take_noise(self, noise: Noise, now: float) -> None:
+        self.statistics.other[noise.fault] += 1
+        if noise.fault == "foreign":
+            return
+        for lane, attempt in self.in_flight.items():
+            if noise.lane in (None, lane):
+                attempt.hear_noise(noise.fault, noise.data)
+        self.sync.mark_recent(now, self.quiet_time, noise.lane)
+
+    def _echo_broke(self, now: float) -> None:
+        self.echo.broken = False
+        self._fail_all_by_echo()
+        self.sync.mark_recent(now, self.quiet_time)
+
+    def _fail_all_by_echo(self) -> None:
+        self.statistics.other["echo"] += 1
+        for attempt in self.in_flight.values():
+            attempt.fault = "echo"
+
+    # -- how an attempt ends -----------------------------------------------------------------------------------
+
+    def _end_complete(self, now: float) -> None:
+        for lane, attempt in list(self.in_flight.items()):
+            if not attempt.complete:
+                continue
+            for event in self.receiver.flush():  # all replies are here, so what is held is surplus
+                self._take(event, now)
+            if attempt.fault or attempt.surplus:
+                self._fail(lane, attempt, now)
+            else:
+                self._accept(lane, attempt, now)
+
+    def expire(self, now: float) -> None:
+        """End every attempt whose deadline has passed."""
+        for lane, attempt in list(self.in_flight.items()):
+            if now < attempt.deadline:
+                continue
+            held = self.echo.give_up()
+            if self.echo.broken:
+                self._echo_broke(now)
+            for event in [*(self.receiver.feed(held) if held else ()), *self.receiver.flush()]:
+                self._take(event, now)
+            if self.in_flight.get(lane) is not attempt:  # what was held has completed it
+                continue
+            dues = attempt.request.replies
+            sound = (attempt.complete or dues is ANY or len(dues) > 1) and not attempt.fault
+            if dues is ANY or (sound and not attempt.surplus):
+                self._accept(lane, attempt, now)
+            else:
+                self._fail(lane, attempt, now)
+
+    def _accept(self, lane: int, attempt: Attempt, now: float) -> None:
+        """The replies are accepted: their nodes are in sync, and the job goes on."""
+        request, dues = attempt.request, attempt.request.replies
+        answer = attempt.answer(min(now, attempt.deadline))
+        if attempt.is_probe and not (request.read is not None and request.read(answer)):
+            attempt.fault = "unexpected"
+            self._fail(lane, attempt, now)
+            return
+        del self.in_flight[lane]
+        self._end_echo_test(attempt)
+        if dues is ANY:
+            if lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
+                self.positions.add([reply.lane for reply in answer.replies])
+        else:
+            heard = self._heard(attempt, dues, now)
+            if request.rank is not Rank.STOP:  # a request that the stop cut short may still be answered
+                for due in heard:
+                    self.sync.confirm(due, probe=attempt.is_probe)
+            self.statistics.answered(heard, now - attempt.sent_at)
+            self.positions.heard([due.node for due in heard], request, answer, self.rate)
+        self._continue(attempt)
+
+    def _heard(self, attempt: Attempt, dues: Sequence[Due], now: float) -> list[Due]:
+        """The nodes whose reply counts; the others are out of sync."""
+        heard = []
+        for index, due in enumerate(dues):
+            if index in attempt.replies and due.node not in attempt.excluded:
+                heard.append(due)
+                continue
+            node = self.sync.of(due.node)
+            if index not in attempt.replies:
+                self.sync.mark_owed(attempt.request.lane, due, now + self.quiet_time)
+            elif not node.silences:
+                node.quiet_until = now + self.quiet_time
+            self.statistics.of(due.node).errors[attempt.failure()] += 1
+        return heard
+
+    def _fail(self, lane: int, attempt: Attempt, now: float) -> None:
+        attempt.fault = attempt.failure()
+        for index, due in enumerate(attempt.request.replies):  # type: ignore[arg-type]  # ANY never fails
+            if index not in attempt.replies and attempt.request.rank is not Rank.STOP:
+                self.sync.mark_owed(lane, due, now + self.quiet_time)
+            else:
+                self.sync.of(due.node).quiet_until = now + self.quiet_time
+            self.statistics.of(due.node).errors[attempt.fault] += 1
+        if attempt.fault == "silence":
+            self._end_echo_test(attempt)
+        del self.in_flight[lane]
+        self._continue(attempt)
+
+    def _continue(self, attempt: Attempt) -> None:
+        if attempt.job is not None:
+            self._resume(attempt.job, attempt)
+
+    def _end_echo_test(self, attempt: Attempt) -> None:
+        """The test of the echo has ended: only its reply came, or nothing at all."""
+        if self.echo.present is not None or attempt.noise:
+            return
+        if attempt.is_probe or attempt.request is self.echo.test or self.echo.disproved:
+            self.echo.excluded()
+
+    # -- prepared requests -------------------------------------------------------------------------------------
+
+    def prepare(self, request: Exchange[Any]) -> Prepared | None:
+        """Prepare a request that is repeated; None where only the general path can carry it out."""
+        dues = request.replies
+        if request.whole is None or request.rank is Rank.STOP or request.effect or not dues or dues is ANY:
+            return None
+        for due in dues:
+            self.sync.of(due.node)
+        prepared = Prepared(self, request, request.whole, self.sync.nodes)
+        if request.other is not None:
+            other = request.other()
+            if other.whole is None:
+                return None
+            prepared.alternate = Prepared(self, other, other.whole, self.sync.nodes)
+            prepared.alternate.alternate = prepared.alternate.record = prepared
+        request.course = prepared
+        return prepared
+
+    def measure(self, prepared: Prepared) -> None:
+        """Compute the time budget of a prepared request for the present rate and latency."""
+        request = prepared.exchange
+        prepared.budget = self.air_time(request) + self.reply_timeout(request)
+        prepared.timing = self.timing
+
+    def accepted(self, prepared: Prepared, data: Data, at: float) -> None:
+        """This is the complete reply to a prepared request that was sent alone."""
+        record, single, sent_at = prepared.record, prepared.single, prepared.attempt.sent_at
+        if self.last is not record:
+            self.note_last(record)
+        if single is not None:
+            single.length, single.asked_at = prepared.length, sent_at
+        took = at - sent_at
+        if not record.low <= took < record.high:
+            record.bucket, record.low, record.high = bucket_of(took)
+        record.latency[record.bucket] += 1
+        record.data, record.at, record.source, record.orders = data, at, prepared, self.positions.orders
+        if not record.counted:
+            record.counted = True
+            self.count_later(record)
+        del self.in_flight[prepared.lane]
+
+    def note_last(self, record: Prepared | None = None) -> None:
+        """Another request follows the last prepared one: note when its nodes were asked, and what they replied."""
+        last, self.last = self.last, record
+        if last is not None:
+            for state in last.states:
+                state.length, state.asked_at = last.source.length, last.source.attempt.sent_at
+        if record is not None and record.tells_position:
+            self.positions.prepared.update(dict.fromkeys(record.nodes, record))
+
+    def count_later(self, prepared: Prepared) -> None:
+        """This prepared request has replies that are not in the statistics."""
+        if len(self._uncounted) >= UNCOUNTED:
+            self.count_prepared()
+        self._uncounted.append(prepared)
+
+    def count_prepared(self) -> None:
+        """Add the replies of prepared requests to the statistics."""
+        uncounted, self._uncounted = self._uncounted, []
+        for prepared in uncounted:
+            self.statistics.add(prepared.nodes, prepared.latency)
+            prepared.latency = [0] * len(prepared.latency)
+            prepared.counted = False
+
+    # -- time, loss, stop --------------------------------------------------------------------------------------
+
+    def next_deadline(self) -> float:
+        """The next moment (s) at which `next_frame` or `expire` has something to do; inf when there is none."""
+        moments = [attempt.deadline for attempt in self.in_flight.values()]
+        steps = [job.step for job in self.queue if isinstance(job, RequestJob)]
+        moments += [step.until for step in steps if isinstance(step, Wait) and step.until > self.time]
+        if self.queue and self.paced and self.free_at > self.time:
+            moments.append(self.free_at)
+        return min(moments, default=inf)
+
+    def latch(self, now: float, by: str) -> None:
+        """Emergency stop: end what waits, let a reply in flight pass, refuse motion until `reset`.
+
+        `by` names the process and the time; the first one counts until `reset`.
+        """
+        self.latched_by = self.latched_by if self.latched else by
+        self.latched = self.stopping = True
+        self.ready = False
+        error = failures.latched(self.latched_by)
+        for job in list(self.queue):
+            if not (isinstance(job, RequestJob) and job.request.effect in KEPT_BY_STOP):
+                self.cancel(job, error)
+        for attempt in self.in_flight.values():
+            attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
+            if attempt.job is not None:
+                job, attempt.job = attempt.job, None
+                job.settle(error=error)
+
+    def _remaining(self, attempt: Attempt, now: float) -> float:
+        """s that a stop waits for what is on the line: a reply, or on a full-duplex line the rest of a request."""
+        if not self.family.link.both_ways:
+            return self.air_time(attempt.request)
+        request: Exchange[Answer] = Exchange(attempt.request.request)
+        return max(0.0, attempt.sent_at + self.air_time(request) - now)
+
+    def stopped(self) -> None:
+        """The stop frames were sent: other requests may leave again, motion and torque stay refused."""
+        self.stopping = False
+
+    def reset(self) -> None:
+        """Take the latch off."""
+        self.latched = self.stopping = False
+
+    def lost(self, error: LinkError) -> None:
+        """The link failed: everything that waits fails with this error."""
+        self.ready = False
+        jobs = [*self.queue, *(attempt.job for attempt in self.in_flight.values())]
+        jobs += [attempt.job for attempt in self._unacknowledged]
+        for lane, attempt in self.in_flight.items():
+            for due in () if attempt.request.replies is ANY else attempt.request.replies:
+                self.statistics.of(due.node).errors["lost"] += 1
+                self.sync.mark_owed(lane, due, attempt.sent_at + self.quiet_time)
+        self.in_flight.clear()
+        self.queue.clear()
+        self._unacknowledged.clear()
+        self.exclusive = None
+        if isinstance(error, LinkLost):
+            self.losses += self.gone is None
+            self.gone = self.loss = error
+            self.positions.forget()
+        for job in jobs:
+            if job is not None:
+                job.settle(error=error)
+
+    def reconnected(self, now: float, latency: float) -> None:
+        """The port is open again: nothing known of the devices counts, but which there were."""
+        self.latency = latency
+        self.receiver = self.family.receiver()
+        self.echo.doubt_anew()
+        self.sync.mark_all(now + self.quiet_time)
+        self.positions.forget()
+        self.gone = None

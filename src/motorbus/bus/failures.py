@@ -1,0 +1,153 @@
+"""Errors of a request: what was sent and received, the likely cause, and what to do."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from motorbus.core.operation import ANY, CanFrame, Effect, Exchange
+from motorbus.errors import (
+    ChecksumError,
+    FramingError,
+    Interrupted,
+    LinkLost,
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    RequestError,
+    UnexpectedReply,
+)
+
+SERIAL_WORDS: Final = {"rate": "baud rate", "flag": "--baud", "bus": ""}
+CAN_WORDS: Final = {
+    "rate": "bit rate",
+    "flag": "--bitrate",
+    "bus": ", a bus without its two terminating resistors",
+}
+FAULTS: Final[dict[str, tuple[type[MotorbusError], str, str]]] = {
+    "silence": (
+        NoReply,
+        "no such id on this bus, another {rate}, no power, or a loose cable{bus}",
+        "`motorbus scan BUS` lists the devices that answer; add `{flag} all` to try every rate",
+    ),
+    "checksum": (
+        ChecksumError,
+        "bytes changed on the way: a long or loose cable, missing ground, or two nodes with one id",
+        "check the wiring; `motorbus scan BUS` shows whether two nodes share an id",
+    ),
+    "framing": (
+        FramingError,
+        "the line carries something else: another {rate}, another program, electrical noise",
+        "check the {rate} and that no other program sends on this bus",
+    ),
+    "surplus": (
+        UnexpectedReply,
+        "more bytes came than were asked for: two nodes with one id, an echo, or another host on the bus",
+        "run one program on this bus and give every device its own id",
+    ),
+    "echo": (
+        UnexpectedReply,
+        "the adapter started or stopped echoing what is sent",
+        "check the adapter; open the bus again",
+    ),
+    "unexpected": (
+        UnexpectedReply,
+        "the node sent a reply to another request: a late one, or one to another host",
+        "run one program on this bus",
+    ),
+}
+"""Faults of an attempt: the error, its likely cause and what to do."""
+RECONNECTING: Final = (
+    "the next request looks for the port again; requests of before the loss are not repeated"
+)
+
+
+def no_answer(
+    request: Exchange[Any], fault: str, received: bytes, *, tries: int, sent: bool, diagnosis: str = ""
+) -> MotorbusError:
+    """The error for a request whose last attempt failed with this fault, and what was `received` then.
+
+    `sent`: the request itself left, not only a probe. `diagnosis` is what the adapter reports, "" for nothing.
+    """
+    dues = () if request.replies is ANY else request.replies
+    node = dues[0].node if dues else None
+    kind, cause, advice = FAULTS[fault]
+    unknown = bool(dues) and sent and (request.effect is not Effect.NONE or not request.repeatable)
+    who = f"node {node}" if node is not None else "the bus"
+    again = f" ({tries} tries)" if tries > 1 else ""
+    summary = {
+        "silence": f"{who} did not answer{again}",
+        "checksum": f"the answer of {who} was damaged{again}",
+    }.get(fault, f"no valid answer from {who}{again}")
+    if unknown:
+        kind = OutcomeUnknown
+        summary += "; whether the write took effect is not known"
+    words = CAN_WORDS if isinstance(request.request, CanFrame) else SERIAL_WORDS
+    return kind(
+        summary,
+        sent=request.request,
+        received=received,
+        expected=f"{dues[0].length} bytes from {who}" if dues else "",
+        cause=diagnosis or cause.format(**words),
+        advice=advice.format(**words),
+        node=node,
+    )
+
+
+def latched(by: str) -> Interrupted:
+    """The error for a request that an emergency stop drops or refuses; `by` names the process and the time."""
+    return Interrupted(
+        f"the bus is stopped: emergency stop latched {by}",
+        advice="when it is safe, call reset() on the bus, in the process that owns it",
+    )
+
+
+def stopped() -> Interrupted:
+    """The error for a motion request that was waiting when its device was stopped."""
+    return Interrupted(
+        "the order was withdrawn: its device was stopped, or its torque switched off, before the order was done",
+        cause="a stop that was requested later goes first and ends the orders that wait",
+        advice="it may have been carried out before the stop, not after it; send it again if it is still wanted",
+    )
+
+
+def no_interlock(request: Exchange[Any]) -> RequestError:
+    """The error for a motion request on a bus without an interlock."""
+    return RequestError(
+        "this bus has no gate, so it refuses requests that move a motor or switch its torque",
+        sent=request.request,
+        cause="the bus was built without the gate that open() adds",
+        advice="use motorbus.open(), or pass `interlock` to the bus; nothing was sent",
+    )
+
+
+def listen_only(request: Exchange[Any]) -> RequestError:
+    """The error for a request while the link only listens."""
+    return RequestError(
+        "the bus only listens: nothing was sent",
+        sent=request.request,
+        cause="it was opened listen-only, or a scan listens for the bit rate",
+        advice="open the bus without listen-only",
+    )
+
+
+def outlived(request: Exchange[Any]) -> LinkLost:
+    """The error for a motion request of a procedure that began before the port was lost."""
+    return LinkLost(
+        "the port was lost after this procedure began, so it moves nothing any more",
+        sent=request.request,
+        cause="devices may have restarted or moved meanwhile",
+        advice="start it again if it is still wanted; nothing was sent",
+    )
+
+
+def reconnecting(error: LinkLost) -> LinkLost:
+    """The same error, saying that the port is looked for again."""
+    if RECONNECTING not in error.advice:
+        advice = error.advice.removesuffix(", then open the bus anew") or "check the cable"
+        error.advice = f"{advice}; {RECONNECTING}"
+    return error
+
+
+def abandoned() -> Interrupted:
+    """The error for a request whose caller no longer waits."""
+    return Interrupted("the request was cancelled", cause="its caller was interrupted or the bus was closed")

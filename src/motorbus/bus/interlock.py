@@ -1,0 +1,21 @@
+"""What a bus asks before it sends a motion request."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from motorbus.core.operation import Exchange, Runnable
+
+
+class Interlock(Protocol):
+    """What judges motion requests before they leave, as the safety gate does."""
+
+    def check(self, request: Exchange[Any], now: float, /) -> None:
+        """Raise MotorbusError if this request must not leave at `now` (s). Called at every attempt."""
+
+    def required_reads(self, request: Exchange[Any], /) -> Sequence[Runnable[Any]]:
+        """The reads that must be carried out before this request can be checked."""
+
+    def stopped(self, nodes: Sequence[int], /) -> None:
+        """A stop for these nodes (empty: all) is about to leave; called from any thread."""

@@ -1,0 +1,203 @@
+"""What an emergency stop needs to know: which nodes are there, their last positions, and the stops sent to each.
+
+A node is known once it has answered or was ordered to move. Its position counts while it is fresh and no order to this
+node has left since: a goal at an old position would be an order to move back.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Final
+
+from motorbus.bus.prepared import Prepared
+from motorbus.core.family import Family, Stop
+from motorbus.core.goal import Goal, Stays
+from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Rank
+
+FRESH: Final = 0.02
+"""s; a position older than this is not where a moving device is."""
+GATED: Final = (Effect.MOTION, Effect.TORQUE)
+"""Effects that the interlock judges and a stop ends."""
+ENDLESS: Final = ("velocity", "load", "current")
+"""Quantities that a device obeys until another order comes."""
+
+Reading = tuple[Exchange[Any], Answer]
+
+
+class LastPositions(Mapping[int, Reading]):
+    """By node, the last request that read a position and its reply. `stop_total` counts all stops sent."""
+
+    def __init__(self, family: Family, rate: int) -> None:
+        self.family = family
+        self.rate = rate
+        """Bit rate at which a node answered last."""
+        self.nodes: set[int] = set()
+        self.orders = 0
+        self.stop_total = 0
+        self.prepared: dict[int, Prepared] = {}
+        """By node, the prepared request whose replies are newer than `_readings`."""
+        self._readings: dict[int, tuple[Exchange[Any], Answer, int]] = {}
+        self._ordered: dict[int, int] = {}
+        self._stops: Counter[int | None] = Counter()  # None: stops for all nodes
+        self._accepted: Counter[int] = Counter()
+        self._acknowledged: dict[int, Answer] = {}  # the reply to the last order of a node
+        self._stop_replies: dict[int, set[Due]] = {}  # of a stop that takes several requests
+        self._frames: Stop | None = None
+
+    # -- positions ---------------------------------------------------------------------------------------------
+
+    def __getitem__(self, node: int) -> Reading:
+        exchange, answer, _ = self._reading(node)
+        return exchange, answer
+
+    def __iter__(self) -> Iterator[int]:
+        return iter({**self._readings, **self.prepared})
+
+    def __len__(self) -> int:
+        return len({**self._readings, **self.prepared})
+
+    def _reading(self, node: int) -> tuple[Exchange[Any], Answer, int]:
+        if (prepared := self.prepared.get(node)) is not None:
+            return prepared.exchange, prepared.answer(), prepared.orders
+        return self._readings[node]
+
+    def heard(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
+        """These nodes answered this request."""
+        self.rate = rate
+        self.add(nodes)
+        if exchange.effect in GATED:
+            self._acknowledged.update(dict.fromkeys(nodes, answer))
+        if exchange.tells_position:
+            for node in nodes:
+                self.prepared.pop(node, None)
+                self._readings[node] = exchange, answer, self.orders
+
+    def add(self, nodes: Iterable[int]) -> None:
+        """These nodes exist."""
+        if not self.nodes.issuperset(nodes):
+            self.nodes.update(nodes)
+            self._frames = None
+
+    def fresh(self, now: float) -> dict[int, Answer | None]:
+        """Every known node with its last position, None where it is older than `FRESH` or an order has left since."""
+        found: dict[int, Answer | None] = dict.fromkeys(sorted(self.nodes))
+        for node in self:
+            _, answer, orders = self._reading(node)
+            if now - answer.at < FRESH and orders >= self._ordered.get(node, 0):
+                found[node] = answer
+        return found
+
+    def forget(self) -> None:
+        """The devices may have restarted: no position or acknowledgement counts any more."""
+        self.prepared.clear()
+        self._readings.clear()
+        self._acknowledged.clear()
+        self._stop_replies.clear()
+
+    # -- orders and stops --------------------------------------------------------------------------------------
+
+    def sent(self, exchange: Exchange[Any]) -> None:
+        """A request leaves that may move something, or stops it."""
+        ordered = exchange.ordered
+        if exchange.rank is Rank.STOP:
+            if exchange.effect in GATED:
+                self._stops.update(addressed(exchange) or (None,))
+                self.stop_total += 1
+            return
+        if ordered:
+            self.add(ordered)
+        if exchange.effect in GATED:
+            self.moved(addressed(exchange) if exchange.replies else ordered)
+
+    def moved(self, nodes: Iterable[int]) -> None:
+        """These nodes (empty: all) got an order: their last position and acknowledgement no longer count."""
+        self.orders += 1
+        for node in nodes or self.nodes:
+            self._ordered[node] = self.orders
+            self._acknowledged.pop(node, None)
+            self._stop_replies.pop(node, None)
+
+    def stop_count(self, node: int) -> int:
+        """Number of stops sent to this node, those for all nodes included."""
+        return self._stops.get(node, 0) + self._stops.get(None, 0)
+
+    def stops_for(self, exchange: Exchange[Any]) -> int:
+        """Number of stops sent so far that end this request if it waits."""
+        nodes = addressed(exchange)
+        return sum(map(self.stop_count, nodes)) if nodes else self.stop_total
+
+    def frames(self, now: float) -> Stop:
+        """Requests that stop all known nodes; without positions where the family fails to use them."""
+        if self._frames is None:
+            self._frames = self.family.stop(dict.fromkeys(sorted(self.nodes)))
+        try:
+            return self.family.stop(self.fresh(now))
+        except Exception:  # the stop must go out
+            return self._frames
+
+    def accept(self, exchange: Exchange[Any], answer: Answer) -> None:
+        """This request was answered and not refused: nodes that it stops have accepted a stop."""
+        if exchange.effect not in GATED or exchange.replies is ANY:
+            return
+        heard = [due for due in exchange.replies if self._acknowledged.get(due.node) is answer]
+        if exchange.rank is Rank.STOP:
+            for due in heard:
+                replies = self._stop_replies.setdefault(due.node, set())
+                replies.add(due)
+                if len(replies) >= self._stop_reply_count(due.node):
+                    self.accepted(due.node)
+        elif exchange.later is None:
+            resting = {goal.node for goal in exchange.goals if rests(goal)}
+            for due in heard:
+                if due.node in resting:
+                    self.accepted(due.node)
+
+    def accepted(self, node: int) -> None:
+        """This node acknowledged a stop."""
+        self._stop_replies.pop(node, None)
+        self._accepted[node] += 1
+
+    def accepted_count(self, node: int) -> int:
+        """Number of stops that this node has acknowledged."""
+        return self._accepted[node]
+
+    def _stop_reply_count(self, node: int) -> int:
+        """Number of different replies that this node gives to the requests of a stop."""
+        requests = self.family.stop(dict.fromkeys(sorted(self.nodes))).exchanges
+        dues = {
+            due
+            for request in requests
+            if request.effect in GATED and request.replies is not ANY
+            for due in request.replies
+            if due.node == node
+        }
+        return max(1, len(dues))
+
+
+def rests(goal: Goal) -> bool:
+    """A device that obeys this goal moves no more."""
+    return goal.stays is Stays.STILL or (goal.quantity in ENDLESS and not goal.value)
+
+
+def moves(exchange: Exchange[Any]) -> bool:
+    """The request moves something or switches torque on."""
+    if exchange.effect not in GATED or exchange.rank is Rank.STOP:
+        return False
+    return not exchange.goals or not all(map(rests, exchange.goals))
+
+
+def addressed(exchange: Exchange[Any]) -> set[int]:
+    """Nodes that answer this request or are ordered something by it; empty for all nodes."""
+    nodes = {goal.node for goal in exchange.goals}
+    if exchange.replies is not ANY:
+        nodes.update(due.node for due in exchange.replies)
+    return nodes
+
+
+def is_stopped_by(stop: Exchange[Any], exchange: Exchange[Any]) -> bool:
+    """This stop is for a node that the request would move or give torque."""
+    if stop.effect not in GATED or exchange.effect not in GATED or exchange.rank is Rank.STOP:
+        return False
+    stopped, ordered = addressed(stop), addressed(exchange)
+    return not stopped or not ordered or bool(stopped & ordered)

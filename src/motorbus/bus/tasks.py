@@ -1,0 +1,336 @@
+"""Running procedures: a tree of generators, and what each of them waits for. No I/O and no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import Any, Final, Generic, TypeVar
+
+from motorbus.bus import failures
+from motorbus.bus.engine import Engine
+from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob
+from motorbus.bus.positions import GATED
+from motorbus.core.operation import (
+    Alone,
+    Exchange,
+    Journal,
+    Listen,
+    Notice,
+    Operation,
+    Pause,
+    Report,
+    Runnable,
+    Step,
+    Together,
+    outcome,
+)
+from motorbus.errors import RequestError
+
+T = TypeVar("T")
+Notify = Callable[[object], None]
+
+CLEANUP_TIMEOUT: Final = 2.0
+"""s for the steps that a cancelled procedure still carries out."""
+SECOND_TIMEOUT: Final = 0.25
+"""s from a second cancellation on."""
+LONG_SLEEP: Final = 0.5
+"""s; a sleep of a clean-up from here on waits for a device to come to rest, and extends the timeout."""
+LONGEST_EXTENSION: Final = 30.0
+"""s by which such sleeps extend it."""
+READS: Final = 2
+"""Rounds of the reads that the interlock requires; the second where the first was doubtful."""
+
+
+class Timer(Job):
+    """Waits for a moment, or for a notification."""
+
+    def __init__(self, settled: Callable[[], None] | None, until: float, losses: int) -> None:
+        super().__init__(None, settled, losses)
+        self.until = until
+        self.listener: Callable[[Notice], None] | None = None
+
+
+class Task:
+    """One generator, and the one thing that it waits for: a job, or its children."""
+
+    def __init__(self, procedure: Runnable[Any], parent: Task | None = None) -> None:
+        self.generator: Operation[Any] = iter(procedure) if isinstance(procedure, Exchange) else procedure
+        self.owner: object = None if parent is None else parent.owner
+        self.job: Job | None = None
+        self.children: list[Task] = []
+        self.joins_one = False
+        self.claims = False
+        self.checked = False
+        self.started = self.finished = False
+        # A clean-up that starts tasks of its own is not cancelled again.
+        self.cancelled: bool = parent is not None and parent.cancelled
+        self.value: Any = None
+        self.error: BaseException | None = None
+
+
+class TaskTree(Generic[T]):
+    """Runs one procedure on the engine of one bus. `report` gets its events.
+
+    `settled` is called when something it waits for has ended, so that `advance` has something to do.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        procedure: Runnable[T],
+        *,
+        now: Callable[[], float],
+        report: Notify | None = None,
+        settled: Callable[[], None] | None = None,
+    ) -> None:
+        self.engine = engine
+        self.now = now
+        self.report = report
+        self.settled = settled
+        self.losses = engine.losses
+        self.cancellation: BaseException | None = None
+        self.deadline = inf
+        self.extension = 0.0
+        self.timers: list[Timer] = []
+        self.root = Task(procedure)
+
+    # -- forward -----------------------------------------------------------------------------------------------
+
+    def advance(self) -> bool:
+        """Step every task that can go on; True when the procedure has ended."""
+        now = self.now()
+        for timer in tuple(self.timers):
+            if timer.losses != self.engine.losses:
+                self._end(timer, error=self.engine.loss)
+            elif timer.until <= now:
+                self._end(timer, None if timer.listener is not None else now)
+        if now >= self.deadline:
+            for task in self._waiting(self.root):
+                if task.job is not None:
+                    self.engine.cancel(task.job)
+        while self._step_tree(self.root):
+            pass
+        return self.root.finished
+
+    def next_moment(self) -> float:
+        """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
+        if self.root.finished:
+            return inf
+        return min([self.deadline, *(timer.until for timer in self.timers)])
+
+    def result(self) -> T:
+        """What the procedure returned; raises its error, or the cancellation."""
+        if (error := self.error()) is not None:
+            raise error
+        value: T = self.root.value
+        return value
+
+    def error(self) -> BaseException | None:
+        """What `result` raises. Errors of the clean-up are notes of the cancellation."""
+        if self.cancellation is None:
+            return self.root.error
+        _add_note(self.cancellation, self.root.error)
+        return self.cancellation
+
+    def _end(self, timer: Timer, value: Any = None, error: BaseException | None = None) -> None:
+        self.timers.remove(timer)
+        if timer.listener is not None:
+            self.engine.listeners.remove(timer.listener)
+        timer.settle(value, error)
+
+    def _step_tree(self, task: Task) -> bool:
+        """Step this task or those below; True when something has moved."""
+        if task.finished:
+            return False
+        if not task.started:
+            task.started = True
+            self._resume(task)
+        elif task.job is not None:
+            if not task.job.done:
+                return False
+            job, task.job = task.job, None
+            self._resume(task, job.value, job.error)
+        elif task.children and all(child.finished for child in task.children):
+            self._join(task)
+        else:
+            moved = [self._step_tree(child) for child in task.children]
+            return any(moved)
+        return True
+
+    def _resume(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
+        try:
+            step = task.generator.send(value) if error is None else task.generator.throw(error)
+        except StopIteration as end:
+            self._finish(task, end.value)
+        except BaseException as failure:
+            self._finish(task, error=failure)
+        else:
+            self._begin(task, step)
+
+    def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
+        task.value, task.error, task.finished = value, error, True
+        if task.claims:
+            self.engine.release(task.owner)
+
+    def _join(self, task: Task) -> None:
+        """All children have ended: their values, or the first error, go to the parent; a cancellation goes first."""
+        children, task.children = task.children, []
+        if self.cancellation is not None and not task.cancelled:
+            for child in children:
+                _add_note(self.cancellation, child.error)
+            task.cancelled = True
+            self._resume(task, error=self.cancellation)
+            return
+        errors = [child.error for child in children if child.error is not None]
+        errors.sort(key=lambda error: isinstance(error, Exception))  # an interrupt is raised first
+        if errors:
+            for other in errors[1:]:
+                if str(other) != str(errors[0]):
+                    errors[0].add_note(f"also: {str(other) or type(other).__name__}")
+            self._resume(task, error=errors[0])
+        else:
+            values = [child.value for child in children]
+            self._resume(task, values[0] if task.joins_one else values)
+
+    # -- steps -------------------------------------------------------------------------------------------------
+
+    def _begin(self, task: Task, step: Step) -> None:
+        if isinstance(step, Exchange):
+            self._begin_request(task, step)
+        elif isinstance(step, Together):
+            task.joins_one = False
+            task.children = [Task(procedure, task) for procedure in step.operations]
+            if not task.children:
+                task.job = Job(None, None)
+                task.job.settle([])
+        elif isinstance(step, Alone):
+            child = Task(step.operation, task)
+            child.claims = child.owner is None  # what is nested belongs to the outermost
+            child.owner = child.owner or child
+            task.children, task.joins_one = [child], True
+            child.started = True
+            child.job = ExclusiveJob(child.owner, self.settled)
+            self.engine.submit(child.job, self.now())
+        elif isinstance(step, Report):
+            self._report(task, step.event)
+        elif isinstance(step, Listen):
+            self._listen(task, step)
+        elif isinstance(step, Pause):
+            task.job = timer = Timer(self.settled, self.now() + step.seconds, self.engine.losses)
+            self.timers.append(timer)
+            if LONG_SLEEP <= step.seconds <= self.extension:
+                self.extension -= step.seconds
+                self.deadline += step.seconds
+        else:
+            task.job = RateJob(step, task.owner, self.settled)
+            self.engine.submit(task.job, self.now())
+
+    def _begin_request(self, task: Task, request: Exchange[Any]) -> None:
+        interlock = self.engine.interlock
+        reads: Sequence[Runnable[Any]] = ()
+        if interlock is not None and request.effect in GATED and not task.checked:
+            reads = interlock.required_reads(request)
+        if reads and interlock is not None:
+            child = Task(_read_first(interlock.required_reads, reads, request), task)
+            child.checked = True
+            task.children, task.joins_one = [child], True
+            return
+        task.job = RequestJob(request, task.owner, self.settled, self.losses)
+        if self.now() >= self.deadline:
+            task.job.settle(error=failures.abandoned())
+        else:
+            self.engine.submit(task.job, self.now())
+
+    def _report(self, task: Task, event: object) -> None:
+        """The report has been handed over before the next step; what it raises is raised in the task."""
+        task.job = Job(None, None)
+        if self.report is None and isinstance(event, Journal):
+            task.job.settle(error=_no_journal(event))
+            return
+        try:
+            if self.report is not None:
+                self.report(event)
+        except Exception as error:
+            task.job.settle(error=error)
+        task.job.settle()
+
+    def _listen(self, task: Task, step: Listen) -> None:
+        task.job = timer = Timer(self.settled, self.now() + step.until, self.engine.losses)
+
+        def listen(notice: Notice) -> None:
+            try:
+                if step.match(notice):
+                    self._end(timer, notice)
+            except Exception as error:
+                self._end(timer, error=error)
+
+        timer.listener = listen
+        self.engine.listeners.append(listen)
+        self.timers.append(timer)
+
+    # -- cancelled ---------------------------------------------------------------------------------------------
+
+    def cancel(self, error: BaseException) -> None:
+        """Throw this into every task that waits; their clean-up gets `CLEANUP_TIMEOUT`, less when called again."""
+        if self.cancellation is None:
+            self.cancellation = error
+            self.deadline = self.now() + CLEANUP_TIMEOUT
+            self.extension = LONGEST_EXTENSION
+            self._cancel(self.root)
+        else:
+            self.extension = 0.0
+            self.deadline = min(self.deadline, self.now() + SECOND_TIMEOUT)
+
+    def _cancel(self, task: Task) -> None:
+        if task.finished or task.cancelled:
+            return
+        if not task.started:
+            task.started = True
+            task.generator.close()
+            self._finish(task, error=self.cancellation)
+        elif task.children and not all(child.finished for child in task.children):
+            for child in task.children:
+                self._cancel(child)
+        elif task.children:
+            self._join(task)
+        else:
+            task.cancelled = True
+            if task.job is not None:
+                job, task.job = task.job, None
+                self.engine.cancel(job)
+                if isinstance(job, Timer) and job in self.timers:
+                    self._end(job)
+            self._resume(task, error=self.cancellation)
+
+    def _waiting(self, task: Task) -> list[Task]:
+        if task.finished:
+            return []
+        return [task, *(leaf for child in task.children for leaf in self._waiting(child))]
+
+
+def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, request: Exchange[T]) -> Operation[T]:
+    """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
+    for _ in range(READS):
+        for read in reads:
+            yield from outcome(read)
+        reads = required(request)
+    return (yield from request)
+
+
+def _add_note(error: BaseException, other: BaseException | None) -> None:
+    if other is None or other is error:
+        return
+    lines = [getattr(other, "summary", "") or str(other) or type(other).__name__]
+    lines += getattr(other, "__notes__", ())
+    known = getattr(error, "__notes__", ())
+    for line in lines:
+        if line not in known:
+            error.add_note(line)
+
+
+def _no_journal(event: Journal) -> RequestError:
+    return RequestError(
+        f"this bus keeps no journal, so it refuses {event.change}()",
+        cause="a guarded change is recorded before it begins, so that a crash can be repaired",
+        advice="open the bus with motorbus.open(), or give it a `report`; nothing was sent",
+    )
