@@ -20,11 +20,11 @@ from motorbus.core.operation import Data
 from motorbus.errors import Interrupted, LinkError, MotorbusError, NoReply
 from motorbus.families.feetech import FAMILY
 from motorbus.link.base import Link
-from motorbus.link.pty import PtyMaster
 from motorbus.link.refusal import full
 from motorbus.link.serial import SerialLink
 from motorbus.link.tcp import TcpLink
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.bus.responder import Responder, position
 from tests.bus.script import admit_all
 from tests.faults.scenes import IDS, Scene, off

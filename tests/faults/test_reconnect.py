@@ -21,8 +21,8 @@ from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Operation, Pause
 from motorbus.errors import LinkLost, NoReply
 from motorbus.link.lock import socket_path
-from motorbus.link.pty import PtyMaster
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.conftest import Figures
 from tests.support.mounts import served
 

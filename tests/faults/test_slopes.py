@@ -14,8 +14,8 @@ import pytest
 import motorbus
 from motorbus.errors import LinkLost
 from motorbus.families.feetech import FAMILY
-from motorbus.link.pty import PtyMaster
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.conftest import Figures, Rounds
 from tests.faults.life import FAMILIES, Footprint, Life, footprint
 from tests.support.mounts import served

@@ -14,7 +14,7 @@ import motorbus
 from motorbus import feetech
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import CONTROL, TABLES
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 from tests.interop.feetech import sdk
 from tests.interop.feetech.peer import NEW_SDK, OLD_SDK, RUSTYPOT, Library, Peer
 from tests.interop.feetech.sdk import ALARMS, BOTH, CORRUPT, MODE, POSITION, SUCCESS, TIMEOUT, TORQUE, Sdk

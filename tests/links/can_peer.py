@@ -15,9 +15,9 @@ from typing import Protocol
 from motorbus.core.operation import REMOTE_FLAG, CanFrame, Data
 from motorbus.link.base import Adapter
 from motorbus.link.can import CanLink
-from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
+from motorbus.simulation.pty import PtyMaster
 
 PING = CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00"))
 PONG = PING._replace(id=0x626)

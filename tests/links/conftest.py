@@ -11,7 +11,7 @@ import can
 import pytest
 
 from motorbus.link import can_slcan
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ import pytest
 import serial  # type: ignore[import-untyped]
 
 from motorbus.link.can_port import CHUNK, Descriptor, Port, SerialObject, SocketObject
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.link.foreign import who_holds
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process
 
 HOLD = """
@@ -19,7 +19,7 @@ sys.stdin.read()
 """
 SERVE = """
 import os, sys
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 terminal = PtyMaster()
 terminal.symlink(sys.argv[1])
 print("ready", flush=True)

@@ -16,10 +16,10 @@ import pytest
 from motorbus.errors import LinkLost, PortBusy
 from motorbus.link import reconnect
 from motorbus.link.lock import PortLock
-from motorbus.link.pty import PtyMaster
 from motorbus.link.reconnect import FIRST, LONGEST, Reconnecting, knock, reconnecting
 from motorbus.link.serial import AGREEING
 from motorbus.link.url import open_link
+from motorbus.simulation.pty import PtyMaster
 from tests.links.rfc2217 import Server
 from tests.links.usb import usb_port
 

@@ -20,9 +20,9 @@ from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, Request
 from motorbus.link import serial
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
-from motorbus.link.pty import PtyMaster
 from motorbus.link.serial import SerialLink, is_sharp
 from motorbus.link.waiting import wait_readable
+from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process, run
 from tests.links.usb import usb_port
 

@@ -9,8 +9,8 @@ import pytest
 import serialx
 
 from motorbus.link import speed
-from motorbus.link.pty import PtyMaster
 from motorbus.link.speed import line_speed
+from motorbus.simulation.pty import PtyMaster
 
 FEETECH_RATES = (
     1_000_000,

@@ -10,10 +10,10 @@ import pytest
 from motorbus.errors import PortNotFound, RequestError
 from motorbus.link.adapters import TERMINAL_LATENCY
 from motorbus.link.can import CanLink
-from motorbus.link.pty import PtyMaster
 from motorbus.link.serial import SerialLink
 from motorbus.link.tcp import TcpLink
 from motorbus.link.url import open_link
+from motorbus.simulation.pty import PtyMaster
 
 
 def test_a_device_is_opened(master: PtyMaster) -> None:

@@ -16,10 +16,10 @@ from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import FeetechBus, model, simulate
 from motorbus.link.base import Side
 from motorbus.link.memory import NoisyLine
-from motorbus.link.pty import PtyMaster
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import HASTE, Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.support.mounts import asked, received, served
 
 PING_1 = "FF FF 01 02 01 FB"

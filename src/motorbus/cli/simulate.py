@@ -21,7 +21,6 @@ from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.link.lock import served_by_simulator
-from motorbus.link.pty import PtyMaster
 from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
@@ -30,6 +29,7 @@ from motorbus.simulation.faulted import SCHEMA, Faulted
 from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
+from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.remarks import Remarks
 from motorbus.simulation.served import check_harmless, join
 

@@ -23,7 +23,7 @@ _UNREAD: Final = 4096
 
 
 class Endpoint(Protocol):
-    """A port that a client opens: `link.pty.PtyMaster`, `listener.TcpListener` or `TcpClient`. Nothing of it blocks."""
+    """A port that a client opens: `pty.PtyMaster`, `listener.TcpListener` or `TcpClient`. Nothing of it blocks."""
 
     def fileno(self) -> int:
         """Turns readable when there is something to `read`."""

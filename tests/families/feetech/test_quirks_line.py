@@ -20,9 +20,9 @@ from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.table import BAUD_CODES
 from motorbus.link import adapters
 from motorbus.link.base import PerfectLine
-from motorbus.link.pty import PtyMaster
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.conformance.test_guarded import Interrupting
 from tests.families.feetech.quirk_bus import Busy, Lossy, bench, instruction
 from tests.support.mounts import served

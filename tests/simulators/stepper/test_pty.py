@@ -16,9 +16,9 @@ from typing import TextIO
 import pytest
 
 from motorbus.families.stepper.simulator import simulate
-from motorbus.link.pty import PtyMaster
 from motorbus.simulation.control import ControlSocket
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.pty import PtyMaster
 from tests.support.hosts.stepper import READ, SAVE, SELECT, frame, step
 from tests.support.mounts import asked, served
 from tests.support.vectors.stepper import DUMP_A, FOLDER

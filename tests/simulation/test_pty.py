@@ -5,16 +5,25 @@ from __future__ import annotations
 import os
 import termios
 import tty
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.pty import PtyMaster
 from motorbus.link.waiting import wait_readable
+from motorbus.simulation.pty import PtyMaster
 from tests.links.other import run
 
 ALL_BYTES = bytes(range(256))
+
+
+@pytest.fixture
+def master() -> Iterator[PtyMaster]:
+    """A real pseudo-terminal."""
+    terminal = PtyMaster()
+    yield terminal
+    terminal.close()
 
 
 def client(name: str) -> int:
@@ -128,7 +137,7 @@ def test_where_there_are_none_it_says_so() -> None:
 import sys
 sys.modules.update(dict.fromkeys(["termios", "tty", "pty", "fcntl"]))
 from motorbus.errors import LinkError
-from motorbus.link.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster
 try:
     PtyMaster()
 except LinkError as error:
