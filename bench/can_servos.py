@@ -18,10 +18,10 @@ from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator.switches import Switches
 from motorbus.families.kst.table import PROFILES
 from motorbus.families.kst.wire import decode_request
-from motorbus.link.slcan import SlcanAdapter
 from motorbus.simulation.clients import CanClient
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.slcan import SlcanAdapter
 
 
 class Turning(KstBus):

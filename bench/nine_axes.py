@@ -26,13 +26,13 @@ from bench.places import ROOT, surroundings
 from bench.truth import Truth, Went, listened
 from motorbus import families
 from motorbus.cli.nine import PARTS, machine
-from motorbus.link.slcan import SlcanAdapter
 from motorbus.motion.moving.moved import Moved
 from motorbus.session import parse_ids
 from motorbus.session.robot import Robot
 from motorbus.simulation.clients import CanClient
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.slcan import SlcanAdapter
 
 START, SHARE = 0.005, 0.02
 """What is asked of it: s between the first start and the last, and of the time of a move between the ends."""

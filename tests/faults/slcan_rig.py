@@ -16,7 +16,7 @@ from motorbus.link.adapters import DEVICE_LATENCY
 from motorbus.link.can_slcan import LINE_BITS, USUAL_BAUD
 from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.memory import MemoryLink
-from motorbus.link.slcan import SlcanAdapter
+from motorbus.simulation.slcan import SlcanAdapter
 from tests.support.catalogue.kst import KstRig
 from tests.support.single_faults import Overheard
 

@@ -13,10 +13,10 @@ from motorbus import families
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data, Operation, Pause, Together, outcome
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.link.can_wire import BUS_OFF
-from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
+from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.faults.scenes import Scene
 from tests.faults.test_reconnect import again, free_port
 from tests.support.mounts import served

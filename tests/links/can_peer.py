@@ -13,11 +13,11 @@ from threading import Event, Thread
 from typing import Protocol
 
 from motorbus.core.operation import REMOTE_FLAG, CanFrame, Data
-from motorbus.link.base import Adapter
 from motorbus.link.can import CanLink
-from motorbus.link.slcan import SlcanAdapter
-from motorbus.link.socketcand import SocketcandAdapter
+from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.socketcand import SocketcandAdapter
 
 PING = CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00"))
 PONG = PING._replace(id=0x626)

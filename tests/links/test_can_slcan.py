@@ -13,8 +13,8 @@ from motorbus.link import can_slcan
 from motorbus.link.adapters import TERMINAL_LATENCY
 from motorbus.link.can_config import configured
 from motorbus.link.can_slcan import SlcanWire, command_of, timing
-from motorbus.link.slcan import SlcanAdapter
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
+from motorbus.simulation.slcan import SlcanAdapter
 from tests.links.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
 
 pytestmark = pytest.mark.usefixtures("patience")

@@ -17,8 +17,8 @@ from motorbus.link.can_text import (
     slcan_line,
     socketcand_element,
 )
-from motorbus.link.slcan import SlcanAdapter
-from motorbus.link.socketcand import SocketcandAdapter
+from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.links.can_peer import LONG_PING, PING, remote
 
 SOME = b"t62584002600000000000\r"

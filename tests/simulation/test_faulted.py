@@ -16,7 +16,6 @@ import pytest
 from motorbus import families
 from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
-from motorbus.link.slcan import SlcanAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, NEWS, TOLD, Faulted, read_order
 from motorbus.simulation.faults import World
@@ -24,6 +23,7 @@ from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.served import LinkClient
+from motorbus.simulation.slcan import SlcanAdapter
 from tests.simulation.links import QueueLink
 from tests.support.mounts import PATIENCE, asked, received, served
 

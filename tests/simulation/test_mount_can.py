@@ -16,12 +16,12 @@ from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.link.memory import NoisyLine
-from motorbus.link.slcan import SlcanAdapter
-from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.simulation.parrots import Parrots
 from tests.support.mounts import PATIENCE, served
 

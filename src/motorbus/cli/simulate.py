@@ -21,8 +21,6 @@ from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.link.lock import served_by_simulator
-from motorbus.link.slcan import SlcanAdapter
-from motorbus.link.socketcand import SocketcandAdapter
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.control import ControlSocket
 from motorbus.simulation.faulted import SCHEMA, Faulted
@@ -32,6 +30,8 @@ from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.remarks import Remarks
 from motorbus.simulation.served import check_harmless, join
+from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.socketcand import SocketcandAdapter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.operation import Data
 
 
 class Link(Protocol):
@@ -80,35 +80,6 @@ class Dozing(Link, Protocol):
 
     def doze(self, until: float) -> None:
         """Let time pass until this moment, whatever arrives."""
-
-
-class Adapter(Protocol):
-    """The adapter's side of a protocol that carries CAN frames over bytes (slcan, socketcand), for simulated buses.
-
-    It does no I/O and has no clock. Nothing that a host sends makes it raise, or keep more than a few KiB.
-
-    `open`         the host has opened the channel: frames pass
-    `listen_only`  the host gets frames and may send none
-    `bitrate`      bit/s that the host has set; None when it did not, or cannot with this protocol
-    `finished`     it hangs up as soon as its answer has been sent
-    """
-
-    open: bool
-    listen_only: bool
-    bitrate: int | None
-    finished: bool
-
-    def greet(self) -> bytes:
-        """A host has come: what it is told unasked."""
-
-    def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
-        """Bytes of the host, cut anywhere, at this moment (s): the frames that it sends with them."""
-
-    def take(self) -> bytes:
-        """What is to be answered to the bytes that were fed."""
-
-    def deliver(self, frame: CanFrame, at: float) -> bytes:
-        """A frame of the bus, seen at this moment (s), as the host gets it; b"" when it does not."""
 
 
 class Side(Enum):

@@ -13,7 +13,8 @@ from typing import Any, Final, Protocol
 
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
-from motorbus.link.base import Adapter, Line, PerfectLine
+from motorbus.link.base import Line, PerfectLine
+from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.adapter_text import Text
 from motorbus.simulation.listener import TcpClient, TcpPort
 

@@ -14,7 +14,8 @@ from typing import Final, Protocol, TypeAlias
 
 from motorbus.core.family import Simulator
 from motorbus.errors import RequestError
-from motorbus.link.base import Adapter, Line
+from motorbus.link.base import Line
+from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.clients import CanClient, Door, Endpoint, Participant, SerialClient
 from motorbus.simulation.course import HASTE, Course
 from motorbus.simulation.faults.struck import is_calm, on_a_wire

@@ -43,7 +43,7 @@ class Subscription(NamedTuple):
 
 
 class SocketcandAdapter:
-    """One connection, as `link.base.Adapter`.
+    """One connection, as `adapter.Adapter`.
 
     `epoch` (s) is added to the moments of frames, so that hosts get the time of day. Cyclic sending (add, update,
     delete), muxfilter and isotpmode are answered by an error.

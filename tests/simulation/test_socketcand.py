@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.link.base import Adapter
-from motorbus.link.socketcand import LONGEST_ELEMENT, SETTLING, UNKNOWN, SocketcandAdapter
+from motorbus.simulation.adapter import Adapter
+from motorbus.simulation.socketcand import LONGEST_ELEMENT, SETTLING, UNKNOWN, SocketcandAdapter
 
 FRAME = CanFrame(0x625, bytes.fromhex("2203600084030000"))
 OK = b"< ok >"

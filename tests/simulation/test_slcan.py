@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.link.base import Adapter
-from motorbus.link.slcan import FIFO, LONGEST_LINE, RATES, Filter, SlcanAdapter, rate_of_timing
+from motorbus.simulation.adapter import Adapter
+from motorbus.simulation.slcan import FIFO, LONGEST_LINE, RATES, Filter, SlcanAdapter, rate_of_timing
 
 FRAME = CanFrame(0x625, bytes.fromhex("2203600084030000"))
 LINE = b"t62582203600084030000\r"

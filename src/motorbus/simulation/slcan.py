@@ -38,7 +38,7 @@ _ALL: Final = 0xFFFF_FFFF
 
 
 class SlcanAdapter:
-    """One adapter, as `link.base.Adapter`: closed, without a bit rate, pushing frames by itself (auto-poll).
+    """One adapter, as `adapter.Adapter`: closed, without a bit rate, pushing frames by itself (auto-poll).
 
     `strict` refuses what a CAN232 refuses but most adapters forgive: to open what is open, to close what is closed,
     to open before a bit rate was set, and settings in the wrong state. python-can opens twice, so the usual one is
