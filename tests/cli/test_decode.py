@@ -10,7 +10,7 @@ import can
 import pytest
 
 from motorbus.cli.exits import Exit
-from motorbus.link.can_log import parse_word
+from motorbus.recorder.can_log import parse_word
 from tests.cli.conftest import Run
 
 READ = "FF FF 01 04 02 38 02 BE"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Output
     from motorbus.core.family import Family
     from motorbus.core.operation import CanFrame
-    from motorbus.link.can_log import Logged
+    from motorbus.recorder.can_log import Logged
 
 _PIECE: Final = 1 << 16
 """Bytes that are fed at a time where there is no numpy."""

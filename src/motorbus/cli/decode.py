@@ -19,14 +19,14 @@ from motorbus.cli.target import said
 from motorbus.core.family import Explanation
 from motorbus.core.operation import REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
-from motorbus.link import can_log
+from motorbus.recorder import can_log
 from motorbus.recorder.files import from_hex, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from motorbus.core.family import Family
-    from motorbus.link.can_log import Logged
+    from motorbus.recorder.can_log import Logged
 
 MOST = 1 << 25
 """Characters of hexadecimal on stdin: 16 MiB of bytes without spaces, which are explained as a whole."""

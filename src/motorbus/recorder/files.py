@@ -1,7 +1,7 @@
 """Bytes of a serial line that somebody has kept in a file: as they came, or written in hexadecimal.
 
 What is written by a terminal program, a logic analyser or `xxd -p` is one of the two. Logs of CAN frames are read by
-`link.can_log`.
+`can_log`.
 """
 
 from __future__ import annotations

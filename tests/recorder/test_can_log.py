@@ -11,7 +11,7 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.can_log import (
+from motorbus.recorder.can_log import (
     LONGEST,
     is_log,
     lines_of,
