@@ -17,7 +17,7 @@ from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.wire import encode_upload, encode_upload_reply
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from motorbus.simulation.can_wire import CanWire
+from tests.support.can_wire import CanWire
 
 LATENCY: Final = 0.001
 """s; there and back, a pure delay."""

@@ -34,7 +34,7 @@ from motorbus.core.operation import Data, Exchange
 from motorbus.errors import MotorbusError
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import FaultyLine, World
-from motorbus.simulation.history import History
+from tests.support.history import History
 from tests.support.oracle import FalseWord, Oracle, Outcome, Window
 from tests.support.world import RETRIES, is_idle, make_bus, receiver_of
 

@@ -11,8 +11,8 @@ import pytest
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.link.memory import NoisyLine
 from tests.conftest import Rounds
+from tests.support.noisy_line import NoisyLine
 from tests.support.rigs.feetech import KINDS, Rig, read_word, sync_read
 
 

@@ -23,7 +23,7 @@ from motorbus.errors import (
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
-from motorbus.simulation.history import History
+from tests.support.history import History
 from tests.support.oracle import SAYS, FalseWord, Oracle, Outcome, outcome
 
 

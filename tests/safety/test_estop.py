@@ -21,7 +21,7 @@ from motorbus.families.feetech import wire as feetech
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.kst.driver.feedback import position_exchange
 from motorbus.families.stepper import wire as stepper
-from motorbus.link.memory import NoisyLine
+from tests.support.noisy_line import NoisyLine
 from tests.support.world import Bus, Pending, is_queued, queue, turn
 
 QUEUED = 3_000

@@ -17,7 +17,7 @@ from motorbus.errors import (
     PortNotFound,
     RequestError,
 )
-from motorbus.link.memory import NoisyLine
+from tests.support.noisy_line import NoisyLine
 
 
 @pytest.mark.parametrize(

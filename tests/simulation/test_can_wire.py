@@ -10,7 +10,7 @@ from motorbus.core.can_bits import INTERFRAME, bits
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.can_wire import CanWire
+from tests.support.can_wire import CanWire
 
 RATE = 500_000
 BIT = 1 / RATE

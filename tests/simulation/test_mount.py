@@ -15,12 +15,12 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import FeetechBus, model, simulate
 from motorbus.link.base import Side
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import HASTE, Mount
 from motorbus.simulation.pty import PtyMaster
 from tests.support.mounts import asked, received, served
+from tests.support.noisy_line import NoisyLine
 
 PING_1 = "FF FF 01 02 01 FB"
 PONG_1 = "FF FF 01 02 00 FC"

@@ -15,7 +15,6 @@ import pytest
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.link.base import Line
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
@@ -24,6 +23,7 @@ from motorbus.simulation.slcan import SlcanAdapter
 from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.simulation.parrots import Parrots
 from tests.support.mounts import PATIENCE, served
+from tests.support.noisy_line import NoisyLine
 
 ASK, ANSWER = b"t60120102\r", b"t68120102\r"
 

@@ -7,10 +7,11 @@ import pytest
 from motorbus import families
 from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.memory import MemoryLink, NoisyLine
+from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.named import Simulation, find
 from tests.simulation.links import QueueLink
+from tests.support.noisy_line import NoisyLine
 
 PING_1 = bytes.fromhex("FF FF 01 02 01 FB")
 PONG_1 = bytes.fromhex("FF FF 01 02 00 FC")

@@ -9,10 +9,10 @@ from motorbus import families
 from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.link.base import PerfectLine
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.faults import FaultyLine, parse
 from motorbus.simulation.named import KNOCK, Simulation
 from tests.simulation.links import QueueLink
+from tests.support.noisy_line import NoisyLine
 
 
 def simulation(faults: str = "", **options: object) -> Simulation:

@@ -12,11 +12,11 @@ from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Line
 from motorbus.link.can import CanLink
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.served import LinkClient, Served, check_harmless, join
 from tests.simulation.links import QueueLink
 from tests.simulation.parrots import ANSWER, Parrots
+from tests.support.noisy_line import NoisyLine
 
 FRAME = CanFrame(0x601, b"\1\2")
 REPLY = CanFrame(0x601 ^ ANSWER, b"\1\2")

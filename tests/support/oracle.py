@@ -32,7 +32,7 @@ from motorbus.errors import (
     WireError,
 )
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.history import History, Raw
+from tests.support.history import History, Raw
 
 INSTANT: Final = 1e-6
 """s that pass before a call begins, so that what was just before it is not in its window."""

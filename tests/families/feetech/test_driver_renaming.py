@@ -14,8 +14,8 @@ from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError, 
 from motorbus.families.feetech.driver import Node, set_id
 from motorbus.families.feetech.simulator.memory import Written
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.named import Simulation
+from tests.support.noisy_line import NoisyLine
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 NEAR = range(10)

@@ -14,9 +14,9 @@ from motorbus.errors import NoReply, RequestError
 from motorbus.families.feetech.driver import Node, Suspicion, duplicates
 from motorbus.families.feetech.driver.sharing import POLLS
 from motorbus.link.base import Side
-from motorbus.link.memory import NoisyLine
 from motorbus.simulation.named import Simulation
 from tests.families.feetech.driver_script import Line, play, reads, watch
+from tests.support.noisy_line import NoisyLine
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 LATE = 254

@@ -11,10 +11,10 @@ import pytest
 from motorbus.core.operation import Data, Progress
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.link.memory import NoisyLine
 from motorbus.motion.moving.stream import SETTLE, Fate, Grid, grains, rate_for
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import machine
+from tests.support.noisy_line import NoisyLine
 
 
 def train(robot: Robot, bus: str) -> Any:

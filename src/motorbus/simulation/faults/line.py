@@ -10,12 +10,11 @@ from collections import Counter
 from collections.abc import Iterable
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
-from motorbus.link.memory import Fired
 from motorbus.simulation.faults.fault import SOMEWHERE, Fault
 from motorbus.simulation.faults.harm import INSTANT, Piece, Strike, harmed, whole
 from motorbus.simulation.faults.luck import Luck, chance
@@ -27,6 +26,15 @@ if TYPE_CHECKING:
 BROKEN: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """What an adapter tells of a frame that broke on the wire: protocol violation and bus error, as SocketCAN classes."""
 _LONGEST: Final = 8
+
+
+class Fired(NamedTuple):
+    """A fault that happened: when (s), which (the option's name), toward whom, and what was to be delivered."""
+
+    at: float
+    fault: str
+    to: Side
+    data: Data
 
 
 class _Way:
