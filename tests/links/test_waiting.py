@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator
 
 import pytest
 
 from motorbus.link import waiting
-from motorbus.link.waiting import doze, is_readable, wait_any, wait_readable
+from motorbus.link.waiting import is_readable, wait_any, wait_readable
 
 
 @pytest.fixture
@@ -73,19 +72,3 @@ def test_of_several_those_are_told_that_have_something(pipe: tuple[int, int]) ->
 def test_a_number_that_is_no_descriptor_is_refused(pipe: tuple[int, int]) -> None:
     with pytest.raises((OSError, ValueError)):
         wait_any([pipe[0], -1], 1.0)
-
-
-def test_a_doze_lasts_until_its_moment_and_one_that_is_over_takes_no_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    slept: list[float] = []
-    monkeypatch.setattr(waiting, "sleep", slept.append)
-    monkeypatch.setattr(waiting, "monotonic", lambda: 100.0)
-    doze(100.25)
-    doze(100.0)
-    doze(99.0)
-    assert slept == [0.25]
-    monkeypatch.undo()
-    begun = time.monotonic()
-    doze(begun + 0.002)
-    assert time.monotonic() >= begun + 0.002

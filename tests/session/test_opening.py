@@ -34,13 +34,6 @@ def test_the_latency_of_a_serial_port_goes_to_its_link_in_seconds(said: object, 
     assert prepare("stepper:socket://10.0.0.7:4000", {"latency": said}).options == {"latency": seconds}
 
 
-@pytest.mark.parametrize(("said", "sleeps"), [("yes", True), ("no", False), (True, True)])
-def test_whether_one_sleeps_until_an_answer_is_due_goes_to_the_link(said: object, sleeps: bool) -> None:
-    assert prepare("feetech:/dev/ttyAMA0", {"sleep": said}).options == {"sleep": sleeps}
-    with pytest.raises(RequestError, match="unknown option 'sleep'"):
-        prepare("feetech:sim", {"sleep": said})
-
-
 @pytest.mark.parametrize("bus", ["feetech:sim", "feetech:sim:arm", "stepper:sim"])
 def test_a_simulator_in_this_process_has_no_latency(bus: str) -> None:
     with pytest.raises(RequestError, match="unknown option 'latency'"):
@@ -55,7 +48,7 @@ def test_a_simulator_in_this_process_has_no_latency(bus: str) -> None:
         ("feetech:/dev/ttyACM0,latency=-1", "no adapter holds bytes back for that long"),
         ("feetech:/dev/ttyACM0,latency=2s", "no adapter holds bytes back for that long"),
         ("feetech:/dev/ttyACM0,latency=fast", "is not a number"),
-        ("feetech:/dev/ttyACM0,sleep=1", "sleep=1: neither yes nor no"),
+        ("feetech:/dev/ttyACM0,sleep=yes", "unknown option 'sleep'"),
         ("kst:sim,bitrate=-1", "not a rate in bit/s"),
         ("nobody:/dev/ttyACM0", "no family 'nobody'"),
     ],

@@ -70,18 +70,6 @@ class Renewable(Link, Protocol):
         """Let time pass while it is gone: until this moment, or until it is time to look for it again."""
 
 
-class Dozing(Link, Protocol):
-    """A link of bytes, each of which would wake whoever waits for an answer.
-
-    Where it `sleeps`, nobody is woken before the whole of an answer can be there, as far as that is known beforehand.
-    """
-
-    sleeps: bool
-
-    def doze(self, until: float) -> None:
-        """Let time pass until this moment, whatever arrives."""
-
-
 class Side(Enum):
     """Which end of a simulated wire."""
 

@@ -29,7 +29,7 @@ from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import busy, forbidden, full, lost, no_port, not_found, wrong_rate
 from motorbus.link.speed import line_speed
 from motorbus.link.tcp import CONNECT_TIME, give_up_soon, split_address
-from motorbus.link.waiting import doze, is_readable, wait_readable
+from motorbus.link.waiting import is_readable, wait_readable
 
 if TYPE_CHECKING:
     from serialx import BaseSerial, SerialPortInfo
@@ -80,8 +80,6 @@ class SerialLink:
 
     virtual = False
     simulated = False
-    sleeps = False
-    doze = staticmethod(doze)
 
     def __init__(
         self, port: str, *, rate: int, sysfs: Path = Path("/sys"), kept: PortLock | None = None
@@ -183,8 +181,6 @@ class PolledLink:
 
     virtual = False
     simulated = False
-    sleeps = False
-    doze = staticmethod(doze)
 
     def __init__(
         self, port: str, *, rate: int, kept: PortLock | None = None, patience: float = CONNECT_TIME

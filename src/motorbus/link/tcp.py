@@ -15,7 +15,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link.lock import PortLock, taken
 from motorbus.link.refusal import full, lost
-from motorbus.link.waiting import doze, wait_readable
+from motorbus.link.waiting import wait_readable
 
 CHUNK = 4096
 CONNECT_TIME = 5.0  # s; a host of a local network that has not answered by then is not there
@@ -59,8 +59,6 @@ class TcpLink:
     paced = False  # what is behind it cannot be known
     virtual = False
     simulated = False
-    sleeps = False
-    doze = staticmethod(doze)
     warnings: tuple[str, ...] = ()
 
     def __init__(

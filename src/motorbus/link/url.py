@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from motorbus.errors import RequestError
-from motorbus.link.base import Dozing, Link
+from motorbus.link.base import Link
 from motorbus.link.lock import PortLock
 
 SCHEMES = ("socket://HOST:PORT", "rfc2217://HOST:PORT")
@@ -25,10 +25,9 @@ def open_link(
     """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://…` or `can://INTERFACE/CHANNEL`.
 
     `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
-    wants: bytes or frames; `options` are for the CAN adapter, or say the `latency` (s) of a serial port and whether the
-    program may `sleep` until the whole of an answer can be there. `kept` is a lock that we have already, maybe of this
-    port; `patience` how long (s) a host of the network is waited for. Raises RequestError for what is no port,
-    PortNotFound, PortBusy (naming its owner) or LinkError.
+    wants: bytes or frames; `options` are for the CAN adapter, or say the `latency` (s) of a serial port. `kept` is a
+    lock that we have already, maybe of this port; `patience` how long (s) a host of the network is waited for.
+    Raises RequestError for what is no port, PortNotFound, PortBusy (naming its owner) or LinkError.
     """
     scheme = port.partition("://")[0].lower() if "://" in port else None
     if scheme == "can" and kind == "frames" and "\0" not in port:
@@ -40,13 +39,10 @@ def open_link(
     link = _serial(port, scheme, rate, kept, patience)
     said: Mapping[str, Any] = options or {}
     link.latency = said.get("latency", link.latency)
-    link.sleeps = said.get("sleep", False)
     return link
 
 
-def _serial(
-    port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None
-) -> Dozing:
+def _serial(port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None) -> Link:
     if scheme == "socket":
         from motorbus.link.tcp import TcpLink
 

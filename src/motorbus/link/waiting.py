@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from select import select
-from time import monotonic, sleep
 
 LIMIT = 1024  # FD_SETSIZE
 LONGEST = 86_400.0  # s; more than some systems accept is cut, and nothing has come by then
@@ -54,10 +53,3 @@ def wait_any(descriptors: Sequence[int], seconds: float) -> list[int]:
     if any(event & POLLNVAL for _, event in found):
         raise ValueError("a descriptor is closed")
     return [descriptor for descriptor, _ in found]
-
-
-def doze(until: float) -> None:
-    """Let time pass until this moment (s on the monotonic clock), whatever arrives meanwhile."""
-    pause = until - monotonic()
-    if pause > 0:
-        sleep(pause)

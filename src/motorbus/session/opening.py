@@ -21,8 +21,6 @@ ADAPTER = "can://"
 
 LATENCY = "latency"
 """The option of every serial port that says for how long its adapter holds bytes back, where the user knows better."""
-SLEEP = "sleep"
-"""The option of every serial port that lets the program sleep until the whole of an answer can be there."""
 RECONNECT = "reconnect"
 """The option of every bus that says whether a port that was lost is looked for."""
 
@@ -58,7 +56,7 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
-        more = {LATENCY, SLEEP} if _is_serial(family, spot.port) else set()
+        more = {LATENCY} if _is_serial(family, spot.port) else set()
         here = [option.name for option in family.link.settings]
         usual = [name for name in ("ids", "model", FAULTS) if name in known]
         raise _unknown(address, unknown[0], [word, *usual, *here, *sorted(more), RECONNECT, *sorted(known)])
@@ -100,12 +98,7 @@ def _is_serial(family: Family, port: str) -> bool:
 
 def _timing(merged: dict[str, object]) -> dict[str, object]:
     """What is said of the time that answers take, as the link takes it; nothing of it is left behind."""
-    found: dict[str, object] = {}
-    if LATENCY in merged:
-        found[LATENCY] = _latency(merged.pop(LATENCY))
-    if SLEEP in merged:
-        found[SLEEP] = _yes(SLEEP, merged.pop(SLEEP))
-    return found
+    return {LATENCY: _latency(merged.pop(LATENCY))} if LATENCY in merged else {}
 
 
 def _latency(said: object) -> float:

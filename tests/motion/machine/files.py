@@ -198,7 +198,7 @@ UNOPENABLE = (
     Broken("baud=1000000", "latncy=0", "bus.arm.address: 'feetech:/dev/ttyACM0,latncy=0'", "did you mean latency?"),
     Broken("baud=1000000", "baud=fast", "bus.arm.address: baud=fast: not a rate", "bit/s, as 500000"),
     Broken("baud=1000000", "latency=x", "bus.arm.address: latency=x: time 'x' is not", "change it in the address"),
-    Broken("baud=1000000", "sleep=1", "bus.arm.address: sleep=1: neither yes nor no", "yes or no"),
+    Broken("baud=1000000", "reconnect=1", "bus.arm.address: reconnect=1: neither yes nor no", "yes or no"),
     Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
     Broken("bitrate=500000", "window=0", "bus.gimbal.address: window=0: not a number", "1 to 127"),
     # values that simulated devices cannot have
