@@ -17,7 +17,7 @@ from typing import Protocol
 import pytest
 from hypothesis import settings
 
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from tests.net import NET, ROOT
 
 HERE = Path(__file__).parent
@@ -142,7 +142,7 @@ class Figures(Protocol):
 @pytest.fixture
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever answers in a process of its own may wait for a processor; costs nothing where all answer undisturbed."""
-    monkeypatch.setattr(adapters, "TERMINAL_LATENCY", 1.0)
+    monkeypatch.setattr(usb_adapters, "TERMINAL_LATENCY", 1.0)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.support.machines import machine
@@ -81,7 +81,7 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever answers in a process of its own may be kept waiting for a processor by all the other tests."""
-    monkeypatch.setattr(adapters, "TERMINAL_LATENCY", 0.02)
+    monkeypatch.setattr(usb_adapters, "TERMINAL_LATENCY", 0.02)
 
 
 @pytest.fixture

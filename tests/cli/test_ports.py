@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.link import serial
-from motorbus.link.adapters import PortInfo
+from motorbus.link.usb_adapters import PortInfo
 from tests.cli.conftest import Run
 
 ADAPTER = PortInfo(

@@ -12,10 +12,9 @@ from typing import Any
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import CanFrame, Data
 from motorbus.families.kst.simulator import KstBus
-from motorbus.link.adapters import DEVICE_LATENCY
-from motorbus.link.can_slcan import LINE_BITS, USUAL_BAUD
-from motorbus.link.can_text import SlcanReader, slcan_line
 from motorbus.link.memory import MemoryLink
+from motorbus.link.slcan import DEFAULT_BAUD, LINE_BITS, SlcanDecoder, encode
+from motorbus.link.usb_adapters import DEVICE_LATENCY
 from motorbus.simulation.slcan import SlcanAdapter
 from tests.support.catalogue.kst import KstRig
 from tests.support.single_faults import Overheard
@@ -66,7 +65,7 @@ class TextLink(MemoryLink):
     """Frames for the bus, text on the line; with a `baud` (bit/s) of the adapter's serial line, text needs its time."""
 
     def __init__(self, simulator: Adapted, *, baud: int | None = None, **options: Any) -> None:
-        self.reader: Any = SlcanReader()
+        self.reader: Any = SlcanDecoder()
         self.baud = baud
         super().__init__(simulator, pace=baud is not None, **options)
         self.paced = False  # of the frames nobody says when they were on the wire
@@ -78,7 +77,7 @@ class TextLink(MemoryLink):
 
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
-        super().write(slcan_line(data))
+        super().write(encode(data))
 
     def read(self, until: float) -> list[Data]:
         while True:
@@ -99,7 +98,7 @@ class SlowSlcanRig(SlcanRig):
     """The same where the text takes its time, at the usual rate of such adapters."""
 
     def linked(self, simulator: KstBus) -> MemoryLink:
-        return TextLink(Adapted(simulator), baud=USUAL_BAUD, rate=500_000)
+        return TextLink(Adapted(simulator), baud=DEFAULT_BAUD, rate=500_000)
 
 
 def value_changed(heard: Overheard) -> bool:

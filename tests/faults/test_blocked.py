@@ -20,7 +20,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import Interrupted, LinkError, MotorbusError, NoReply
 from motorbus.families.feetech import FAMILY
 from motorbus.link.base import Link
-from motorbus.link.refusal import full
+from motorbus.link.errors import full
 from motorbus.link.serial import SerialLink
 from motorbus.link.tcp import TcpLink
 from motorbus.simulation.mount import Mount

@@ -12,7 +12,7 @@ import motorbus
 from motorbus import families
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data, Operation, Pause, Together, outcome
 from motorbus.errors import LinkLost, MotorbusError
-from motorbus.link.can_wire import BUS_OFF
+from motorbus.link.can import BUS_OFF
 from motorbus.simulation.clients import Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount

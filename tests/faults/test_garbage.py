@@ -24,7 +24,7 @@ from motorbus.families.feetech.wire.stream import Stream
 from motorbus.families.stepper import wire as stepper
 from motorbus.families.stepper.wire import receiver as stepper_receiver
 from motorbus.families.stepper.wire.frames import DUMP
-from motorbus.link import can_text
+from motorbus.link import slcan
 from motorbus.link.base import PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.conftest import Figures, Rounds
@@ -311,7 +311,7 @@ def test_l9_garbage_without_end_hangs_nothing(line: str, kind: str, rounds: Roun
 
 BOUNDS: dict[str, tuple[str, object, str, object]] = {
     "feetech": ("beginnings of its longest frames", Stream, "_size", lambda stream, data, start: 10**9),
-    "kst by slcan": ("digits without end", can_text, "LONGEST", 10**9),
+    "kst by slcan": ("digits without end", slcan, "LONGEST", 10**9),
     "stepper": ("beginnings of dumps", stepper_receiver, "DUMP_LENGTH", 10**9),
 }
 """A kind of garbage, and what of the product bounds what is held back of it: where it is, its name, and no bound."""

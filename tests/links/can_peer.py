@@ -167,7 +167,9 @@ def socketcand_server() -> Iterator[Peer]:
 
 def open_can(peer: Peer | str, rate: int = 0, **options: object) -> CanLink:
     """As a session opens it."""
-    return CanLink(peer if isinstance(peer, str) else peer.url, rate=rate, usual=500_000, options=options)
+    return CanLink(
+        peer if isinstance(peer, str) else peer.url, rate=rate, default_rate=500_000, options=options
+    )
 
 
 def some(link: CanLink, count: int = 1, seconds: float = 30.0) -> list[Data]:

@@ -1,4 +1,4 @@
-"""Every test of links has a state folder of its own, so that locks of one never meet those of another."""
+"""Every test of links has its own state folder, and so its own locks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
-from motorbus.link import can_slcan
+from motorbus.link import slcan
 from motorbus.simulation.pty import PtyMaster
 
 
@@ -24,17 +24,17 @@ def state_home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture(autouse=True)
 def no_can_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What whoever runs the tests has configured for python-can is none of their business."""
+    """The user's own configuration of python-can does not apply."""
     monkeypatch.setattr(can.util, "CONFIG_FILES", [])
     for name in [name for name in os.environ if name.startswith("CAN_")]:
         monkeypatch.delenv(name)
 
 
 @pytest.fixture
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine under load must not pass for a mute adapter."""
-    monkeypatch.setattr(can_slcan, "LISTENING", 10.0)
-    monkeypatch.setattr(can_slcan, "PATIENCE", 10.0)
+def long_timeouts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine an adapter that replies late must not look silent."""
+    monkeypatch.setattr(slcan, "FIRST_REPLY", 10.0)
+    monkeypatch.setattr(slcan, "REPLY_TIME", 10.0)
 
 
 @pytest.fixture

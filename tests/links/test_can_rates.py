@@ -10,8 +10,8 @@ import can
 import pytest
 
 from motorbus.errors import LinkError
-from motorbus.link.can_config import CanConfig, configured
-from motorbus.link.can_rates import check_rate, kernel_link, kernel_rate, known_rates
+from motorbus.link.can_options import CanOptions, read_options
+from motorbus.link.can_rates import check_rate, kernel_rate, kernel_state, known_rates
 from tests.links.can_peer import on_terminal, open_can
 
 KST = (20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
@@ -22,8 +22,8 @@ def back_end(interface: str) -> object:
     return can.interface._get_class_for_interface(interface)
 
 
-def config(port: str, rate: int = 0, **options: object) -> CanConfig:
-    return configured(can, port, rate, options)
+def config(port: str, rate: int = 0, **options: object) -> CanOptions:
+    return read_options(can, port, rate, options)
 
 
 def ip(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str, code: int = 0) -> None:
@@ -64,7 +64,7 @@ def test_s7_means_two_things_so_neither_is_used(rate: int) -> None:
     assert (peer.heard, peer.adapter.open) == ([], False)
 
 
-@pytest.mark.usefixtures("patience")
+@pytest.mark.usefixtures("long_timeouts")
 def test_what_the_advice_says_works() -> None:
     with on_terminal() as peer:
         link = open_can(peer, **BITS)
@@ -100,7 +100,7 @@ def test_usb2can_would_round(rate: int) -> None:
 
 def test_the_kernels_rate_is_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ip(tmp_path, monkeypatch, kernel(250_000))
-    assert kernel_link("can0") == (250_000, True, False)
+    assert kernel_state("can0") == (250_000, True, False)
     assert kernel_rate(config("can://socketcan/can0"), 0, 500_000) == (250_000, ())
     assert kernel_rate(config("can://socketcan/can0"), 250_000, 500_000) == (250_000, ())
 
@@ -138,7 +138,7 @@ def test_an_interface_without_a_rate(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 @pytest.mark.parametrize("text", ["", "no json", "[]", "[{}]", "[[]]", '{"flags": []}'])
 def test_a_kernel_that_does_not_tell(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str) -> None:
     ip(tmp_path, monkeypatch, text)
-    assert kernel_link("can0") is None
+    assert kernel_state("can0") is None
     rate, warnings = kernel_rate(config("can://socketcan/can0"), 0, 500_000)
     assert (rate, warnings) == (
         500_000,
@@ -148,7 +148,7 @@ def test_a_kernel_that_does_not_tell(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 
 def test_no_such_interface_or_no_such_program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ip(tmp_path, monkeypatch, kernel(), code=1)
-    assert kernel_link("can0") is None
+    assert kernel_state("can0") is None
     (tmp_path / "empty").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
-    assert kernel_link("can0") is None
+    assert kernel_state("can0") is None

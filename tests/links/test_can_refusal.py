@@ -9,12 +9,12 @@ import can
 import pytest
 
 from motorbus.errors import LinkError, PortBusy, PortNotFound, RequestError
-from motorbus.link.can_config import CanConfig, configured
-from motorbus.link.can_refusal import device_of, refused
+from motorbus.link.can import open_error
+from motorbus.link.can_options import CanOptions, read_options
 
 
-def config(port: str) -> CanConfig:
-    return configured(can, port, 0, {})
+def config(port: str) -> CanOptions:
+    return read_options(can, port, 0, {})
 
 
 def caused(error: Exception, cause: Exception) -> Exception:
@@ -54,7 +54,7 @@ def caused(error: Exception, cause: Exception) -> Exception:
     ],
 )
 def test_what_it_is_told_as(port: str, error: Exception, kind: type[Exception], words: str) -> None:
-    told = refused(config(port), error)
+    told = open_error(config(port), error)
     assert type(told) is kind
     with pytest.raises(kind, match=words):
         raise told
@@ -71,10 +71,10 @@ def test_what_it_is_told_as(port: str, error: Exception, kind: type[Exception], 
 )
 def test_the_serial_port_of_an_adapter(code: int, kind: type[Exception]) -> None:
     error = caused(can.CanInitializationError("could not open port"), OSError(code, os.strerror(code)))
-    assert type(refused(config("can://slcan/dev/ttyACM0"), error)) is kind
+    assert type(open_error(config("can://slcan/dev/ttyACM0"), error)) is kind
 
 
 def test_the_device_of_an_adapter() -> None:
-    assert device_of(config("can://slcan/dev/ttyACM0@1000000")) == "/dev/ttyACM0"
-    assert device_of(config("can://slcan/socket://127.0.0.1:4000")) == ""
-    assert device_of(config("can://socketcan/can0")) == ""
+    assert config("can://slcan/dev/ttyACM0@1000000").device == "/dev/ttyACM0"
+    assert config("can://slcan/socket://127.0.0.1:4000").device == ""
+    assert config("can://socketcan/can0").device == ""

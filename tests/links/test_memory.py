@@ -229,7 +229,7 @@ def test_a_runaway_writer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     link = MemoryLink(Parrot())
     for _ in range(3):
         link.write(PING)
-    with pytest.raises(LinkError, match="nobody reads"):
+    with pytest.raises(LinkError, match="replies are not read"):
         link.write(PING)
 
 

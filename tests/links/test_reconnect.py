@@ -16,8 +16,8 @@ import pytest
 from motorbus.errors import LinkLost, PortBusy
 from motorbus.link import reconnect
 from motorbus.link.lock import PortLock
-from motorbus.link.reconnect import FIRST, LONGEST, Reconnecting, knock, reconnecting
-from motorbus.link.serial import AGREEING
+from motorbus.link.reconnect import FIRST_RETRY, LAST_RETRY, Reconnecting, check_reachable, reconnecting
+from motorbus.link.serial import NEGOTIATION_TIME
 from motorbus.link.url import open_link
 from motorbus.simulation.pty import PtyMaster
 from tests.links.rfc2217 import Server
@@ -61,7 +61,7 @@ def other() -> Iterator[PtyMaster]:
 
 
 def opened(port: str, **more: Any) -> Reconnecting:
-    said: dict[str, Any] = {"rate": RATE, "usual": RATE, "kind": "bytes", "options": {}}
+    said: dict[str, Any] = {"rate": RATE, "default_rate": RATE, "kind": "bytes", "options": {}}
     link = reconnecting(open_link(port, **said), **said, **more)
     assert isinstance(link, Reconnecting)
     return link
@@ -115,7 +115,7 @@ def test_l12_a_link_that_was_left_behind_leads_to_somebody_elses_terminal(
     path = tmp_path / "bus"
     path.symlink_to(master.slave_name)
     link = opened(str(path))
-    with pytest.raises(LinkLost, match="has not been made anew"):
+    with pytest.raises(LinkLost, match="has not been made again"):
         link.renew(1)
     path.unlink()
     path.symlink_to(other.slave_name)
@@ -127,7 +127,7 @@ def test_l12_a_link_that_was_left_behind_leads_to_somebody_elses_terminal(
 
 def test_a_terminal_without_a_name_of_its_own_is_not_looked_for(master: PtyMaster) -> None:
     link = open_link(master.slave_name, rate=RATE)
-    assert reconnecting(link, rate=RATE, usual=RATE) is link
+    assert reconnecting(link, rate=RATE, default_rate=RATE) is link
     link.close()
 
 
@@ -148,7 +148,7 @@ def test_a_link_that_leads_elsewhere_by_now_is_not_followed(tmp_path: Path, mast
 def test_l12_an_adapter_is_found_under_another_name(usb: Usb, master: PtyMaster, other: PtyMaster) -> None:
     link = adapter(master, usb)
     names: list[str] = []
-    link.moved = names.append
+    link.on_rename = names.append
     old = master.slave_name
     pulled(link, master)
     usb.ports = {other.slave_name: "A", "/dev/ttyACM7": "B"}
@@ -165,12 +165,12 @@ def test_l12_another_adapter_is_refused_and_nothing_is_said_to_it(
 ) -> None:
     link = adapter(other, usb)
     names: list[str] = []
-    link.moved = names.append
+    link.on_rename = names.append
     usb.ports = {other.slave_name: "B"}  # B is plugged in where A was
     with pytest.raises(LinkLost, match="another in its place") as told:
         link.renew(1)
     assert "with the serial number A" in told.value.expected
-    assert "opened anew" not in told.value.advice
+    assert "open the bus again" in told.value.advice
     for attempt in (lambda: link.write(b"for A"), lambda: link.read(0.0), lambda: link.renew(1)):
         with pytest.raises(LinkLost, match="another in its place"):
             attempt()
@@ -217,11 +217,13 @@ def test_it_is_looked_for_at_first_soon_and_then_more_seldom(
         clock.looks += [clock.now] if usb.asked > before else []
         clock.now += 0.001
     gaps = [later - sooner for sooner, later in zip(clock.looks, clock.looks[1:], strict=False)]
-    assert gaps[:4] == pytest.approx([FIRST, 2 * FIRST, 4 * FIRST, 8 * FIRST], abs=0.002)
-    assert gaps[4:] == pytest.approx([LONGEST] * len(gaps[4:]), abs=0.002)
+    assert gaps[:4] == pytest.approx(
+        [FIRST_RETRY, 2 * FIRST_RETRY, 4 * FIRST_RETRY, 8 * FIRST_RETRY], abs=0.002
+    )
+    assert gaps[4:] == pytest.approx([LAST_RETRY] * len(gaps[4:]), abs=0.002)
     assert len(gaps) > 5
     link.rest(clock.now + 10)
-    assert clock.now == pytest.approx(clock.looks[-1] + LONGEST, abs=0.01), (
+    assert clock.now == pytest.approx(clock.looks[-1] + LAST_RETRY, abs=0.01), (
         "rest ends when it is to be looked for"
     )
     link.close()
@@ -241,7 +243,7 @@ def test_a_loss_that_another_thread_has_mended_needs_nothing(usb: Usb, master: P
 def test_what_keeps_it_from_being_opened_is_told(usb: Usb, master: PtyMaster) -> None:
     usb.ports[master.slave_name] = "A"
 
-    def held(rate: int, listen_only: bool, kept: PortLock) -> Any:
+    def held(rate: int, listen_only: bool, lock: PortLock) -> Any:
         raise PortBusy("held by process 17", cause="it was quicker", advice="close it there")
 
     link = Reconnecting(open_link(master.slave_name, rate=RATE), held)
@@ -298,7 +300,10 @@ def test_a_server_that_is_mute_when_it_is_back_holds_nobody_up_for_long() -> Non
     server.close()
     with pytest.raises(LinkLost):
         link.read(link.now() + 30)
-    with socket.create_server(("127.0.0.1", port)), pytest.raises(LinkLost, match=f"within {AGREEING:g} s"):
+    with (
+        socket.create_server(("127.0.0.1", port)),
+        pytest.raises(LinkLost, match=f"within {NEGOTIATION_TIME:g} s"),
+    ):
         link.renew(1)
     link.close()
 
@@ -307,13 +312,13 @@ def test_a_server_that_ends_is_known_before_a_library_waits_for_it() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         for url in (f"rfc2217://127.0.0.1:{port}", f"can://socketcand/127.0.0.1:{port}/can0"):
-            knock(url)
-        knock(f"can://slcan/socket://127.0.0.1:{port}")
+            check_reachable(url)
+        check_reachable(f"can://slcan/socket://127.0.0.1:{port}")
     for url in (f"rfc2217://127.0.0.1:{port}", f"can://slcan/socket://127.0.0.1:{port}"):
         with pytest.raises(OSError, match="cannot be reached"):
-            knock(url)
-    knock("can://socketcan/can0")
-    knock(f"socket://127.0.0.1:{port}")
+            check_reachable(url)
+    check_reachable("can://socketcan/can0")
+    check_reachable(f"socket://127.0.0.1:{port}")
 
 
 # -- who has the port ----------------------------------------------------------------------------------------------

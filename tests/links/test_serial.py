@@ -17,11 +17,11 @@ import pytest
 import serialx
 
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link import serial
+from motorbus.link import serial, wait
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
-from motorbus.link.serial import SerialLink, is_sharp
-from motorbus.link.waiting import wait_readable
+from motorbus.link.serial import SerialLink, has_fine_clock
+from motorbus.link.wait import wait_readable
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process, run
 from tests.links.usb import usb_port
@@ -97,7 +97,7 @@ def test_nothing_by_the_deadline_is_nothing(link: SerialLink) -> None:
 def test_a_deadline_in_the_past_never_waits(
     until: float, link: SerialLink, master: PtyMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(serial, "wait_readable", None)  # calling it would raise
+    monkeypatch.setattr(wait, "wait_readable", None)  # calling it would raise
     assert link.read(until) == []
     master.write(PING)
     while not (arrived := link.read(until)):
@@ -215,7 +215,7 @@ def test_a_foreign_program_is_named(master: PtyMaster) -> None:
 def test_a_program_that_locks_the_device_is_seen_even_where_nobody_can_look(
     master: PtyMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(serial, "who_holds", lambda _: None)
+    monkeypatch.setattr(serial, "find_user", lambda _: None)
     held = os.open(master.slave_name, os.O_RDWR | os.O_NOCTTY)
     fcntl.flock(held, fcntl.LOCK_EX)
     with pytest.raises(PortBusy, match="another program") as refused:
@@ -265,7 +265,7 @@ def test_what_is_no_serial_port(path: str, tmp_path: Path) -> None:
 FORBIDDEN = """
 import os, sys, tempfile
 from motorbus.errors import LinkError
-from motorbus.link import serial
+from motorbus.link import serial, wait
 import serialx
 if os.geteuid() == 0:
     os.setgroups([])
@@ -377,4 +377,4 @@ def test_a_clock_of_coarse_ticks_cannot_tell_how_long_a_frame_took(
 ) -> None:
     found = SimpleNamespace(resolution=resolution)
     monkeypatch.setattr(time, "get_clock_info", lambda name: found)
-    assert is_sharp() is sharp
+    assert has_fine_clock() is sharp

@@ -8,8 +8,8 @@ import termios
 import pytest
 import serialx
 
-from motorbus.link import speed
-from motorbus.link.speed import line_speed
+from motorbus.link import serial
+from motorbus.link.serial import line_speed
 from motorbus.simulation.pty import PtyMaster
 
 FEETECH_RATES = (
@@ -39,7 +39,7 @@ def test_every_rate_of_the_servos_is_told_at_both_ends(rate: int, master: PtyMas
 def test_without_the_exact_way_the_usual_rates_are_told(
     master: PtyMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(speed, "_exact", lambda _: None)
+    monkeypatch.setattr(serial, "_termios2_speed", lambda _: 0)
     settings = termios.tcgetattr(master.fileno())
     settings[4] = settings[5] = termios.B57600
     termios.tcsetattr(master.fileno(), termios.TCSANOW, settings)

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import PortNotFound, RequestError
-from motorbus.link.adapters import TERMINAL_LATENCY
 from motorbus.link.can import CanLink
 from motorbus.link.serial import SerialLink
 from motorbus.link.tcp import TcpLink
 from motorbus.link.url import open_link
+from motorbus.link.usb_adapters import TERMINAL_LATENCY
 from motorbus.simulation.pty import PtyMaster
 
 
@@ -59,7 +59,7 @@ def test_an_unknown_scheme_comes_with_those_that_exist(port: str) -> None:
 def test_a_can_channel_is_opened_with_its_options() -> None:
     link = open_link(
         "CAN://virtual/a",
-        usual=500_000,
+        default_rate=500_000,
         kind="frames",
         options={"receive_own_messages": "yes", "listen_only": "no"},
     )

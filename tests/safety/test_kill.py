@@ -31,10 +31,10 @@ PROGRAM = """
 import json, os, signal, sys
 from random import Random
 from motorbus import Robot
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from tests.safety.decoders import FeetechWitness, KstWitness
 
-adapters.TERMINAL_LATENCY = 1.0  # a simulator may have to wait for a processor
+usb_adapters.TERMINAL_LATENCY = 1.0  # a simulator may have to wait for a processor
 chance, left = Random(int(sys.argv[2])), [int(sys.argv[3])]
 decoders, heard, goals = {"arm": FeetechWitness(), "can": KstWitness(0x25)}, {}, {}
 

@@ -28,10 +28,10 @@ PROGRAM = """
 import os, signal, sys
 from random import Random
 from motorbus import Robot
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from motorbus.link.serial import SerialLink
 
-adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
+usb_adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 chance, left, write = Random(int(sys.argv[2])), [int(sys.argv[3])], SerialLink.write
 
 def doomed(link, data):

@@ -18,9 +18,9 @@ from tests.support.machines import described
 PROGRAM = """
 import sys
 from motorbus import Robot
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 
-adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
+usb_adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 with Robot.load(sys.argv[1]) as robot:
     if "lift" in robot.axes:
         robot["lift"].declare(0.0)

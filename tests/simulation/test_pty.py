@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.waiting import wait_readable
+from motorbus.link.wait import wait_readable
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import run
 

@@ -122,7 +122,7 @@ def test_a_channel_is_opened_as_a_host_would(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("motorbus.link.can.CanLink", open_link)
     with closing(join("can://virtual/here", 250_000, 500_000, fd=False)):
         pass
-    expected = {"rate": 250_000, "usual": 500_000, "options": {"fd": False}, "shared": True}
+    expected = {"rate": 250_000, "default_rate": 500_000, "options": {"fd": False}, "shared": True}
     assert asked == [("can://virtual/here", expected)]
 
 

@@ -21,7 +21,7 @@ from motorbus.bus.part import Part, advance, clock_of, follow, results, step
 from motorbus.bus.pump import Bus
 from motorbus.bus.relay import NAP, SHORT
 from motorbus.core.operation import Runnable
-from motorbus.link.waiting import wait_any
+from motorbus.link.wait import wait_any
 
 ASK_AGAIN = 0.001  # s between two looks at a link without descriptor
 

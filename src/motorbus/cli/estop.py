@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from motorbus.bus.pump import Bus
     from motorbus.bus.stop import StopOutcome
     from motorbus.core.family import Family
-    from motorbus.link.refusal import Owner
+    from motorbus.link.errors import Owner
 
 ANYBODY: Final = 1
 """An id that a device of any family can have."""

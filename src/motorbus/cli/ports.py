@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 from motorbus.cli.output import Output
 
 if TYPE_CHECKING:
-    from motorbus.link.adapters import PortInfo
+    from motorbus.link.usb_adapters import PortInfo
 
 app = App(
     name="ports",

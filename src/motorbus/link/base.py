@@ -1,7 +1,8 @@
-"""What every link offers: move bytes (or CAN frames), and own the clock.
+"""The contract of a link, and of the wire between a host and a simulated device.
 
-The bus never looks at a clock of its own and never sleeps: it asks `link.now()` and waits by
-`link.read(until)`. So over a memory link the same code runs in virtual time, without threads or sleeps.
+A link moves bytes or CAN frames and owns the clock. It is first in, first out: data arrives in the order in which
+the other end sent it. The bus never sleeps and reads no clock of its own: it calls `now()` and waits in `read()`. So
+the same bus runs in virtual time over a memory link.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ from motorbus.core.operation import Data
 
 
 class Link(Protocol):
-    """An open byte stream, or an open CAN channel.
+    """An open byte stream or CAN channel.
 
-    `name`       what the user called it, for messages
-    `latency`    seconds the adapter may hold a byte back before handing it over
-    `paced`      bytes need their air time on this link, so a reply that comes sooner is a stale one
+    `name`       the port as the user wrote it, for messages
+    `rate`       bit/s
+    `latency`    seconds for which the adapter may hold data back
+    `paced`      data takes its air time, so a reply that comes sooner is an old one
     `virtual`    time passes only inside `read`
     `simulated`  there is no real device behind it
-    `warnings`   what the user ought to know about this port (a slow latency timer …)
+    `warnings`   what the user should know about this port, such as a slow latency timer
     """
 
     name: str
@@ -32,53 +34,50 @@ class Link(Protocol):
     warnings: tuple[str, ...]
 
     def now(self) -> float:
-        """Seconds on a monotonic clock that this link owns."""
+        """Seconds on the monotonic clock of this link."""
 
     def write(self, data: Data) -> None:
-        """Hand over one request without blocking. Raises LinkLost when the port is gone, LinkError when full."""
+        """Send data without blocking. Raises LinkLost, or LinkError when the buffer is full."""
 
     def read(self, until: float) -> list[Data]:
-        """Whatever has arrived; waits for the first of it, at most up to this moment. [] when nothing came.
+        """Return what has arrived; wait for the first of it until this moment. Raises LinkLost.
 
-        `until` in the past asks without waiting. Raises LinkLost when the port is gone.
+        A moment in the past does not wait. The list is empty when nothing arrived.
         """
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
-        """Change the rate in bit/s, and send nothing from now on if `listen_only`; a serial line is silent anyway.
-
-        Raises LinkError when the adapter cannot do the one or the other.
-        """
+        """Set the rate in bit/s; with `listen_only` a CAN adapter sends nothing from now on. Raises LinkError."""
 
     def fileno(self) -> int | None:
-        """A descriptor that turns readable when something has arrived, or None when there is none."""
+        """A descriptor that is readable when data has arrived; None where there is none."""
 
     def close(self) -> None:
-        """Give the port back. Calling it again does nothing."""
+        """Release the port. A second call does nothing."""
 
 
 @runtime_checkable
 class Renewable(Link, Protocol):
-    """A link that can be opened anew when it was lost. Nothing of before is kept: neither bytes nor requests."""
+    """A link that can be reopened after a loss. No bytes and no requests survive the loss."""
 
     def renew(self, losses: int) -> None:
-        """Open it anew if it is there again, and time to look. Raises LinkLost, saying why it is still gone.
+        """Reopen the port if it is back and a retry is due. Raises LinkLost with the reason otherwise.
 
-        `losses` is how often the caller has seen it lost: a loss that another thread has mended by now needs nothing.
+        `losses` counts the losses that the caller has seen. If this loss is already repaired, the call does nothing.
         """
 
     def rest(self, until: float) -> None:
-        """Let time pass while it is gone: until this moment, or until it is time to look for it again."""
+        """Wait until this moment, or until the next retry is due."""
 
 
 class Side(Enum):
-    """Which end of a simulated wire."""
+    """One end of a simulated wire."""
 
     HOST = "host"
     DEVICE = "device"
 
 
 class Delivery(NamedTuple):
-    """Data that reaches one end of a simulated wire at a moment (s)."""
+    """Data that arrives at one end of a simulated wire at this moment (s)."""
 
     at: float
     to: Side
@@ -86,17 +85,14 @@ class Delivery(NamedTuple):
 
 
 class Line(Protocol):
-    """What lies between a host and a simulated device: nothing, or every fault a wire can have.
-
-    It stands between simulator and mount whatever the mount is (memory, pseudo-terminal, TCP).
-    """
+    """The wire between a host and simulated devices, with or without faults."""
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
-        """What becomes of data that one end sent at this moment; an echo is a delivery back to the sender."""
+        """Return what arrives of data sent at this moment (s). An echo is a delivery to its sender."""
 
 
 class PerfectLine:
-    """A wire that does nothing but carry."""
+    """A wire without faults and without delay."""
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         return [Delivery(at, Side.DEVICE if sender is Side.HOST else Side.HOST, data)]

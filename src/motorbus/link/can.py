@@ -1,238 +1,241 @@
-"""CAN channels, opened by python-can: `can://INTERFACE/CHANNEL`.
+"""CAN channels that python-can opens: `can://INTERFACE/CHANNEL`.
 
-Whatever python-can opens can be used: socketcan, slcan, socketcand, pcan, kvaser, gs_usb, virtual and the rest, with
-its configuration files and CAN_* variables. Where it falls back in silence (another bit rate, an option it does not
-know), waits without end or reads a byte at a time, this link does not follow. python-can is imported here, when a
-port is opened, and nowhere else.
+Every interface of python-can works, with its configuration files and CAN_* variables. Where python-can would silently
+take another bit rate, ignore an option or wait without end, this link raises an error. python-can is imported here
+only, when a port is opened.
 """
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import Any, Final
 
-from motorbus.core.operation import CanFrame, Data
-from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
-from motorbus.link import adapters
-from motorbus.link.can_config import NO_WIRE, SERIAL_PORTS, CanConfig, configured
-from motorbus.link.can_port import ASK_AGAIN
-from motorbus.link.can_rates import check_rate, ip_line, kernel_rate
-from motorbus.link.can_refusal import INSTALL, device_of, refused
-from motorbus.link.can_slcan import SlcanWire, command_of, open_slcan
-from motorbus.link.can_socketcand import open_socketcand
-from motorbus.link.can_wire import BusWire, Wire, build, refuse_bus_off
-from motorbus.link.foreign import who_holds
-from motorbus.link.identity import PSEUDO_TERMINALS
-from motorbus.link.lock import PortLock, taken
-from motorbus.link.refusal import busy, no_port, not_found
-from motorbus.link.serial import could_be_a_port, ports
+from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
+from motorbus.link import usb_adapters
+from motorbus.link.can_channel import POLL_TIME, BusChannel, Channel, Counts, open_bus
+from motorbus.link.can_options import SHARED, CanOptions, read_options
+from motorbus.link.can_rates import check_rate, ip_command, kernel_rate
+from motorbus.link.errors import busy, no_permission, not_a_port, not_found
+from motorbus.link.lock import PortLock, lock_port
+from motorbus.link.port_users import find_user
+from motorbus.link.serial import NO_DEVICE, PSEUDO_TERMINALS, could_be_a_port, ports
+from motorbus.link.slcan import SlcanChannel, open_slcan, rate_command
+from motorbus.link.socketcand import open_socketcand
 
-BY_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
-"""Back ends in which a readable descriptor means a frame, and a silent one that there is none."""
-TELLS_ERRORS: Final = ("socketcan", "socketcand")
-"""Back ends whose error frames say what is wrong in the words of the kernel."""
-LATENCY: Final = {
-    "virtual": adapters.TERMINAL_LATENCY,  # two threads have to be scheduled
-    "udp_multicast": adapters.TERMINAL_LATENCY,
-    "socketcan": adapters.USB_TIME,  # the kernel takes no time, the USB adapter below it may
+BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF in the identifier of an error frame, linux/can/error.h
+INSTALL: Final = 'pip install "motorbus[can]"'
+_FRAME_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
+"""Interfaces whose descriptor is readable exactly when there is a frame."""
+_KERNEL_ERRORS: Final = ("socketcan", "socketcand")
+"""Interfaces whose error frames are those of the Linux kernel."""
+_LATENCY: Final = {
+    "virtual": usb_adapters.TERMINAL_LATENCY,  # two threads are scheduled
+    "udp_multicast": usb_adapters.TERMINAL_LATENCY,
+    "socketcan": usb_adapters.USB_TIME,  # of the USB adapter below the kernel
 }
-"""s; any other adapter hands frames over as a USB device does."""
+"""s; any other adapter has the latency of a USB device."""
+_EXTRAS: Final = {
+    "gs_usb": "gs-usb",
+    "udp_multicast": "multicast",
+    **{name: name for name in ("canalystii", "cantact", "neovi", "nixnet", "serial", "seeedstudio")},
+}
+"""The extra of python-can that a back end needs."""
+_DRIVERS: Final = {
+    "pcan": "PEAK's PCAN-Basic library",
+    "kvaser": "Kvaser's CANlib",
+    "ixxat": "the VCI driver (Windows)",
+    "vector": "Vector's XL driver (Windows)",
+}
+_LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
+    "slcan": {},  # by a command
+    "socketcan": {},  # by the kernel
+    "virtual": {},
+    "udp_multicast": {},
+    "pcan": {"state": "PASSIVE"},
+    "kvaser": {"driver_mode": False},
+    "vector": {"listen_only": True},
+    "cantact": {"monitor": True},
+    "seeedstudio": {"operation_mode": "silent"},
+}
+"""The settings with which a back end only listens; the others cannot."""
 
 
-def python_can(wanted: str) -> ModuleType:
-    """python-can, silent unless somebody listens to its log. Raises LinkError, naming how to install it."""
+def python_can(port: str) -> ModuleType:
+    """The module python-can, without log output by default. Raises LinkError when it is not installed."""
     try:
         import can
     except ImportError as error:
-        raise LinkError(f"{wanted} needs python-can, which is missing: {error}", advice=INSTALL) from None
+        raise LinkError(f"{port} needs python-can, which is missing: {error}", advice=INSTALL) from None
     log = logging.getLogger("can")
     if not log.handlers:
         log.addHandler(logging.NullHandler())
     return can
 
 
-class CanLink:
-    """An open CAN channel. `rate` in bit/s is what the user said (0: nothing), `usual` what the family expects.
+def describe(port: str, options: Mapping[str, object]) -> CanOptions:
+    """What this address means, without opening it. Raises RequestError, or LinkError without python-can."""
+    return read_options(python_can(port), port, 0, options)
 
-    `options`: `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and whatever the
-    back end's constructor takes. `shared`: takes part beside a host of this machine, as simulated devices on a
-    SocketCAN interface do, so that one is not locked. Raises RequestError for an unknown interface or option,
-    PortNotFound, PortBusy, or LinkError: for a bit rate that this adapter does not really have, a missing driver, a
-    refusal. `kept` is a lock that we have already, maybe this one. `lock_name` is the name of the adapter by which it
-    is locked and listens for an emergency stop. `no_wire`: it is made of programs alone.
+
+class CanLink:
+    """An open CAN channel.
+
+    `rate`          bit/s from the user; 0 when not given
+    `default_rate`  bit/s of the family
+    `options`       `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and what the
+                    back end's constructor takes
+    `shared`        takes part beside a host of this machine, as simulated devices do: SocketCAN is not locked
+    `lock`          a lock that the caller already holds
+
+    `lock_name` names the adapter for its lock and its emergency stop; "" for a shared channel. `no_wire`: no device
+    can be real. Raises RequestError for an unknown interface or option, PortNotFound, PortBusy, or LinkError: for a bit
+    rate that the adapter does not have, a missing driver, a refusal.
     """
 
-    paced = False  # adapters say nothing of when a frame was on the wire
+    paced = False  # adapters do not report when a frame was on the wire
     virtual = False
     simulated = False
-    timeless = False  # behind a pseudo-terminal frames need no time: how soon an answer comes says nothing
+    timeless = False  # frames through a pseudo-terminal take no time
 
     def __init__(
         self,
         port: str,
         *,
         rate: int = 0,
-        usual: int = 0,
+        default_rate: int = 0,
         options: Mapping[str, object] | None = None,
         shared: bool = False,
-        kept: PortLock | None = None,
+        lock: PortLock | None = None,
     ) -> None:
         self.name = port
         self._can = python_can(port)
-        self._config = configured(self._can, port, rate, options or {})
-        self._back_end = self._class()
-        self.warnings = self._config.warnings
-        self.latency = LATENCY.get(self._config.interface, adapters.DEVICE_LATENCY)
-        self.rate = self._settled_rate(usual)
-        self.listen_only = self._config.listen_only
-        self.no_wire = self._config.no_wire
-        self._tells = self._config.interface in TELLS_ERRORS
-        self._tuning = False
-        self._told = (0, 0)
-        self.lock_name = _lock_name(self._config)
-        alone = self.lock_name and not (shared and self._config.interface == "socketcan")
-        self.lock = taken(self.lock_name, kept) if alone else PortLock(self.lock_name or port)
+        self._options = found = read_options(self._can, port, rate, options or {})
         try:
-            self._wire: Wire = self._opened(self.rate, self.listen_only)
+            self._back_end: Any = self._can.interface._get_class_for_interface(found.interface)
+        except Exception as error:
+            raise open_error(found, error) from error
+        self.warnings = found.warnings
+        self.latency = _LATENCY.get(found.interface, usb_adapters.DEVICE_LATENCY)
+        self.rate = self._checked_rate(default_rate)
+        self.listen_only = found.listen_only
+        self.no_wire = found.no_wire
+        self.lock_name = found.lock_name
+        self._changing = False
+        self._reported = (0, 0)
+        locked = self.lock_name and not (shared and found.interface == "socketcan")
+        self.lock = lock_port(self.lock_name, lock) if locked else PortLock(self.lock_name or port)
+        try:
+            self._channel = self._open(self.rate, self.listen_only)
         except BaseException:
             self.lock.release()
             raise
 
-    def _class(self) -> Any:
-        try:
-            return self._can.interface._get_class_for_interface(self._config.interface)
-        except Exception as error:
-            raise refused(self._config, error) from error
-
-    def _settled_rate(self, usual: int) -> int:
-        """The rate to open at. Raises LinkError when the adapter would make another of it."""
-        config = self._config
-        if config.interface == "socketcan":
-            rate, warnings = kernel_rate(config, config.rate, usual)
+    def _checked_rate(self, default_rate: int) -> int:
+        """The rate to open with. Raises LinkError when the adapter would make another one."""
+        options = self._options
+        if options.interface == "socketcan":
+            rate, warnings = kernel_rate(options, options.rate, default_rate)
             self.warnings += warnings
             return rate
-        rate = config.rate or config.bits or usual
+        rate = options.rate or options.timing_rate or default_rate
         if rate <= 0:
-            raise RequestError(f"{self.name}: no bit rate was said", expected="bitrate=500000, for example")
-        if config.sets_rate:
-            check_rate(config, self._back_end, rate)
-        elif config.rate and config.interface not in NO_WIRE:
-            whose = "server" if config.interface == "socketcand" else "adapter"
+            raise RequestError(
+                f"{self.name}: the bit rate is missing", expected="bitrate=500000, for example"
+            )
+        if options.sets_rate:
+            check_rate(options, self._back_end, rate)
+        elif options.rate and options.interface not in SHARED:
+            place = "server" if options.interface == "socketcand" else "adapter"
             self.warnings += (
-                f"the bit rate is set at the {whose}; whether that is {rate} bit/s cannot be checked",
+                f"the bit rate is set at the {place}; whether that is {rate} bit/s cannot be checked",
             )
         return rate
 
-    # -- opening --------------------------------------------------------------------------------------------
-
-    def _opened(self, rate: int, listen_only: bool) -> Wire:
-        config = self._config
+    def _open(self, rate: int, listen_only: bool) -> Channel:
+        options = self._options
         if listen_only:
-            self._check_listening()
+            self._check_can_listen()
         try:
-            if config.interface == "slcan":
-                return self._opened_slcan(rate, listen_only)
-            if config.interface == "socketcand":
-                wire, self.latency = open_socketcand(config, self._back_end)
-                return wire
-            return self._opened_bus(rate, listen_only)
+            if options.interface == "slcan":
+                return self._open_slcan(rate, listen_only)
+            if options.interface == "socketcand":
+                channel, self.latency = open_socketcand(options, self._back_end)
+                return channel
+            settings = dict(options.settings)
+            if options.sets_rate and "timing" not in settings:
+                settings["bitrate"] = rate
+            if listen_only:
+                settings.update(_LISTEN_ONLY[options.interface])
+                if "state" in settings:
+                    settings["state"] = self._can.BusState[settings["state"]]
+            bus = open_bus(self._back_end, options.channel, settings)
+            descriptor = bus.fileno() if options.interface in _FRAME_DESCRIPTOR else None
+            return BusChannel(self.name, bus, self._can.Message, descriptor)
         except MotorbusError:
             raise
-        except Exception as error:  # each back end has its own
-            raise refused(self._config, error) from error
+        except Exception as error:  # each back end has its own types
+            raise open_error(options, error) from error
 
-    def _opened_slcan(self, rate: int, listen_only: bool) -> SlcanWire:
-        device = device_of(self._config)
-        self.timeless = os.path.realpath(device).startswith(PSEUDO_TERMINALS) if device else False
+    def _open_slcan(self, rate: int, listen_only: bool) -> SlcanChannel:
+        device = self._options.device
+        real = os.path.realpath(device)
+        self.timeless = bool(device) and real.startswith(PSEUDO_TERMINALS)
         if device and os.name != "nt":
             if not os.path.exists(device):
                 raise not_found(self.name, ports())
             if not could_be_a_port(device):
-                raise no_port(self.name, ports(), device)
-            holder = who_holds(os.path.realpath(device))
-            if holder is not None:
-                raise busy(self.name, holder)
-        wire, self.latency, warnings = open_slcan(self._config, self._back_end)
+                raise not_a_port(self.name, ports(), device)
+            user = find_user(real)
+            if user is not None:
+                raise busy(self.name, user)
+        channel, self.latency, warnings = open_slcan(self._options, self._back_end)
         self.warnings += warnings
         try:
-            wire.configure(command_of(self._config, self._back_end, rate), rate, listen_only=listen_only)
+            channel.configure(
+                rate_command(self._options, self._back_end, rate), rate, listen_only=listen_only
+            )
         except BaseException:
-            wire.close()
+            channel.close()
             raise
-        return wire
+        return channel
 
-    def _opened_bus(self, rate: int, listen_only: bool) -> BusWire:
-        config = self._config
-        settings = dict(config.settings)
-        if config.sets_rate and "timing" not in settings:
-            settings["bitrate"] = rate
-        if listen_only:
-            settings.update(self._listening().get(config.interface, {}))
-        bus = build(self._back_end, config.channel, settings)
-        descriptor = bus.fileno() if config.interface in BY_DESCRIPTOR else None
-        return BusWire(self.name, bus, self._can.Message, descriptor)
-
-    def _listening(self) -> dict[str, dict[str, Any]]:
-        """What makes a back end only listen; the kernel's interfaces are asked instead, the rest cannot."""
-        return {
-            "slcan": {},
-            "socketcan": {},
-            "virtual": {},
-            "udp_multicast": {},
-            "pcan": {"state": self._can.BusState.PASSIVE},
-            "kvaser": {"driver_mode": False},
-            "vector": {"listen_only": True},
-            "cantact": {"monitor": True},
-            "seeedstudio": {"operation_mode": "silent"},
-        }
-
-    def _check_listening(self) -> None:
-        if self._config.interface not in self._listening():
+    def _check_can_listen(self) -> None:
+        interface = self._options.interface
+        if interface not in _LISTEN_ONLY:
             raise LinkError(
-                f"{self.name}: {self._config.interface} cannot only listen: its adapter would acknowledge frames",
-                expected=f"listen_only with one of {', '.join(self._listening())}",
+                f"{self.name}: {interface} cannot only listen: its adapter would acknowledge frames",
+                expected=f"listen_only with one of {', '.join(_LISTEN_ONLY)}",
                 advice="leave out listen_only where nothing else is on the bus",
             )
 
-    # -- the link -------------------------------------------------------------------------------------------
-
     @property
     def device(self) -> str:
-        """The serial port of this machine that the adapter is; "" for any other channel."""
-        serial = self._config.interface in SERIAL_PORTS and "://" not in self.lock_name
-        return self.lock_name if serial else ""
+        """The serial port of the adapter; "" for any other channel."""
+        return self._options.device
 
     def port_at(self, device: str) -> str:
-        """The port, as an address says it, where that serial port is called so."""
-        _, at, baud = str(self._config.channel).partition("@")
-        return f"can://{self._config.interface}/{device.lstrip('/')}{at}{baud}"
+        """The address of this adapter at another serial port."""
+        _, at, baud = str(self._options.channel).partition("@")
+        return f"can://{self._options.interface}/{device.lstrip('/')}{at}{baud}"
 
     @property
-    def damaged(self) -> int:
-        """Lines or elements that came and were no whole frame."""
-        return self._wire.damaged
-
-    @property
-    def refused(self) -> int:
-        """How often the adapter said no, as far as it says so at all."""
-        return self._wire.refused
-
-    @property
-    def dropped(self) -> int:
-        """Frames left out: CAN FD, and echoes of our own."""
-        return self._wire.dropped
+    def counts(self) -> Counts:
+        """Damaged lines, refused commands and dropped frames."""
+        return self._channel.counts
 
     def trouble(self) -> str:
-        """What the adapter has said since this was last asked, for whoever waits in vain; "" for nothing."""
-        refused, damaged = self._wire.refused, self._wire.damaged
-        before, self._told = self._told, (refused, damaged)
+        """What the adapter has reported since the last call, for the error of a missing reply; "" for nothing."""
+        refused, damaged = self.counts.refused, self.counts.damaged
+        before, self._reported = self._reported, (refused, damaged)
         if refused > before[0]:
             return (
-                f"the adapter refused {refused - before[0]} frames: nobody on the bus acknowledges them, the bit rate "
+                f"the adapter refused {refused - before[0]} frames: no node on the bus acknowledges them, the bit rate "
                 "is another, or its buffer is full"
             )
         if damaged > before[1]:
@@ -246,20 +249,20 @@ class CanLink:
         if not isinstance(data, CanFrame):
             raise RequestError(f"{self.name} carries CAN frames, not bytes", sent=data)
         if self.listen_only:
-            raise LinkError(f"{self.name} only listens: nothing was sent", sent=data)
-        self._wire.write(data)
+            raise LinkError(f"{self.name} only listens and cannot send", sent=data)
+        self._channel.write(data)
 
     def read(self, until: float) -> list[Data]:
-        wire = self._wire
+        channel = self._channel
         try:
-            frames = wire.read(until)
+            frames = channel.read(until)
         except LinkLost:
-            if wire is self._wire and not self._tuning:
+            if channel is self._channel and not self._changing:
                 raise
-            time.sleep(ASK_AGAIN)
-            return []  # it is being opened anew
-        if frames and self._tells:
-            refuse_bus_off(self.name, frames)
+            time.sleep(POLL_TIME)
+            return []  # another thread reopens it for another rate
+        if frames and self._options.interface in _KERNEL_ERRORS:
+            check_bus_off(self.name, frames)
         return frames
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
@@ -269,80 +272,108 @@ class CanLink:
         if (rate, listen_only) == (self.rate, self.listen_only):
             return
         if listen_only:
-            self._check_listening()
-        self._retune(rate, listen_only)
+            self._check_can_listen()
+        options = self._options
+        if options.interface == "socketcan":
+            self._check_kernel(rate, listen_only)
+        elif options.interface not in SHARED:
+            if not options.sets_rate and rate != self.rate:
+                raise LinkError(
+                    f"{self.name}: the bit rate of {options.interface} cannot be changed to {rate} bit/s from here",
+                    advice="set it where the adapter is",
+                )
+            check_rate(options, self._back_end, rate)
+            self._change(rate, listen_only)
         self.rate, self.listen_only = rate, listen_only
 
-    def _retune(self, rate: int, listen_only: bool) -> None:
-        config = self._config
-        if config.interface in NO_WIRE:
-            return
-        if config.interface == "socketcan":
-            self._ask_kernel(rate, listen_only)
-        elif not config.sets_rate and rate != self.rate:
-            raise LinkError(
-                f"{self.name}: the bit rate of {config.interface} cannot be changed to {rate} bit/s from here",
-                advice="set it where the adapter is",
-            )
-        else:
-            check_rate(config, self._back_end, rate)
-            again = self._configure if isinstance(self._wire, SlcanWire) else self._reopen
-            self._or_as_before(again, rate, listen_only)
-
-    def _ask_kernel(self, rate: int, listen_only: bool) -> None:
-        _, unknown = kernel_rate(self._config._replace(listen_only=listen_only), rate, rate)
+    def _check_kernel(self, rate: int, listen_only: bool) -> None:
+        _, unknown = kernel_rate(self._options._replace(listen_only=listen_only), rate, rate)
         if unknown:
             raise LinkError(
                 f"{self.name}: the bit rate of a SocketCAN interface is set by the system",
-                advice=ip_line(str(self._config.channel), rate, listen_only),
+                advice=ip_command(str(self._options.channel), rate, listen_only),
             )
 
-    def _or_as_before(self, again: Callable[[int, bool], None], rate: int, listen_only: bool) -> None:
-        self._tuning = True
+    def _change(self, rate: int, listen_only: bool) -> None:
+        """Set up the adapter again; as before when that fails."""
+        self._changing = True
         try:
-            again(rate, listen_only)
+            self._set_up(rate, listen_only)
         except MotorbusError:
-            again(self.rate, self.listen_only)
+            self._set_up(self.rate, self.listen_only)
             raise
         finally:
-            self._tuning = False
+            self._changing = False
 
-    def _configure(self, rate: int, listen_only: bool) -> None:
-        assert isinstance(self._wire, SlcanWire)
-        command = command_of(self._config, self._back_end, rate)
-        self._wire.configure(command, rate, listen_only=listen_only)
-
-    def _reopen(self, rate: int, listen_only: bool) -> None:
-        self._wire.close()
-        self._wire = self._opened(rate, listen_only)
+    def _set_up(self, rate: int, listen_only: bool) -> None:
+        if isinstance(self._channel, SlcanChannel):
+            command = rate_command(self._options, self._back_end, rate)
+            self._channel.configure(command, rate, listen_only=listen_only)
+        else:
+            self._channel.close()
+            self._channel = self._open(rate, listen_only)
 
     def fileno(self) -> int | None:
-        return self._wire.fileno()
+        return self._channel.fileno()
 
     def close(self) -> None:
-        self._wire.close()
+        self._channel.close()
         self.lock.release()
 
 
-def no_wire(port: str, options: Mapping[str, object]) -> bool:
-    """Whether a port that need not be open is made of programs alone. Raises as `lock_name`."""
-    return configured(python_can(port), port, 0, options).no_wire
+def check_bus_off(name: str, frames: Iterable[Data]) -> None:
+    """Raise LinkLost for an error frame of the kernel that reports bus off: the controller sends nothing any more."""
+    for frame in frames:
+        if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
+            raise LinkLost(
+                f"{name} is off the bus: its controller has counted too many errors",
+                received=frame,
+                cause="a short circuit, another bit rate on the bus, no terminating resistors, or no other node",
+                advice="check the bus; an interface without restart-ms needs `ip link set can0 type can restart`",
+            )
 
 
-def lock_name(port: str, options: Mapping[str, object]) -> str:
-    """The `CanLink.lock_name` of a port that need not be open. Raises as `CanLink` does for what is no port."""
-    return _lock_name(configured(python_can(port), port, 0, options))
-
-
-def _lock_name(config: CanConfig) -> str:
-    """One name for one adapter, whatever it was called; "" where any number of programs meet."""
-    if config.interface in NO_WIRE:
-        return ""
-    if config.interface in SERIAL_PORTS:  # the name by which anything else locks it
-        channel = str(config.channel)
-        return channel if "://" in channel else channel.partition("@")[0]
-    if config.interface == "socketcand":
-        return (
-            f"can://socketcand/{config.settings.get('host')}:{config.settings.get('port')}/{config.channel}"
+def open_error(options: CanOptions, error: Exception) -> MotorbusError:
+    """The error for what python-can has raised at open: a missing driver is an ImportError here, a NameError there."""
+    name, interface = options.name, options.interface
+    source = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    code = getattr(source, "errno", None) or getattr(error, "error_code", None)
+    if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
+        advice = f"install {_DRIVERS.get(interface, 'the driver that comes with the adapter')}"
+        if interface == "slcan":
+            advice = INSTALL
+        elif interface in _EXTRAS:
+            advice = f'pip install "python-can[{_EXTRAS[interface]}]"'
+        return LinkError(f"{name}: the driver of {interface} is missing: {error}", advice=advice)
+    if isinstance(error, (ValueError, TypeError)):
+        return RequestError(f"{name}: python-can's {interface} refuses this: {error}")
+    if interface == "slcan":
+        return _slcan_error(options, error, code)
+    if code in NO_DEVICE:
+        return PortNotFound(f"{name}: there is no {interface} channel {options.channel}: {error}")
+    if code == errno.EAFNOSUPPORT:
+        return LinkError(
+            f"{name}: the kernel of this system has no CAN",
+            advice="sudo modprobe can-raw; where there is none, use the adapter by can://slcan/…",
         )
-    return f"can://{config.interface}/{config.channel}"
+    if code == errno.EBUSY:
+        return busy(name, None)
+    return LinkError(
+        f"{name} cannot be opened: {error}", advice="is the adapter plugged in, the channel right?"
+    )
+
+
+def _slcan_error(options: CanOptions, error: Exception, code: int | None) -> MotorbusError:
+    name, device = options.name, options.device
+    if not device:
+        return PortNotFound(
+            f"{name} cannot be reached: {error}",
+            advice="is the bridge switched on, the simulator running, the port number right?",
+        )
+    if code in NO_DEVICE:
+        return not_found(name, ports())
+    if code in (errno.EACCES, errno.EPERM):
+        return no_permission(name, device)
+    if code == errno.EBUSY:
+        return busy(name, find_user(os.path.realpath(device)))
+    return LinkError(f"{name} cannot be opened as a serial port: {error}")

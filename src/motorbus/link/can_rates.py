@@ -1,8 +1,7 @@
-"""Which bit rate a CAN adapter will really run at, found out before it is opened.
+"""Check a CAN bit rate before the adapter is opened.
 
-python-can's back ends differ in what they do with a rate they do not have: one raises, one takes 500 kbit/s instead,
-one hands a number to its driver that means something else. A wrong rate disturbs everybody on the bus, so what cannot
-be done is an error here, and what cannot be known is said.
+Back ends of python-can differ for a rate that they do not have: one raises, one takes 500 kbit/s instead, one passes a
+number to its driver that means another rate. A wrong rate disturbs the whole bus, so it is an error here.
 """
 
 from __future__ import annotations
@@ -10,18 +9,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
 from motorbus.errors import LinkError
-from motorbus.link.can_config import CanConfig
+from motorbus.link.can_options import TIMING, CanOptions
 
-IP_TIME: Final = 2.0
-"""s that `ip` may take to say how an interface is set."""
+IP_TIME: Final = 2.0  # s; time-out for the program `ip`
 AMBIGUOUS: Final = 750_000
-"""bit/s that python-can's slcan asks for with S7, by which the LAWICEL manual means 800 kbit/s."""
-LAWICEL_CLOCK: Final = 8_000_000
-"""Hz that BTR0 and BTR1 of an slcan adapter count in (SJA1000 at 16 MHz)."""
+"""bit/s for which python-can's slcan sends S7, which means 800 kbit/s in the LAWICEL manual."""
+LAWICEL_CLOCK: Final = 8_000_000  # Hz of BTR0 and BTR1 of an slcan adapter (SJA1000 at 16 MHz)
 _TABLES: Final = {
     "slcan": "_BITRATES",
     "pcan": "PCAN_BITRATES",
@@ -31,13 +27,19 @@ _TABLES: Final = {
     "iscan": "BAUDRATES",
     "seeedstudio": "BITRATE",
 }
-"""Where python-can's back ends keep the rates they have: an attribute of the class or of its module."""
-_ANY_TIMING: Final = "f_clock=8000000,brp=1,tseg1=7,tseg2=2,sjw=1,nof_samples=1"
+"""Where the back ends of python-can keep their rates: an attribute of the class or of its module."""
+_REASONS: Final = {
+    "slcan": " (S7 is 800 kbit/s in the LAWICEL manual and 750 kbit/s in python-can, so neither is used)",
+    "pcan": " (python-can would take 500 kbit/s instead)",
+    "kvaser": " (python-can would pass the bare number to the driver)",
+}
+_TIMING_ADVICE: Final = "give the bit timing instead of a rate"
+_TIMING_800K: Final = "f_clock=8000000,brp=1,tseg1=7,tseg2=2,sjw=1,nof_samples=1"
 """800 kbit/s with the clock of an slcan adapter, sampled at 80 %."""
 
 
 def known_rates(interface: str, back_end: Any) -> frozenset[int]:
-    """The bit rates that this back end has names for; empty when it takes any number, or cannot be asked."""
+    """The bit rates in the table of this back end; empty when it takes any number, or has no table."""
     name = _TABLES.get(interface)
     if name is None or back_end is None:
         return frozenset()
@@ -46,106 +48,92 @@ def known_rates(interface: str, back_end: Any) -> frozenset[int]:
     return rates - {AMBIGUOUS} if interface == "slcan" else rates
 
 
-def check_rate(config: CanConfig, back_end: Any, rate: int) -> None:
-    """The back end really makes this rate. Raises LinkError when it does not."""
-    if config.bits:
-        _check_timing(config, rate)
+def check_rate(options: CanOptions, back_end: Any, rate: int) -> None:
+    """Raise LinkError when the back end does not make this rate (bit/s)."""
+    interface = options.interface
+    if options.timing_rate:
+        if rate != options.timing_rate:
+            raise LinkError(
+                f"{options.name}: the bit timing makes {options.timing_rate} bit/s, not {rate}",
+                advice="leave out the bit rate, or the timing",
+            )
+        clock = options.settings["timing"].f_clock
+        if interface == "slcan" and clock != LAWICEL_CLOCK:
+            raise LinkError(
+                f"{options.name}: an slcan adapter counts in {LAWICEL_CLOCK} Hz, not {clock}",
+                expected=f"f_clock={LAWICEL_CLOCK}",
+            )
         return
-    rates = known_rates(config.interface, back_end)
-    if rates and rate not in rates and "tseg1" not in config.settings:
-        raise cannot(config, rate, rates)
-    if config.interface == "usb2can" and (rate % 1000 or rate > 1_000_000):
-        raise cannot(config, rate, ())
-
-
-def _check_timing(config: CanConfig, rate: int) -> None:
-    if rate != config.bits:
-        raise LinkError(
-            f"{config.name}: the bit timing makes {config.bits} bit/s, not {rate}",
-            advice="leave out the bit rate, or the timing",
-        )
-    clock = config.settings["timing"].f_clock
-    if config.interface == "slcan" and clock != LAWICEL_CLOCK:
-        raise LinkError(
-            f"{config.name}: an slcan adapter counts in {LAWICEL_CLOCK} Hz, not {clock}",
-            expected=f"f_clock={LAWICEL_CLOCK}",
-        )
-
-
-def cannot(config: CanConfig, rate: int, rates: Iterable[int]) -> LinkError:
-    """This back end has no such rate."""
-    why = {
-        "slcan": " (S7 is 800 kbit/s in the LAWICEL manual and 750 kbit/s in python-can, so neither is used)",
-        "pcan": " (python-can would take 500 kbit/s instead)",
-        "kvaser": " (python-can would hand the bare number to the driver)",
-    }
-    known = sorted(rates)
-    is_trap = config.interface == "slcan" and rate in (AMBIGUOUS, 800_000)
-    return LinkError(
-        f"{config.name}: {config.interface} has no bit rate of {rate} bit/s"
-        f"{why.get(config.interface, '') if is_trap or config.interface != 'slcan' else ''}",
-        expected=f"one of {', '.join(map(str, known))} bit/s" if known else "whole kbit/s, at most 1000",
-        advice=f"give the bit timing instead of a rate: {_ANY_TIMING} is 800 kbit/s"
-        if config.interface == "slcan"
-        else "give the bit timing instead of a rate (f_clock, brp, tseg1, tseg2, sjw, nof_samples), or change the"
-        " rate of the bus",
+    rates = known_rates(interface, back_end)
+    if rates and rate not in rates and "tseg1" not in options.settings:
+        expected = f"one of {', '.join(map(str, sorted(rates)))} bit/s"
+    elif interface == "usb2can" and (rate % 1000 or rate > 1_000_000):
+        expected = "whole kbit/s, at most 1000"
+    else:
+        return
+    reason = _REASONS.get(interface, "")
+    advice = f"{_TIMING_ADVICE} ({', '.join(TIMING)}), or change the rate of the bus"
+    if interface == "slcan":
+        reason = reason if rate in (AMBIGUOUS, 800_000) else ""
+        advice = f"{_TIMING_ADVICE}: {_TIMING_800K} is 800 kbit/s"
+    raise LinkError(
+        f"{options.name}: {interface} has no bit rate of {rate} bit/s{reason}",
+        expected=expected,
+        advice=advice,
     )
 
 
-class KernelLink(NamedTuple):
-    """What the Linux kernel says of a CAN interface: bit/s (0: it has none, as vcan), switched on, only listening."""
+class KernelState(NamedTuple):
+    """State of a SocketCAN interface: bit/s (0 for vcan, which has none), switched on, listen-only."""
 
     rate: int
     up: bool
     listen_only: bool
 
 
-def kernel_link(channel: str) -> KernelLink | None:
-    """How this interface is set, as `ip` tells it; None when nobody tells."""
+def kernel_state(channel: str) -> KernelState | None:
+    """The state of this interface from the program `ip`; None when it does not tell."""
     command = ["ip", "-details", "-json", "link", "show", "dev", channel]
     try:
-        told = subprocess.run(command, capture_output=True, timeout=IP_TIME, check=True).stdout
-        about = json.loads(told)[0]
+        output = subprocess.run(command, capture_output=True, timeout=IP_TIME, check=True).stdout
+        about = json.loads(output)[0]
         data = about.get("linkinfo", {}).get("info_data", {})
         rate = int(data.get("bittiming", {}).get("bitrate", 0))
-        return KernelLink(rate, "UP" in about["flags"], "LISTEN-ONLY" in data.get("ctrlmode", ()))
+        return KernelState(rate, "UP" in about["flags"], "LISTEN-ONLY" in data.get("ctrlmode", ()))
     except (OSError, subprocess.SubprocessError, ValueError, LookupError, TypeError, AttributeError):
         return None
 
 
-def kernel_rate(config: CanConfig, rate: int, usual: int) -> tuple[int, tuple[str, ...]]:
-    """The rate of a SocketCAN interface, which is the kernel's, and what to warn of. `rate` is 0 when nobody said.
+def kernel_rate(options: CanOptions, rate: int, default_rate: int) -> tuple[int, tuple[str, ...]]:
+    """Rate of a SocketCAN interface (bit/s), which the system sets, and warnings. `rate` is 0 when not given.
 
-    Raises LinkError when the interface is switched off, or set otherwise than was said.
+    Raises LinkError when the interface is switched off, or its settings are not those of the options.
     """
-    channel = str(config.channel)
-    link = kernel_link(channel)
-    if link is None:
-        return rate or usual, (
-            f"the kernel did not tell the bit rate of {channel}; {rate or usual} bit/s is assumed",
-        )
-    if not link.up:
+    name, channel = options.name, str(options.channel)
+    state = kernel_state(channel)
+    wanted = rate or default_rate
+    if state is None:
+        return wanted, (f"the kernel did not tell the bit rate of {channel}; {wanted} bit/s is assumed",)
+    if not state.up:
+        advice = ip_command(channel, wanted, state.listen_only)
+        raise LinkError(f"{name}: {channel} is switched off", advice=advice)
+    if rate and state.rate and rate != state.rate:
         raise LinkError(
-            f"{config.name}: {channel} is switched off",
-            advice=ip_line(channel, rate or usual, link.listen_only),
+            f"{name}: the kernel runs {channel} at {state.rate} bit/s, not at {rate}",
+            cause="the system sets the bit rate of a SocketCAN interface, not the program that uses it",
+            advice=ip_command(channel, rate, state.listen_only),
         )
-    if rate and link.rate and rate != link.rate:
+    if options.listen_only != state.listen_only and state.rate:
+        advice = ip_command(channel, rate or state.rate, options.listen_only)
         raise LinkError(
-            f"{config.name}: the kernel runs {channel} at {link.rate} bit/s, not at {rate}",
-            cause="the bit rate of a SocketCAN interface is set by the system, not by the program that uses it",
-            advice=ip_line(channel, rate, link.listen_only),
+            f"{name}: the kernel {'only listens' if state.listen_only else 'takes full part'} on {channel}",
+            advice=advice if options.listen_only else f"{advice}; or say listen_only=yes",
         )
-    if config.listen_only != link.listen_only and link.rate:
-        raise LinkError(
-            f"{config.name}: the kernel {'only listens' if link.listen_only else 'takes full part'} on {channel}",
-            advice=ip_line(channel, rate or link.rate, config.listen_only)
-            + ("" if config.listen_only else "; or say listen_only=yes"),
-        )
-    return link.rate or rate or usual, ()
+    return state.rate or wanted, ()
 
 
-def ip_line(channel: str, rate: int, listen_only: bool) -> str:
-    """What to say to the kernel."""
+def ip_command(channel: str, rate: int, listen_only: bool) -> str:
+    """The shell commands that set up this interface."""
     mode = "on" if listen_only else "off"
     return (
         f"sudo ip link set {channel} down; "

@@ -1,8 +1,7 @@
-"""A link that ends in a simulator of this process, with a clock of its own.
+"""A link to a simulator in this process.
 
-In virtual time nothing ever sleeps: the clock moves only inside `read`, from one event to the next. So ten minutes
-of garbage or a hundred thousand late replies are over in seconds, and the same seed gives the same bytes. The
-same link runs on the real clock when a person wants to watch.
+In virtual time the link never sleeps: its clock moves only inside `read`, from one event to the next, and the same
+seed gives the same bytes. On the real clock it waits.
 """
 
 from __future__ import annotations
@@ -18,20 +17,19 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Line, PerfectLine, Side
 
-BACKLOG = 1 << 20  # requests nobody has read the answers of; more is a runaway writer
+BACKLOG = 1 << 20  # deliveries under way; more means that the program writes without reading
 
 
 class MemoryLink:
-    """A `Link` over a simulator, for bytes or CAN frames.
+    """A `Link` to a simulator, for bytes or CAN frames.
 
-    `rate`           bit/s; the simulator is tuned to it
-    `line`           what lies between: nothing, or faults
-    `virtual`        time passes only inside `read`; False uses the monotonic clock and really waits
-    `pace`           data need their air time: a request reaches the simulator, and a reply the host, when its last
-                     byte has passed, each queued behind what was sent before it: in that direction, or for CAN
-                     frames, whose wire all share, at all. A simulator that is `paced` does so by itself
-    `bits_per_byte`  start and stop bits included
-    `start`          what a virtual clock shows at first; for a simulator that has lived before
+    `rate`           bit/s, also of the simulator
+    `line`           the wire between them
+    `virtual`        time passes only inside `read`; False uses the monotonic clock
+    `pace`           data takes its air time and queues behind earlier data: of its direction, or for CAN frames of the
+                     bus. A simulator with `paced` does this itself
+    `bits_per_byte`  with start and stop bits
+    `start`          first moment (s) of the virtual clock
     """
 
     latency = 0.0
@@ -60,14 +58,12 @@ class MemoryLink:
         self._now = start
         self._under_way: list[tuple[float, int, Side, Data]] = []
         self._arrived: list[Data] = []
-        self._serial = 0
+        self._sequence = 0
         self._free = {Side.HOST: -inf, Side.DEVICE: -inf}
         self._gone_at = self._back_at = inf
         self._closed = False
         self._changed = Condition()
         self.tune(rate)
-
-    # -- what every link offers -----------------------------------------------------------------------------
 
     def now(self) -> float:
         return self._now if self.virtual else time.monotonic()
@@ -77,9 +73,11 @@ class MemoryLink:
             now = self.now()
             self._check(now)
             if self.listen_only:
-                raise LinkError(f"{self.name} only listens: nothing was sent")
+                raise LinkError(f"{self.name} only listens and cannot send")
             if len(self._under_way) >= BACKLOG:
-                raise LinkError(f"{self.name}: {BACKLOG} requests are under way and nobody reads")
+                raise LinkError(
+                    f"{self.name}: {BACKLOG} requests are under way and their replies are not read"
+                )
             self._send(Side.HOST, data, now)
             self._changed.notify_all()
 
@@ -96,25 +94,25 @@ class MemoryLink:
         return None
 
     def due(self) -> float:
-        """The next moment (s) at which something happens here, if nothing is sent before; inf when nothing will."""
+        """Moment (s) of the next event if nothing is sent before; inf when there is none."""
         with self._changed:
-            return -inf if self._arrived else self._next()
+            return -inf if self._arrived else self._next_event()
 
     def close(self) -> None:
         with self._changed:
-            while self._under_way:  # a real port sends what it was given before it closes
+            while self._under_way:  # a real port sends its buffer before it closes
                 at, _, to, data = heappop(self._under_way)
                 if to is Side.DEVICE and not self._closed and self.now() < self._gone_at:
                     self.simulator.receive(data, max(at, self.now()))
             self._closed = True
             self._changed.notify_all()
 
-    # -- for tests ------------------------------------------------------------------------------------------
+    # -- what tests and simulations do with it ------------------------------------------------------------------
 
     def unplug(self, at: float = -inf, seconds: float = inf) -> None:
-        """Pull the adapter, at once or at a moment to come: what is under way then is lost, `LinkLost` is raised.
+        """Unplug the adapter now or at a later moment (s), for so many seconds. Data under way is lost.
 
-        So many `seconds` later it is there again, and works as soon as it has been opened anew (`renew`).
+        The link raises LinkLost until it is renewed.
         """
         with self._changed:
             self._gone_at = at
@@ -122,13 +120,13 @@ class MemoryLink:
             self._changed.notify_all()
 
     def plug(self) -> None:
-        """Put the adapter back; what was under way when it was pulled does not come any more."""
+        """Plug the adapter in again; old data does not arrive any more."""
         with self._changed:
             now = self.now()
             if now >= self._gone_at:
                 self._under_way.clear()
                 self._arrived.clear()
-                self.simulator.advance(now)  # what devices have said meanwhile nobody has heard
+                self.simulator.advance(now)  # drops what devices sent meanwhile
             self._gone_at = self._back_at = inf
 
     def renew(self, losses: int) -> None:
@@ -146,7 +144,7 @@ class MemoryLink:
                 self._changed.wait(moment - self.now())
 
     def advance(self, seconds: float) -> None:
-        """Let virtual time pass without reading; what arrives meanwhile is kept for the next `read`."""
+        """Let virtual time pass without reading; what arrives is kept for the next `read`."""
         with self._changed:
             end = self._now + seconds
             self._happen_until(end)
@@ -154,23 +152,22 @@ class MemoryLink:
 
     @property
     def quiet(self) -> bool:
-        """Nothing is under way, nothing waits to be read, and the adapter is there and stays."""
+        """Nothing is under way or unread, and the adapter is plugged in."""
         return not (self._under_way or self._arrived) and self._gone_at == inf
 
     def inject(self, data: Data, seconds: float = 0.0) -> None:
-        """Deliver data of a foreign sender to the host so many seconds later."""
+        """Deliver data of a foreign sender to the host after so many seconds."""
         with self._changed:
-            self._serial += 1
-            heappush(self._under_way, (self.now() + seconds, self._serial, Side.HOST, data))
+            self._deliver(self.now() + seconds, Side.HOST, data)
             self._changed.notify_all()
 
-    # -- the course of events -------------------------------------------------------------------------------
+    # -- events -------------------------------------------------------------------------------------------------
 
     def _read_virtual(self, until: float) -> list[Data]:
         limit = max(until, self._now)
         while not self._arrived:
             self._check(self._now)
-            moment = max(self._next(), self._now)
+            moment = max(self._next_event(), self._now)
             if moment > limit:
                 break
             self._now = moment
@@ -179,7 +176,7 @@ class MemoryLink:
         if not self._arrived and self._now < limit < inf:
             self._now = limit
             self._happen(limit)
-        return self._taken()
+        return self._take()
 
     def _read_real(self, until: float) -> list[Data]:
         while True:
@@ -187,11 +184,11 @@ class MemoryLink:
             self._check(now)
             self._happen_until(now)
             if self._arrived or now >= until:
-                return self._taken()
-            pause = min(self._next(), until) - now
+                return self._take()
+            pause = min(self._next_event(), until) - now
             self._changed.wait(pause if pause < inf else None)
 
-    def _taken(self) -> list[Data]:
+    def _take(self) -> list[Data]:
         arrived, self._arrived = self._arrived, []
         return arrived
 
@@ -200,11 +197,10 @@ class MemoryLink:
             raise LinkLost(f"{self.name}: the port is closed")
         if now >= self._gone_at:
             raise LinkLost(
-                f"{self.name}: the adapter was unplugged", cause="the simulated adapter was pulled"
+                f"{self.name}: the adapter was unplugged", cause="the simulated adapter was unplugged"
             )
 
-    def _next(self) -> float:
-        """The next moment that matters."""
+    def _next_event(self) -> float:
         if self.now() >= self._gone_at:
             return self._back_at
         due = self.simulator.due()
@@ -212,15 +208,19 @@ class MemoryLink:
         return min(moment, self._under_way[0][0]) if self._under_way else moment
 
     def _happen_until(self, end: float) -> None:
-        while (moment := self._next()) <= end and moment < self._gone_at:
+        while (moment := self._next_event()) <= end and moment < self._gone_at:
             self._happen(moment)
         if end < self._gone_at:
             self._happen(end)
 
     def _happen(self, moment: float) -> None:
-        """Everything of this moment: devices begin to send, and what is under way arrives."""
+        """Process all events of this moment: devices begin to send, and data under way arrives."""
         begun = self.simulator.advance(moment)
-        if begun and self._arrive_at_once(begun[-1][0], moment):
+        other = self._under_way[0][0] if self._under_way else inf
+        is_plain = type(self.line) is PerfectLine and not self.pace
+        if (
+            begun and is_plain and begun[-1][0] <= moment < other
+        ):  # fast path: all of it arrives now, nothing else
             self._arrived += [data for _, data in begun]
             return
         for when, data in begun:
@@ -232,21 +232,17 @@ class MemoryLink:
             else:
                 self.simulator.receive(data, at)
 
-    def _arrive_at_once(self, last: float, moment: float) -> bool:
-        """Whether all that begins up to `last` is there by this moment, and nothing else is: a wire without faults and
-        without pace is most of what a fleet has."""
-        others = self._under_way[0][0] if self._under_way else inf
-        return type(self.line) is PerfectLine and not self.pace and last <= moment < others
-
     def _send(self, sender: Side, data: Data, at: float) -> None:
         if self.pace:
-            wire = Side.HOST if isinstance(data, CanFrame) else sender
+            wire = Side.HOST if isinstance(data, CanFrame) else sender  # CAN has one wire for both directions
             at = self._free[wire] = max(at, self._free[wire]) + self._air_time(data)
         for delivery in self.line.carry(sender, data, at):
-            self._serial += 1  # equal moments arrive in the order they were sent
-            heappush(self._under_way, (delivery.at, self._serial, delivery.to, delivery.data))
+            self._deliver(*delivery)
 
     def _air_time(self, data: Data) -> float:
-        if isinstance(data, CanFrame):
-            return bits(data) / self.rate
-        return len(data) * self.bits_per_byte / self.rate
+        size = bits(data) if isinstance(data, CanFrame) else len(data) * self.bits_per_byte
+        return size / self.rate
+
+    def _deliver(self, at: float, to: Side, data: Data) -> None:
+        self._sequence += 1  # data of one moment arrives in the order in which it was sent
+        heappush(self._under_way, (at, self._sequence, to, data))

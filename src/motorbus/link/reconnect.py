@@ -1,77 +1,185 @@
-"""A port that was lost is opened anew when it is there again: an adapter that was pulled, a server that ended.
+"""Reopen a port that was lost: an adapter that was unplugged, a server that ended.
 
-It is known by what does not change (`identity`), so it is found under another name, and no other adapter is taken for
-it. Nothing waits for it and no thread looks: whoever uses the bus has it looked for, at first soon and then more
-seldom, and is told at once that it is gone. Nothing is kept of what was to be sent. The lock of the port is kept, so
-nobody else gets in between, until something else has its name; then that belongs to whoever opens it (decision record
-0034).
+A name such as /dev/ttyUSB0 goes to the first adapter that is plugged in. So an adapter is recognised by its serial
+number; without one, by vendor, product and USB socket. A pseudo-terminal is recognised by the symbolic link to it, for
+its number goes to the next terminal.
+
+No thread waits for the port: each use of the bus tries to reopen it, soon at first and then less often, and fails at
+once in between. The lock of the port is kept until another adapter has its name (decision record 0034).
 """
 
 from __future__ import annotations
 
 import os
+import re
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import Data
 from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
 from motorbus.link.base import Link
-from motorbus.link.can_config import SOCKETCAND_PORT
-from motorbus.link.identity import PSEUDO_TERMINALS, Lister, another, found_again, identity_of
+from motorbus.link.can_options import SOCKETCAND_PORT
+from motorbus.link.errors import lost
 from motorbus.link.lock import PortLock
-from motorbus.link.refusal import lost
+from motorbus.link.serial import PSEUDO_TERMINALS, list_ports
 from motorbus.link.tcp import split_address
 from motorbus.link.url import open_link
 
-FIRST: Final = 0.05
-"""s after the first look that failed, until the next one; then twice as long each time."""
-LONGEST: Final = 0.5
-"""s between two looks at most: with the time that opening takes it is there within 2 s of its return."""
-PATIENCE: Final = 0.1
-"""s for a host of the network to answer at all, when it is looked for: whoever waits has other things to do."""
-MOST_LINKS: Final = 16
-"""Symbolic links behind one another that are looked at."""
-AGAIN: Final = "it is looked for again whenever something is asked for; nothing of before is sent again"
+FIRST_RETRY: Final = 0.05  # s after the first failure; then twice as long each time
+LAST_RETRY: Final = 0.5  # s at most
+CONNECT_TIME: Final = 0.1  # s for a host of the network: the caller has other work
+MOST_LINKS: Final = 16  # symbolic links in a row
+RETRY_ADVICE: Final = (
+    "it is looked for again whenever something is asked for; nothing of before is sent again"
+)
+_USB_SOCKET: Final = re.compile(r"\d+-\d+(\.\d+)*:\d+\.\d+")
+"""Kernel name of the interface of a USB device: bus-port.port:configuration.interface."""
+
+Lister = Callable[[], Iterable[Any]]
+"""Lists the serial ports, as `serialx.list_serial_ports` does."""
 
 
-class Again(Protocol):
-    """Opens a port anew, at a rate (bit/s), only listening or not, with the lock that is kept for it."""
+class Identity(NamedTuple):
+    """What distinguishes a port of an adapter. `vid` is None for a port that is not on USB.
 
-    def __call__(self, rate: int, listen_only: bool, kept: PortLock) -> Link:
-        """Raises PortNotFound while it is not there, LinkLost where another one is, or what opening a port raises."""
+    `interface` and `number` distinguish the ports of one adapter; `place` is its USB socket, "" when unknown; `device`
+    is the name it had.
+    """
+
+    device: str
+    vid: int | None = None
+    pid: int | None = None
+    serial_number: str = ""
+    interface: int | None = None
+    number: int | None = None
+    place: str = ""
+
+    def __str__(self) -> str:
+        if self.vid is None:
+            return f"the port {self.device}"
+        adapter = f"the adapter {self.vid:04x}:{self.pid or 0:04x}"
+        if self.serial_number:
+            return f"{adapter} with the serial number {self.serial_number}"
+        return f"{adapter} at the USB place {self.place}" if self.place else f"{adapter} at {self.device}"
+
+    def is_same(self, other: Identity) -> bool:
+        """Whether it is the same port of the same adapter."""
+        if self[1:6] != other[1:6]:
+            return False
+        if self.vid is not None and self.serial_number:
+            return True
+        if self.vid is not None and self.place:
+            return self.place == other.place
+        return self.device == other.device
+
+
+def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
+    """The identity of every serial port that the system lists."""
+    return [
+        Identity(
+            device=port.resolved_device,
+            vid=port.vid,
+            pid=port.pid,
+            serial_number=port.serial_number or "",
+            interface=port.interface_num,
+            number=port.port_number,
+            place=usb_socket(port.resolved_device, sysfs) if port.vid is not None else "",
+        )
+        for port in lister()
+    ]
+
+
+def usb_socket(device: str, sysfs: Path = Path("/sys")) -> str:
+    """The USB socket of the adapter of this device; "" when unknown."""
+    parts = Path(os.path.realpath(sysfs / "class" / "tty" / Path(device).name / "device")).parts
+    return next((part for part in reversed(parts) if _USB_SOCKET.fullmatch(part)), "")
+
+
+def identify(device: str, lister: Lister, sysfs: Path = Path("/sys")) -> Identity:
+    """The identity of a port that is present; `device` is a path without symbolic links."""
+    found = (one for one in identities(lister, sysfs) if _same_name(one.device, device))
+    return next(found, Identity(device))
+
+
+def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path("/sys")) -> str:
+    """The present device of an adapter; `name` is what messages call it.
+
+    Raises PortNotFound while it is absent, AnotherAdapter when its name belongs to another one, LinkLost when several
+    could be it.
+    """
+    present = identities(lister, sysfs)
+    same = [one for one in present if wanted.is_same(one)]
+    if len(same) > 1:  # some makers give one number to a whole batch
+        same = [one for one in same if wanted.place and one.place == wanted.place]
+        if len(same) != 1:
+            raise LinkLost(
+                f"{name} is gone, and several adapters could be it",
+                expected=str(wanted),
+                cause="their maker gave all of them one serial number",
+                advice="plug it in where it was, or open the bus again with the right name",
+            )
+    if same:
+        return same[0].device
+    other = next((one for one in present if _same_name(one.device, wanted.device)), None)
+    if other is not None:
+        raise another_adapter(name, wanted, str(other))
+    if wanted.vid is None and os.path.exists(wanted.device):  # a port that the system does not list
+        return wanted.device
+    raise PortNotFound(f"{name}: {wanted} is not there")
+
+
+def another_adapter(name: str, wanted: Identity | str, present: str) -> AnotherAdapter:
+    """The lost port has its name no more: another one has it."""
+    return AnotherAdapter(
+        f"{name} is gone, and there is another in its place: {present}",
+        expected=str(wanted),
+        cause="another adapter was plugged in and got the name of the lost one",
+        advice="plug in the first one, or open the bus again with the right name",
+    )
+
+
+def _same_name(one: str, other: str) -> bool:
+    return one.upper() == other.upper() if os.name == "nt" else one == other
+
+
+Reopen = Callable[[int, bool, PortLock], Link]
+"""Opens a port again: rate (bit/s), listen-only, and the lock that is kept for it.
+
+It raises PortNotFound while the port is absent, LinkLost for another adapter, or what opening raises.
+"""
 
 
 class Reconnecting:
-    """An open link, and how it is opened `again`. `link` is there and has a lock; see `reconnecting`.
+    """A link that is reopened after a loss. `link` holds its lock; see `reconnecting`.
 
-    `moved` is called with the name by which the port is locked when that has changed, and with "" when something else
-    has that name.
+    `on_rename` is called with the new name of the lock, and with "" when another adapter has the name of the port.
     """
 
     virtual = False
     simulated = False
 
-    def __init__(self, link: Any, again: Again) -> None:
+    def __init__(self, link: Any, reopen: Reopen) -> None:
         self.name: str = link.name
         self.paced: bool = link.paced
-        self.moved: Callable[[str], None] = _nobody
-        self._again = again
-        self._turn = Lock()
+        self.on_rename: Callable[[str], object] = str
+        self._reopen = reopen
+        self._access = Lock()
         self._closed = False
-        self._mended = 0  # this loss, and all before, are over
-        self._wait = 0.0
-        self._next = 0.0
+        self._repaired = 0  # losses of the caller that are repaired
+        self._pause = 0.0
+        self._retry_at = 0.0
         self._error: BaseException | None = None
         self._lock: PortLock = link.lock
-        link.lock = self._lock.lent()
-        self._take(link)
+        link.lock = self._lock.borrow()
+        self._use(link)
 
-    def _take(self, link: Any) -> None:
-        """Use this one from now on: its methods are ours, so that nothing comes in between."""
+    def _use(self, link: Any) -> None:
+        """Use this link from now on; its methods become our attributes, which costs no extra call."""
         self._link = link
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
@@ -80,26 +188,24 @@ class Reconnecting:
         self.read = link.read  # type: ignore[method-assign]
         self.write = link.write  # type: ignore[method-assign]
 
-    # -- what every link offers ----------------------------------------------------------------------------------------
-
     @property
     def listen_only(self) -> bool:
-        """Nothing is sent."""
+        """Whether the link cannot send."""
         return bool(getattr(self._link, "listen_only", False))
 
     @property
     def lock_name(self) -> str:
-        """The name by which the port is locked, and listens for an emergency stop; "" where it is not."""
+        """The name under which the port is locked; "" when it is not."""
         return self._lock.port if self._lock.held else ""
 
     def now(self) -> float:
         return time.monotonic()
 
     def write(self, data: Data) -> None:
-        raise self._gone()
+        raise self._loss()
 
     def read(self, until: float) -> list[Data]:
-        raise self._gone()
+        raise self._loss()
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         self._link.tune(rate, listen_only)
@@ -110,208 +216,185 @@ class Reconnecting:
         return descriptor
 
     def trouble(self) -> str:
-        """What the adapter has to say of failures since it was last asked."""
-        told: str = getattr(self._link, "trouble", str)()
-        return told
+        """What the adapter has reported since the last call."""
+        report: str = getattr(self._link, "trouble", str)()
+        return report
 
     def close(self) -> None:
         self._closed = True
-        with self._turn:  # a port that is just being opened is closed as well
+        with self._access:  # also a port that another thread is opening
             self._link.close()
             self._lock.release()
 
     def __getattr__(self, name: str) -> Any:
-        if name == "_link":  # before there is one
+        if name == "_link":  # not assigned yet
             raise AttributeError(name)
         return getattr(self._link, name)
 
-    # -- lost, and found again -----------------------------------------------------------------------------------------
-
     def renew(self, losses: int) -> None:
-        """See `Renewable.renew`. Another thread that is at it is waited for: it may find it."""
-        with self._turn:
+        """See `Renewable.renew`. Waits for another thread that is reopening the port."""
+        with self._access:
             if self._closed:
                 raise lost(self.name, "it is closed")
-            if losses <= self._mended:
+            if losses <= self._repaired:
                 return
-            if time.monotonic() < self._next:
-                raise self._gone()
+            if time.monotonic() < self._retry_at:
+                raise self._loss()
             self._link.close()
-            self._forget()
+            for method in ("read", "write"):  # ours raise the reason
+                self.__dict__.pop(method, None)
             try:
-                self._put(self._again(self.rate, self.listen_only, self._lock))
+                link: Any = self._reopen(self.rate, self.listen_only, self._lock)
             except (MotorbusError, OSError) as error:
-                self._look_later(error)
-                raise self._gone() from error
-            self._mended, self._wait, self._next = losses, 0.0, time.monotonic() + FIRST
+                self._fail(error)
+                raise self._loss() from error
+            self._accept(link)
+            self._repaired, self._pause, self._retry_at = losses, 0.0, time.monotonic() + FIRST_RETRY
+
+    def _fail(self, error: BaseException) -> None:
+        self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
+        self._retry_at = time.monotonic() + self._pause
+        self._error = error
+        if isinstance(error, AnotherAdapter) and self._lock.held:  # any program may open that one
+            self._lock.release()
+            self.on_rename("")
+
+    def _accept(self, link: Any) -> None:
+        """Use the new link, and keep its lock when the name has changed."""
+        link.name = self.name
+        self._error = None
+        renamed = link.lock.held
+        if renamed:
+            before, self._lock = self._lock, link.lock
+            link.lock = self._lock.borrow()
+            before.release()
+        self._use(link)
+        if renamed:
+            self.on_rename(self.lock_name)
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
-        pause = min(until, max(self._next, time.monotonic() + FIRST / 10)) - time.monotonic()
-        if pause > 0:
-            time.sleep(pause)
+        retry = max(self._retry_at, time.monotonic() + FIRST_RETRY / 10)
+        time.sleep(max(0.0, min(until, retry) - time.monotonic()))
 
-    def _forget(self) -> None:
-        """From now on it is gone: what is written or read says why."""
-        for name in ("read", "write"):
-            self.__dict__.pop(name, None)
-
-    def _put(self, link: Any) -> None:
-        """It is there. Its lock is kept from now on; the one of the name before is given back."""
-        link.name = self.name
-        before, own, self._error = self._lock, link.lock, None
-        if own.held:
-            self._lock, link.lock = own, own.lent()
-            before.release()
-        self._take(link)
-        if own.held:
-            self.moved(self.lock_name)
-
-    def _look_later(self, error: BaseException) -> None:
-        self._wait = min(2 * self._wait or FIRST, LONGEST)
-        self._next = time.monotonic() + self._wait
-        self._error = error
-        if isinstance(error, AnotherAdapter) and self._lock.held:  # which may be opened by anybody
-            self._lock.release()
-            self.moved("")
-
-    def _gone(self) -> LinkLost:
+    def _loss(self) -> LinkLost:
         error = self._error
         if isinstance(error, MotorbusError) and not isinstance(error, PortNotFound):
-            summary = (
-                error.summary if isinstance(error, LinkLost) else f"{self.name} is gone: {error.summary}"
-            )
-            advice = f"{error.advice or 'see to that'}; {AGAIN}"
+            summary = error.summary
+            if not isinstance(error, LinkLost):
+                summary = f"{self.name} is gone: {summary}"
+            advice = f"{error.advice or 'check the other end'}; {RETRY_ADVICE}"
             return LinkLost(summary, expected=error.expected, cause=error.cause, advice=advice)
         found = lost(self.name, error.summary if isinstance(error, PortNotFound) else error or "it went away")
-        found.advice = f"see to the other end; {AGAIN}"
+        found.advice = f"check the other end; {RETRY_ADVICE}"
         return found
-
-
-def _nobody(_: str) -> None:
-    """Nobody needs to know by which name the port is locked."""
-
-
-# -- how each kind of port is found again ------------------------------------------------------------------------------
 
 
 def reconnecting(
     link: Link,
     *,
     rate: int = 0,
-    usual: int = 0,
+    default_rate: int = 0,
     kind: str = "bytes",
     options: Mapping[str, object] | None = None,
-    lister: Lister | None = None,
+    lister: Lister = list_ports,
     sysfs: Path = Path("/sys"),
 ) -> Link:
-    """The same link, which is opened anew when it is lost; the other arguments are those it was opened with.
+    """The same link, reopened after a loss; the other arguments are those it was opened with.
 
-    A pseudo-terminal that was called by its own number is not: the next terminal gets that. Nor is what nobody owns.
+    Not for a pseudo-terminal opened by its number, which goes to the next terminal, nor for a port without a lock.
     """
-    lock: PortLock | None = getattr(link, "lock", None)
-    if lock is None or not lock.held:
+    opened: Any = link
+    if getattr(link, "lock", None) is None or not opened.lock.held:
         return link
-    ways = _Ways(link, rate, usual, kind, dict(options or {}))
-    if not ways.device:
-        return Reconnecting(link, ways.anywhere)
-    real = os.path.realpath(ways.device)
-    if real.startswith(PSEUDO_TERMINALS):
-        linked = os.path.abspath(ways.device) != real
-        return Reconnecting(link, ways.linked) if linked else link
-    look = lister or _listed
-    known = identity_of(real, look, sysfs)
+    given = dict(options or {})
 
-    def adapter(rate: int, listen_only: bool, kept: PortLock) -> Link:
-        there = found_again(link.name, known, look, sysfs)
-        found = ways.open(ways.at(there), rate, listen_only, kept)
-        if not known.is_same(now := identity_of(there, look, sysfs)):  # they changed places meanwhile
+    def open_again(port: str, new_rate: int, listen_only: bool, lock: PortLock) -> Link:
+        return open_link(
+            port,
+            rate=rate if new_rate == first_rate else new_rate,  # a rate that was not given is not forced
+            default_rate=default_rate,
+            kind=kind,
+            options={**given, "listen_only": listen_only} if kind == "frames" else given,
+            lock=lock,
+            connect_time=CONNECT_TIME,
+        )
+
+    name, first_rate = link.name, link.rate
+    device: str = opened.device if kind == "frames" else "" if "://" in name else name
+    if not device:
+
+        def server(new_rate: int, listen_only: bool, lock: PortLock) -> Link:
+            check_reachable(name)
+            return open_again(name, new_rate, listen_only, lock)
+
+        return Reconnecting(link, server)
+    real = os.path.realpath(device)
+    if real.startswith(PSEUDO_TERMINALS):
+        if os.path.abspath(device) == real:
+            return link
+        return Reconnecting(link, _Terminal(name, device, open_again))
+    known = identify(real, lister, sysfs)
+    port_at: Callable[[str], str] = opened.port_at if kind == "frames" else str
+
+    def adapter(new_rate: int, listen_only: bool, lock: PortLock) -> Link:
+        present = find_adapter(name, known, lister, sysfs)
+        found = open_again(port_at(present), new_rate, listen_only, lock)
+        if not known.is_same(now := identify(present, lister, sysfs)):  # exchanged meanwhile
             found.close()
-            raise another(link.name, known, str(now))
+            raise another_adapter(name, known, str(now))
         return found
 
     return Reconnecting(link, adapter)
 
 
-def _listed() -> list[Any]:
-    """What the system tells; the library that asks it is imported when a port is opened."""
-    from motorbus.link.serial import listed
+class _Terminal:
+    """A pseudo-terminal behind a symbolic link, which must have been made again."""
 
-    return list(listed())
+    def __init__(
+        self, port: str, device: str, open_again: Callable[[str, int, bool, PortLock], Link]
+    ) -> None:
+        self._port = port
+        self._device = device
+        self._open = partial(open_again, port)
+        self._links = _symbolic_links(device)
 
-
-class _Ways:
-    """How a port was opened, and is again; `device` is the serial port of this machine, "" for any other."""
-
-    def __init__(self, link: Any, rate: int, usual: int, kind: str, options: dict[str, object]) -> None:
-        self.port: str = link.name
-        self.device: str = link.device if kind == "frames" else "" if "://" in self.port else self.port
-        self._at: Callable[[str], str] = link.port_at if kind == "frames" else str
-        self._said, self._had = rate, link.rate
-        self._usual, self._kind, self._options = usual, kind, options
-        self._links = _links(self.device)
-
-    def at(self, device: str) -> str:
-        """The port, as an address says it, where its serial port has this name."""
-        return self._at(device)
-
-    def open(self, port: str, rate: int, listen_only: bool, kept: PortLock) -> Link:
-        """Open it at this rate; a rate that nobody has said is left to whoever sets it."""
-        options = self._options
-        if self._kind == "frames":
-            options = {**options, "listen_only": listen_only}
-        return open_link(
-            port,
-            rate=self._said if rate == self._had else rate,
-            usual=self._usual,
-            kind=self._kind,
-            options=options,
-            kept=kept,
-            patience=PATIENCE,
-        )
-
-    def anywhere(self, rate: int, listen_only: bool, kept: PortLock) -> Link:
-        """A server, or a channel by its name."""
-        knock(self.port)
-        return self.open(self.port, rate, listen_only, kept)
-
-    def linked(self, rate: int, listen_only: bool, kept: PortLock) -> Link:
-        """A pseudo-terminal, wherever the link leads by now."""
-        real = os.path.realpath(self.device)
+    def __call__(self, rate: int, listen_only: bool, lock: PortLock) -> Link:
+        real = os.path.realpath(self._device)
         if not os.path.exists(real):
-            raise PortNotFound(f"{self.device} leads nowhere")
+            raise PortNotFound(f"{self._device} leads nowhere")
         if not real.startswith(PSEUDO_TERMINALS):
-            raise another(self.port, f"a pseudo-terminal, behind {self.device}", real)
-        links = _links(self.device)
-        if links == self._links:  # who was killed has left it behind, and its number is the next terminal's
-            raise PortNotFound(f"{self.device} has not been made anew")
-        found = self.open(self.port, rate, listen_only, kept)
+            raise another_adapter(self._port, f"a pseudo-terminal, behind {self._device}", real)
+        links = _symbolic_links(self._device)
+        if links == self._links:  # left over from a killed simulator, whose number the next terminal gets
+            raise PortNotFound(f"{self._device} has not been made again")
+        found = self._open(rate, listen_only, lock)
         self._links = links
         return found
 
 
-def _links(path: str) -> list[tuple[int, int]]:
-    """The symbolic links that lead from there to a device, each by what changes when it is made anew."""
+def _symbolic_links(path: str) -> list[tuple[int, int]]:
+    """The symbolic links from this path to the device: for each its inode and its time of change."""
     found: list[tuple[int, int]] = []
-    while path and os.path.islink(path) and len(found) < MOST_LINKS:
-        about = os.lstat(path)
-        found.append((about.st_ino, about.st_ctime_ns))
+    while os.path.islink(path) and len(found) < MOST_LINKS:
+        status = os.lstat(path)
+        found.append((status.st_ino, status.st_ctime_ns))
         path = os.path.join(os.path.dirname(path), os.readlink(path))
     return found
 
 
-def knock(port: str) -> None:
-    """Raise PortNotFound soon where a server does not answer: what opens its port would wait for long.
+def check_reachable(port: str) -> None:
+    """Raise PortNotFound soon where a server does not answer and opening its port would wait for long.
 
-    A raw socket is not asked beforehand: it is opened as quickly.
+    A raw socket is not checked: opening it is as fast.
     """
-    where = port.removeprefix("can://slcan/")
+    address = port.removeprefix("can://slcan/")
     if port.startswith("can://socketcand/"):
         host, colon, number = port.removeprefix("can://socketcand/").partition("/")[0].partition(":")
-        where = f"socket://{host}:{number if colon else SOCKETCAND_PORT}"
-    elif where == port and not port.startswith("rfc2217://"):
+        address = f"socket://{host}:{number if colon else SOCKETCAND_PORT}"
+    elif address == port and not port.startswith("rfc2217://"):
         return
     try:
-        socket.create_connection(split_address(where), timeout=PATIENCE).close()
+        socket.create_connection(split_address(address), timeout=CONNECT_TIME).close()
     except OSError as error:
         raise PortNotFound(f"{port} cannot be reached: {error}") from error

@@ -1,4 +1,4 @@
-"""From the port in a bus address to an open link."""
+"""Open the port of a bus address."""
 
 from __future__ import annotations
 
@@ -9,67 +9,60 @@ from motorbus.errors import RequestError
 from motorbus.link.base import Link
 from motorbus.link.lock import PortLock
 
-SCHEMES = ("socket://HOST:PORT", "rfc2217://HOST:PORT")
+SERIAL_PORTS = "a device such as /dev/ttyACM0 or COM7, socket://HOST:PORT or rfc2217://HOST:PORT"
+CAN_CHANNELS = "can://INTERFACE/CHANNEL, as can://slcan/dev/ttyACM0 or can://socketcan/can0"
 
 
 def open_link(
     port: str,
     *,
     rate: int = 0,
-    usual: int = 0,
+    default_rate: int = 0,
     kind: str = "bytes",
     options: Mapping[str, object] | None = None,
-    kept: PortLock | None = None,
-    patience: float | None = None,
+    lock: PortLock | None = None,
+    connect_time: float | None = None,
 ) -> Link:
-    """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://…` or `can://INTERFACE/CHANNEL`.
+    """Open a device (`/dev/ttyACM0`, `COM7`), `socket://host:port`, `rfc2217://host:port` or `can://INTERFACE/CHANNEL`.
 
-    `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the family expects then; `kind` what it
-    wants: bytes or frames; `options` are for the CAN adapter, or say the `latency` (s) of a serial port. `kept` is a
-    lock that we have already, maybe of this port; `patience` how long (s) a host of the network is waited for.
-    Raises RequestError for what is no port, PortNotFound, PortBusy (naming its owner) or LinkError.
+    `rate`          bit/s from the user; 0 when not given
+    `default_rate`  bit/s of the family
+    `kind`          what the family needs, "bytes" or "frames"
+    `options`       of the CAN adapter, or the `latency` (s) of a serial port
+    `lock`          a lock that the caller already holds, possibly of this port
+    `connect_time`  time-out in s for a host of the network
+
+    Raises RequestError for what is not a port, PortNotFound, PortBusy (with the owner) or LinkError.
     """
-    scheme = port.partition("://")[0].lower() if "://" in port else None
-    if scheme == "can" and kind == "frames" and "\0" not in port:
-        from motorbus.link.can import CanLink
-
-        return CanLink(port, rate=rate, usual=usual, options=options or {}, kept=kept)
-    rate = rate or usual
-    _check(port, scheme, rate, kind)
-    link = _serial(port, scheme, rate, kept, patience)
-    said: Mapping[str, Any] = options or {}
-    link.latency = said.get("latency", link.latency)
-    return link
-
-
-def _serial(port: str, scheme: str | None, rate: int, kept: PortLock | None, patience: float | None) -> Link:
-    if scheme == "socket":
-        from motorbus.link.tcp import TcpLink
-
-        more = {} if patience is None else {"patience": patience}
-        return TcpLink(port, rate=rate, kept=kept, **more)
-    from motorbus.link.serial import open_serial
-
-    return open_serial(port, rate=rate, kept=kept, patience=patience)
-
-
-def _check(port: str, scheme: str | None, rate: int, kind: str) -> None:
+    scheme = port.partition("://")[0].lower() if "://" in port else ""
+    expected = CAN_CHANNELS if kind == "frames" else SERIAL_PORTS
     if (kind == "frames") != (scheme == "can"):
         raise RequestError(
             f"{port!r}: these devices speak {'CAN' if kind == 'frames' else 'on a serial line'}",
-            expected="can://INTERFACE/CHANNEL, as can://slcan/dev/ttyACM0 or can://socketcan/can0"
-            if kind == "frames"
-            else f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",
+            expected=expected,
             advice="a simulated bus needs no port: write sim in its place",
         )
-    if scheme not in (None, "socket", "rfc2217", "can"):
-        raise RequestError(
-            f"{port!r}: unknown scheme {scheme!r}",
-            expected=f"a device such as /dev/ttyACM0 or COM7, {' or '.join(SCHEMES)}",
-        )
+    if scheme not in ("", "socket", "rfc2217", "can") or port.startswith("://"):
+        raise RequestError(f"{port!r}: unknown scheme {scheme!r}", expected=expected)
     if not port.strip() or "\0" in port:
-        raise RequestError(
-            f"{port!r} is not a port", expected=f"a device such as /dev/ttyACM0, {' or '.join(SCHEMES)}"
-        )
+        raise RequestError(f"{port!r} is not a port", expected=expected)
+    if scheme == "can":
+        from motorbus.link.can import CanLink
+
+        return CanLink(port, rate=rate, default_rate=default_rate, options=options or {}, lock=lock)
+    rate = rate or default_rate
     if rate <= 0:
         raise RequestError(f"{rate} is not a rate in bit/s", expected="a positive whole number")
+    link: Link
+    if scheme == "socket":
+        from motorbus.link.tcp import CONNECT_TIME, TcpLink
+
+        limit = CONNECT_TIME if connect_time is None else connect_time
+        link = TcpLink(port, rate=rate, lock=lock, connect_time=limit)
+    else:
+        from motorbus.link.serial import open_serial
+
+        link = open_serial(port, rate=rate, lock=lock, connect_time=connect_time)
+    latency: Any = (options or {}).get("latency", link.latency)
+    link.latency = latency
+    return link

@@ -115,7 +115,7 @@ def _link(opening: Opening) -> Link:
         return find(opening.port.removeprefix("sim:"), family.name).link(opening.rate or family.link.rate)
     said: Any = {
         "rate": opening.rate,
-        "usual": family.link.rate,
+        "default_rate": family.link.rate,
         "kind": family.link.kind,
         "options": opening.options,
     }
@@ -128,7 +128,7 @@ def _look_for(bus: BusFace, opening: Opening) -> None:
     if not opening.reconnect:
         bus.reconnects = False
     elif isinstance(bus.link, Reconnecting):
-        bus.link.moved = lambda name: bus.move_stop_socket(socket_path(name) if name else None)
+        bus.link.on_rename = lambda name: bus.move_stop_socket(socket_path(name) if name else None)
 
 
 def _stop_socket(opening: Opening, link: Link) -> Path | None:

@@ -155,4 +155,4 @@ def lock_name(address: str, options: Mapping[str, object]) -> str:
         return opening.port
     from motorbus.link import can
 
-    return can.lock_name(opening.port, opening.options)
+    return can.describe(opening.port, opening.options).lock_name

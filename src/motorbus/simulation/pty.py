@@ -13,7 +13,7 @@ from pathlib import Path
 
 from motorbus.errors import LinkError, RequestError
 from motorbus.link.lock import served_by_simulator
-from motorbus.link.speed import line_speed
+from motorbus.link.serial import line_speed
 
 CHUNK = 4096
 TERMINALS = "/dev/pts/"

@@ -58,25 +58,25 @@ class LinkClient(Participant):
         self.link.close()
 
 
-def join(port: str, rate: int = 0, usual: int = 0, **options: object) -> LinkClient:
+def join(port: str, rate: int = 0, default_rate: int = 0, **options: object) -> LinkClient:
     """Take part in a CAN bus as its devices. Raises what opening such a port raises.
 
-    `rate` in bit/s is what the user said, 0 when nothing, and `usual` what the devices have; `options` are for the
+    `rate` is in bit/s from the user, 0 when not given, and `default_rate` that of the devices; `options` are for the
     adapter.
     """
     if not port.startswith(_CAN):
         raise RequestError(f"{port!r} is no CAN channel", expected="can://INTERFACE/CHANNEL")
     from motorbus.link.can import CanLink
 
-    return LinkClient(CanLink(port, rate=rate, usual=usual, options=options, shared=True))
+    return LinkClient(CanLink(port, rate=rate, default_rate=default_rate, options=options, shared=True))
 
 
 def check_harmless(port: str, options: Mapping[str, object]) -> None:
     """Raises RequestError for a channel that may have real devices, so that no faults may be there; opens nothing."""
     if port.startswith(_CAN):
-        from motorbus.link.can import no_wire
+        from motorbus.link.can import describe
 
-        if not no_wire(port, options):
+        if not describe(port, options).no_wire:
             raise on_a_wire(port)
 
 

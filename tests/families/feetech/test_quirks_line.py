@@ -18,7 +18,7 @@ from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import FAMILY, sync_read, sync_read_positions
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.table import BAUD_CODES
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.mount import Mount
@@ -132,8 +132,8 @@ def test_quirk_18_many_servos_are_read_at_the_price_of_one_question(tmp_path: Pa
     timer = tmp_path / "class" / "tty" / "ttyUSB0" / "device" / "latency_timer"
     timer.parent.mkdir(parents=True)
     timer.write_text("16\n")
-    assert adapters.latency_timer("/dev/ttyUSB0", tmp_path) == 16
-    assert "16 ms" in adapters.latency_warning("/dev/ttyUSB0", 16)
+    assert usb_adapters.latency_timer("/dev/ttyUSB0", tmp_path) == 16
+    assert "16 ms" in usb_adapters.timer_warnings("/dev/ttyUSB0", 16)[0]
 
 
 def test_quirk_21_servos_without_sync_read_are_read_one_by_one() -> None:

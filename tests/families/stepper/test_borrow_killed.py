@@ -25,10 +25,10 @@ from motorbus.link.serial import SerialLink
 KILLED_AT = """
 import os, signal, sys
 from motorbus.cli import main
-from motorbus.link import adapters
+from motorbus.link import usb_adapters
 from motorbus.link.serial import SerialLink
 
-adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
+usb_adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 write, count = SerialLink.write, [0, int(sys.argv[1])]
 
 def doomed(self, data):

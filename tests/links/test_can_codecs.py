@@ -9,14 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.link.can_text import (
-    KEPT,
-    LONGEST,
-    SlcanReader,
-    SocketcandReader,
-    slcan_line,
-    socketcand_element,
-)
+from motorbus.link import slcan, socketcand
+from motorbus.link.slcan import LONGEST, REPLIES_KEPT, SlcanDecoder
+from motorbus.link.socketcand import SocketcandDecoder
 from motorbus.simulation.slcan import SlcanAdapter
 from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.links.can_peer import LONG_PING, PING, remote
@@ -44,8 +39,8 @@ def frames(draw: st.DrawFn) -> CanFrame:
     ],
 )
 def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
-    assert slcan_line(frame) == line
-    assert SlcanReader().feed(line) == [frame]
+    assert slcan.encode(frame) == line
+    assert SlcanDecoder().feed(line) == [frame]
 
 
 @pytest.mark.parametrize(
@@ -58,30 +53,30 @@ def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
     ],
 )
 def test_elements_of_socketcand(frame: CanFrame, element: bytes) -> None:
-    assert socketcand_element(frame) == element
+    assert socketcand.encode(frame) == element
 
 
 @given(frame=frames(), cut=st.integers(0, 40))
 def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None:
-    adapter, reader = SlcanAdapter(), SlcanReader()
+    adapter, reader = SlcanAdapter(), SlcanDecoder()
     adapter.feed(b"S6\rO\r")
     text = adapter.deliver(frame, 1.0)
     assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert adapter.feed(slcan_line(frame)) == [frame]
+    assert adapter.feed(slcan.encode(frame)) == [frame]
 
 
 @given(frame=frames(), cut=st.integers(0, 60))
 def test_what_a_socketcand_server_writes_is_read(frame: CanFrame, cut: int) -> None:
-    server, reader = SocketcandAdapter(), SocketcandReader()
+    server, reader = SocketcandAdapter(), SocketcandDecoder()
     server.feed(b"< open can0 >< rawmode >")
     text = server.deliver(frame, 1.0)
     assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert server.feed(socketcand_element(frame)) == [frame]
+    assert server.feed(socketcand.encode(frame)) == [frame]
 
 
 @given(data=st.binary(max_size=80))
 def test_nothing_makes_a_reader_raise(data: bytes) -> None:
-    for reader, good in ((SlcanReader(), b"\r" + SOME), (SocketcandReader(), b">< frame 625 1.0 40 >")):
+    for reader, good in ((SlcanDecoder(), b"\r" + SOME), (SocketcandDecoder(), b">< frame 625 1.0 40 >")):
         reader.feed(data)
         assert reader.feed(good)[-1:], "the next good frame is read"
 
@@ -89,7 +84,7 @@ def test_nothing_makes_a_reader_raise(data: bytes) -> None:
 @given(place=st.integers(0, 20), byte=st.integers(0, 255))
 def test_one_damaged_character_is_no_frame_or_one_of_its_form(place: int, byte: int) -> None:
     """Only a digit that has become another digit cannot be told: slcan has no checksum."""
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     line = bytearray(SOME)
     line[place] = byte
     for frame in reader.feed(bytes(line)):
@@ -113,26 +108,26 @@ def test_one_damaged_character_is_no_frame_or_one_of_its_form(place: int, byte: 
     ],
 )
 def test_a_line_that_is_no_frame_is_counted(line: bytes) -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     assert reader.feed(line + b"\r" + SOME) == [PING]
-    assert reader.damaged == 1
+    assert reader.counts.damaged == 1
 
 
 def test_timestamps_are_known_by_two_in_a_row() -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     stamped = SOME[:-1] + b"1F3A\r"
     assert reader.feed(stamped) == []
     assert reader.feed(stamped * 2) == [PING, PING]
     assert reader.feed(SOME) == []
     assert reader.feed(stamped) == [PING]
-    assert reader.damaged == 2
+    assert reader.counts.damaged == 2
 
 
 def test_a_length_too_short_by_two_is_no_timestamp() -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     reader.feed(SOME)
     assert reader.feed(b"t62564002600000000000\r") == []
-    assert reader.damaged == 1
+    assert reader.counts.damaged == 1
 
 
 def harmed(line: bytes) -> Iterator[tuple[bytes, bool]]:
@@ -156,9 +151,9 @@ def harmed(line: bytes) -> Iterator[tuple[bytes, bool]]:
 )
 def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFrame) -> None:
     """A line has no checksum: this is all that can go unnoticed, and the next line but one is read again."""
-    for line, is_digit in harmed(slcan_line(frame)):
-        reader = SlcanReader()
-        frames = reader.feed(line + slcan_line(PING) * 2)
+    for line, is_digit in harmed(slcan.encode(frame)):
+        reader = SlcanDecoder()
+        frames = reader.feed(line + slcan.encode(PING) * 2)
         assert frames[-1] == PING
         others = [one for one in frames if one not in (frame, PING)]
         assert is_digit or not others, (line, others)
@@ -166,47 +161,47 @@ def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFr
 
 
 def test_answers_are_no_frames() -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     assert reader.feed(b"\rz\rZ\rV1013\rNSIMU\rF00\rA\r") == []
-    assert (reader.damaged, reader.answers) == (0, [True] * 7)
+    assert (reader.counts.damaged, reader.replies) == (0, [True] * 7)
     reader.feed(b"\a\n\r")
-    assert (reader.refused, reader.answers[-2:]) == (1, [False, True])
+    assert (reader.counts.refused, reader.replies[-2:]) == (1, [False, True])
     reader.forget()
-    assert reader.answers == []
+    assert reader.replies == []
 
 
 def test_answers_are_not_kept_for_ever() -> None:
     """Every frame that is sent brings one."""
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     reader.feed(b"\r\a" + b"z\r" * 100_000)
-    assert reader.answers[:3] == [True, False, True]
-    assert len(reader.answers) == KEPT
+    assert reader.replies[:3] == [True, False, True]
+    assert len(reader.replies) == REPLIES_KEPT
 
 
 def test_a_refusal_in_the_midst_of_a_line_damages_it() -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     assert reader.feed(b"t6258400\a" + SOME) == [PING]
-    assert (reader.damaged, reader.refused) == (1, 1)
+    assert (reader.counts.damaged, reader.counts.refused) == (1, 1)
 
 
 def test_frames_of_can_fd_are_foreign() -> None:
-    reader = SlcanReader()
+    reader = SlcanDecoder()
     assert reader.feed(b"d1239" + b"00" * 12 + b"\r") == []
-    assert (reader.foreign, reader.damaged) == (1, 0)
+    assert (reader.counts.dropped, reader.counts.damaged) == (1, 0)
 
 
-@pytest.mark.parametrize("reader", [SlcanReader(), SocketcandReader()])
-def test_what_does_not_end_is_given_up(reader: SlcanReader | SocketcandReader) -> None:
+@pytest.mark.parametrize("reader", [SlcanDecoder(), SocketcandDecoder()])
+def test_what_does_not_end_is_given_up(reader: SlcanDecoder | SocketcandDecoder) -> None:
     for _ in range(40):
         reader.feed(b"x" * 100)
-    assert reader.damaged >= 40 * 100 // (LONGEST + 100)
+    assert reader.counts.damaged >= 40 * 100 // (LONGEST + 100)
 
 
 def test_errors_on_the_bus_of_a_server() -> None:
-    reader = SocketcandReader()
+    reader = SocketcandDecoder()
     assert reader.feed(b"< error 004 1.5 >") == [CanFrame(0x4 | ERROR_FLAG, bytes(8))]
     assert reader.feed(b"< error unknown command >") == []
-    assert (reader.refused, reader.damaged) == (1, 0)
+    assert (reader.counts.refused, reader.counts.damaged) == (1, 0)
 
 
 @pytest.mark.parametrize(
@@ -224,14 +219,14 @@ def test_errors_on_the_bus_of_a_server() -> None:
     ],
 )
 def test_an_element_that_is_no_frame_is_counted(element: bytes) -> None:
-    reader = SocketcandReader()
+    reader = SocketcandDecoder()
     assert reader.feed(element + b"< frame 625 1.0  >") == [CanFrame(0x625, b"")]
-    assert reader.damaged == 1
+    assert reader.counts.damaged == 1
 
 
 def test_other_elements_are_let_be() -> None:
-    reader = SocketcandReader()
+    reader = SocketcandDecoder()
     assert reader.feed(b"< hi >< ok > < echo > < > < frame 00000625 1.000000 AB CD >") == [
         CanFrame(0x625, b"\xab\xcd", True)
     ]
-    assert (reader.damaged, reader.refused) == (0, 0)
+    assert (reader.counts.damaged, reader.counts.refused) == (0, 0)

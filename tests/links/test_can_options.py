@@ -10,7 +10,7 @@ import can
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.link.can_config import CanConfig, configured, parameters, split_port
+from motorbus.link.can_options import CanOptions, parameters, parse_port, read_options
 
 BITS: dict[str, Any] = {
     "f_clock": "8000000",
@@ -22,8 +22,8 @@ BITS: dict[str, Any] = {
 }
 
 
-def config(port: str, rate: int = 0, **options: object) -> CanConfig:
-    return configured(can, port, rate, options)
+def config(port: str, rate: int = 0, **options: object) -> CanOptions:
+    return read_options(can, port, rate, options)
 
 
 @pytest.mark.parametrize(
@@ -47,13 +47,13 @@ def config(port: str, rate: int = 0, **options: object) -> CanConfig:
     ],
 )
 def test_an_address_and_its_parts(port: str, interface: str, said: dict[str, object]) -> None:
-    assert split_port(port) == (interface, said)
+    assert parse_port(port) == (interface, said)
 
 
 @pytest.mark.parametrize("port", ["can:///can0", "can://socketcand/box", "can://socketcand/:4/can0"])
 def test_an_address_with_a_gap(port: str) -> None:
     with pytest.raises(RequestError, match="can://"):
-        split_port(port)
+        parse_port(port)
 
 
 def test_what_the_user_says_wins(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,7 +85,7 @@ def test_a_file_that_is_no_configuration(monkeypatch: pytest.MonkeyPatch, tmp_pa
 def test_a_part_of_a_bit_timing_in_a_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_CONFIG", '{"f_clock": 8000000, "brp": 1}')
     found = config("can://slcan/dev/x", 500_000)
-    assert (found.rate, found.bits) == (500_000, 0)
+    assert (found.rate, found.timing_rate) == (500_000, 0)
     assert found.warnings == (
         "python-can's configuration says f_clock=8000000, brp=1, which is no whole bit timing: ignored",
     )
@@ -168,7 +168,7 @@ def test_neither_yes_nor_no() -> None:
 
 def test_a_bit_timing_sets_the_rate() -> None:
     found = config("can://slcan/dev/ttyACM0", **BITS)
-    assert found.bits == 800_000
+    assert found.timing_rate == 800_000
     assert set(found.settings) == {"timing"}
 
 

@@ -1,4 +1,4 @@
-"""What a USB adapter is and how long it holds a byte back, told from its ids and from what the kernel says of it."""
+"""USB adapters: which one it is, from its USB ids, and how long it holds a byte back."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-USB_TIME = 0.003  # s; a USB full-speed frame each way, and the host's own turn
-DEVICE_LATENCY = 0.004  # s; adapters without a timer hand bytes over within 2 to 4 ms
-WINDOWS_LATENCY = 0.019  # s; FTDI's 16 ms cannot be asked for there, so it is assumed
-TERMINAL_LATENCY = 0.002  # s; a pseudo-terminal has no adapter, only two processes to be scheduled
-FAST_TIMER = 1  # ms; the least an FTDI latency timer can be set to
+USB_TIME = 0.003  # s; one USB full-speed frame each way and the host's own time
+DEVICE_LATENCY = 0.004  # s; adapters without a timer deliver bytes within 2 to 4 ms
+WINDOWS_LATENCY = 0.019  # s; Windows does not tell the latency timer, so FTDI's 16 ms is assumed
+TERMINAL_LATENCY = 0.002  # s; a pseudo-terminal has no adapter, but two processes are scheduled
+FAST_TIMER = 1  # ms; the lowest FTDI latency timer
 
 KERNEL_CH341 = "Linux drivers/usb/serial/ch341.c"
 KERNEL_FTDI = "Linux drivers/usb/serial/ftdi_sio_ids.h"
@@ -21,15 +21,11 @@ WCH_DRIVER = "WCH ch343ser_linux driver"
 
 
 class Adapter(NamedTuple):
-    """A kind of adapter: its chip, where it is usually met, and who says so."""
+    """A kind of adapter: its chip, where it is common, and the source of its ids."""
 
     chip: str
-    usual: str
+    common: str
     source: str
-
-    @property
-    def guess(self) -> str:
-        return f"{self.chip}: {self.usual}" if self.usual else self.chip
 
 
 ADAPTERS: Final[Mapping[tuple[int, int], Adapter]] = MappingProxyType(
@@ -50,7 +46,7 @@ ADAPTERS: Final[Mapping[tuple[int, int], Adapter]] = MappingProxyType(
         (0x10C4, 0xEA60): Adapter("CP210x", "usual on ESP32 boards", KERNEL_CP210X),
         (0x067B, 0x2303): Adapter("PL2303", "", KERNEL_PL2303),
         (0x0483, 0x5740): Adapter(
-            "STM32", "usual on controller boards with their own USB", "craigm26/OpenCastor#527"
+            "STM32", "usual on controller boards with own USB", "craigm26/OpenCastor#527"
         ),
         (0x2E8A, 0x000A): Adapter("RP2040", "a board that passes bytes on", "Raspberry Pi Pico SDK, usb_pid"),
         (0x303A, 0x1001): Adapter("ESP32", "its own USB port", "Espressif USB Serial/JTAG, ESP-IDF"),
@@ -61,8 +57,8 @@ ADAPTERS: Final[Mapping[tuple[int, int], Adapter]] = MappingProxyType(
 class PortInfo(NamedTuple):
     """A serial port of this machine.
 
-    `stable` is the name under /dev/serial/by-id, which stays when other adapters come and go; "" where there is
-    none. `guess` is what the adapter probably is, "" when it is not in the table.
+    `stable` is its name under /dev/serial/by-id, which does not depend on the order of plugging; "" where there is
+    none. `guess` says what the adapter probably is; "" for unknown ids.
     """
 
     device: str
@@ -76,33 +72,39 @@ class PortInfo(NamedTuple):
 
     @property
     def description(self) -> str:
-        """What the adapter says it is."""
+        """Manufacturer and product as the adapter reports them."""
         return " ".join(part for part in (self.manufacturer, self.product) if part)
 
 
 def guess(vid: int | None, pid: int | None) -> str:
-    """What an adapter with these ids probably is; "" when unknown."""
-    if vid is None or pid is None:
+    """What an adapter with these ids probably is; "" for unknown ids."""
+    adapter = ADAPTERS.get((vid, pid)) if vid is not None and pid is not None else None
+    if adapter is None:
         return ""
-    adapter = ADAPTERS.get((vid, pid))
-    return adapter.guess if adapter else ""
+    return f"{adapter.chip}: {adapter.common}" if adapter.common else adapter.chip
 
 
 def latency_timer(device: str, sysfs: Path = Path("/sys")) -> int | None:
-    """Milliseconds that an FTDI adapter collects bytes before it hands them over; None for any other adapter."""
+    """Milliseconds for which an FTDI adapter collects bytes; None for any other adapter."""
     try:
-        text = (sysfs / "class" / "tty" / Path(device).name / "device" / "latency_timer").read_text()
-        return int(text)
+        return int((sysfs / "class" / "tty" / Path(device).name / "device" / "latency_timer").read_text())
     except (OSError, ValueError):
         return None
 
 
-def latency_warning(device: str, timer: int) -> str:
-    """What the user ought to know about this latency timer, and how to make it fast."""
-    name = Path(device).name
-    return (
+def timer_latency(timer: int) -> float:
+    """Latency (s) of an adapter with this latency timer (ms)."""
+    return timer / 1000 + USB_TIME
+
+
+def timer_warnings(device: str, timer: int) -> tuple[str, ...]:
+    """A warning with the remedy when the latency timer (ms) is slow; empty when it is fast."""
+    if timer <= FAST_TIMER:
+        return ()
+    remedy = f"echo {FAST_TIMER} > /sys/bus/usb-serial/devices/{Path(device).name}/latency_timer"
+    rule = f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{{latency_timer}}="{FAST_TIMER}"'
+    warning = (
         f"its latency timer is {timer} ms, which allows about {1000 // (timer + 1)} reads a second; set it to"
-        f" {FAST_TIMER} ms: as root, echo {FAST_TIMER} > /sys/bus/usb-serial/devices/{name}/latency_timer; for good,"
-        ' in /etc/udev/rules.d/99-motorbus.rules: ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio",'
-        f' ATTR{{latency_timer}}="{FAST_TIMER}"'
+        f" {FAST_TIMER} ms: as root, {remedy}; permanently, in /etc/udev/rules.d/99-motorbus.rules: {rule}"
     )
+    return (warning,)

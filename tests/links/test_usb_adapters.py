@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.link.adapters import ADAPTERS, PortInfo, guess, latency_timer, latency_warning
+from motorbus.link.usb_adapters import ADAPTERS, PortInfo, guess, latency_timer, timer_warnings
 
 
 def timer_file(sysfs: Path, name: str) -> Path:
@@ -57,7 +57,7 @@ def test_nonsense_in_its_place_is_no_timer(tmp_path: Path) -> None:
 
 
 def test_the_warning_says_what_it_costs_and_what_to_do() -> None:
-    told = latency_warning("/dev/ttyUSB0", 16)
+    [told] = timer_warnings("/dev/ttyUSB0", 16)
     assert "16 ms" in told
     assert "58 reads a second" in told
     assert "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in told

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import time
 from collections.abc import Iterator
+from threading import Thread
 
 import pytest
 
-from motorbus.link import waiting
-from motorbus.link.waiting import is_readable, wait_any, wait_readable
+from motorbus.link import wait
+from motorbus.link.wait import Readiness, wait_any, wait_readable
 
 
 @pytest.fixture
@@ -22,7 +25,7 @@ def pipe() -> Iterator[tuple[int, int]]:
 @pytest.fixture(params=["select", "poll"], autouse=True)
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "poll":
-        monkeypatch.setattr(waiting, "LIMIT", 0)
+        monkeypatch.setattr(wait, "SELECT_LIMIT", 0)
 
 
 def test_what_is_there_is_seen(pipe: tuple[int, int]) -> None:
@@ -34,16 +37,40 @@ def test_nothing_is_nothing(pipe: tuple[int, int]) -> None:
     assert not wait_readable(pipe[0], 0.001)
 
 
-def test_a_look_sees_what_is_there_and_what_has_ended(pipe: tuple[int, int]) -> None:
-    assert not is_readable(pipe[0])
+def test_a_registered_descriptor_waits_the_same(pipe: tuple[int, int]) -> None:
+    ready = Readiness(pipe[0])
+    begin = time.monotonic()
+    assert not ready.wait(0.0015)
+    assert time.monotonic() - begin >= 0.0015
+    assert not ready.wait(0.0)
+    assert not ready.wait(float("-inf"))
     os.write(pipe[1], b"x")
-    assert is_readable(pipe[0])
-    reader, writer = os.pipe()
-    os.close(writer)
-    assert is_readable(reader)
-    os.close(reader)
-    with pytest.raises((OSError, ValueError)):
-        is_readable(-1)
+    assert ready.wait(0.0)
+    assert ready.wait(float("inf"))
+
+
+def test_two_threads_may_wait_for_one_descriptor(pipe: tuple[int, int]) -> None:
+    ready = Readiness(pipe[0])
+    found: list[bool] = []
+    threads = [Thread(target=lambda: found.append(ready.wait(30.0))) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    time.sleep(0.01)
+    os.write(pipe[1], b"x")
+    for thread in threads:
+        thread.join()
+    assert found == [True] * 3
+
+
+def test_a_descriptor_above_the_limit_of_select(pipe: tuple[int, int]) -> None:
+    high = fcntl.fcntl(pipe[0], fcntl.F_DUPFD, 1500)
+    try:
+        ready = Readiness(high)
+        assert not ready.wait(0.0005)
+        os.write(pipe[1], b"x")
+        assert ready.wait(1.0)
+    finally:
+        os.close(high)
 
 
 def test_the_end_of_the_other_side_is_seen(pipe: tuple[int, int]) -> None:

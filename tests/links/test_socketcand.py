@@ -11,7 +11,7 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost
-from motorbus.link import can_socketcand
+from motorbus.link import socketcand
 from tests.links.can_peer import PING, PONG, open_can, serving, socketcand_server, some
 
 
@@ -47,14 +47,14 @@ def test_a_server_of_another_kind(words: tuple[bytes, ...], complaint: str) -> N
 
 
 def test_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.05)
+    monkeypatch.setattr(socketcand, "REPLY_TIME", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(LinkError, match="does not greet"):
         open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
 
 
 @pytest.mark.parametrize("word", [b"x", b"x" * 4096])
 def test_a_server_that_talks_without_end(monkeypatch: pytest.MonkeyPatch, word: bytes) -> None:
-    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
+    monkeypatch.setattr(socketcand, "REPLY_TIME", 0.1)
     over = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
@@ -76,7 +76,7 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
     monkeypatch: pytest.MonkeyPatch, words: tuple[bytes, ...]
 ) -> None:
     """It has greeted who knocked; python-can would wait for it without end."""
-    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 10.0)
+    monkeypatch.setattr(socketcand, "REPLY_TIME", 10.0)
     with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as ends:
         scripts = iter([(b"< hi >", b"< ok >"), words])
 
@@ -86,7 +86,7 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
                 if number:
                     connection.recv(256)
                     # for what is said after this one
-                    monkeypatch.setattr(can_socketcand, "ANSWER_TIME", 0.1)
+                    monkeypatch.setattr(socketcand, "REPLY_TIME", 0.1)
                 connection.sendall(word)
             return True
 
@@ -131,5 +131,5 @@ def test_errors_and_damage() -> None:
         assert some(link) == [PONG]
         peer.say(b"< error 004 1.0 >", b"< frame 123 1.0 >< frame 123 1.0 4 ><", PONG)
         assert some(link, 3) == [CanFrame(ERROR_FLAG | 4, bytes(8)), CanFrame(0x123, b""), PONG]
-        assert link.damaged == 2
+        assert link.counts.damaged == 2
         link.close()

@@ -9,15 +9,16 @@ import pytest
 
 from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkError, LinkLost
-from motorbus.link import can_slcan
-from motorbus.link.adapters import TERMINAL_LATENCY
-from motorbus.link.can_config import configured
-from motorbus.link.can_slcan import SlcanWire, command_of, timing
+from motorbus.link import slcan
+from motorbus.link.can_channel import Port
+from motorbus.link.can_options import read_options
+from motorbus.link.slcan import SlcanChannel, port_timing, rate_command
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
+from motorbus.link.usb_adapters import TERMINAL_LATENCY
 from motorbus.simulation.slcan import SlcanAdapter
 from tests.links.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
 
-pytestmark = pytest.mark.usefixtures("patience")
+pytestmark = pytest.mark.usefixtures("long_timeouts")
 
 
 class Cramped:
@@ -27,14 +28,12 @@ class Cramped:
         self.frames: list[CanFrame] = []
         self._adapter = adapter
         self._room = room
+        self.port = Port(self.receive, self.send, None)
 
-    def fileno(self) -> None:
-        return None
+    def receive(self, size: int) -> bytes:
+        raise BlockingIOError
 
-    def read(self) -> bytes:
-        return b""
-
-    def write(self, data: bytes) -> int:
+    def send(self, data: bytes) -> int:
         data, self._room = data[: self._room], 1000
         self.frames += self._adapter.feed(data)
         return len(data)
@@ -46,7 +45,7 @@ def test_it_is_told_the_rate_and_opened_once(strict: bool) -> None:
     with on_terminal(adapter) as peer:
         link = open_can(peer, 250_000)
         assert adapter.told == [b"C", b"S5", b"O"]
-        assert (adapter.bitrate, adapter.open, link.refused) == (250_000, True, 0)
+        assert (adapter.bitrate, adapter.open, link.counts.refused) == (250_000, True, 0)
         link.write(PING)
         assert some(link) == [PONG]
         link.close()
@@ -54,7 +53,7 @@ def test_it_is_told_the_rate_and_opened_once(strict: bool) -> None:
 
 
 def test_a_mute_adapter_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(can_slcan, "LISTENING", 0.01)
+    monkeypatch.setattr(slcan, "FIRST_REPLY", 0.01)
     with on_terminal(Mute()) as peer:
         link = open_can(peer)
         link.write(PING)
@@ -75,8 +74,8 @@ def test_a_rate_that_the_adapter_refuses(strict: bool) -> None:
 
 def test_a_refusal_that_comes_late_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """The adapter was taken for mute, and then answered everything at once."""
-    monkeypatch.setattr(can_slcan, "LISTENING", 0.0)
-    monkeypatch.setattr(can_slcan, "MUTE", 10.0)
+    monkeypatch.setattr(slcan, "FIRST_REPLY", 0.0)
+    monkeypatch.setattr(slcan, "SILENT_PAUSE", 10.0)
     adapter = Picky(b"S6")
     with on_terminal(adapter) as peer, pytest.raises(LinkError, match="refuses 500000"):
         open_can(peer, 500_000)
@@ -85,8 +84,8 @@ def test_a_refusal_that_comes_late_counts(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_refusal_that_comes_after_it_was_opened_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """As over Bluetooth: the first answers come when somebody reads already. Nothing goes out at a wrong rate then."""
-    monkeypatch.setattr(can_slcan, "LISTENING", 0.0)
-    monkeypatch.setattr(can_slcan, "MUTE", 0.0)
+    monkeypatch.setattr(slcan, "FIRST_REPLY", 0.0)
+    monkeypatch.setattr(slcan, "SILENT_PAUSE", 0.0)
     adapter = Mute()
     with on_terminal(adapter) as peer:
         link = open_can(peer, 500_000)
@@ -112,10 +111,10 @@ def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
 def test_a_fork_that_closes_leaves_the_channel_to_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     adapter = SlcanAdapter()
     adapter.feed(b"S6\rO\r")
-    wire = SlcanWire("it", Cramped(adapter, 1000), lambda: None)
-    wire._is_open = True
+    channel = SlcanChannel("it", Cramped(adapter, 1000).port, lambda: None)
+    channel._is_open = True
     monkeypatch.setattr("os.getpid", lambda: 1)
-    wire.close()
+    channel.close()
     assert adapter.open
 
 
@@ -124,13 +123,14 @@ def test_a_line_cut_off_by_closing_is_no_frame(sent: int) -> None:
     """C, which closes the channel, is a hexadecimal digit as well."""
     adapter = SlcanAdapter()
     adapter.feed(b"S6\rO\r")
-    wire = SlcanWire("it", Cramped(adapter, sent), lambda: None)
-    wire._is_open = True
+    cramped = Cramped(adapter, sent)
+    channel = SlcanChannel("it", cramped.port, lambda: None)
+    channel._is_open = True
     with pytest.raises(LinkError, match="no more bytes"):
-        wire.write(PING)
-    wire.close()
+        channel.write(PING)
+    channel.close()
     assert not adapter.open
-    assert wire._port.frames == []  # type: ignore[attr-defined]
+    assert cramped.frames == []
 
 
 @pytest.mark.parametrize(("options", "command"), [({}, b"O"), ({"listen_only": "yes"}, b"L")])
@@ -182,10 +182,10 @@ def test_damage_is_counted_and_survived() -> None:
         link = open_can(peer)
         peer.say(b"t62\xff\r", b"t6254\r", b"t625x\r", b"garbage", b"\r", PONG)
         assert some(link) == [PONG]
-        assert link.damaged == 4
+        assert link.counts.damaged == 4
         peer.say(b"\a\a", PONG)
         assert some(link) == [PONG]
-        assert link.refused == 2
+        assert link.counts.refused == 2
         assert "refused 2 frames" in link.trouble()
         assert link.trouble() == "", "told once"
         peer.say(b"t6254\r", PONG)
@@ -215,17 +215,20 @@ def test_an_adapter_that_is_unplugged() -> None:
     ],
 )
 def test_how_long_an_adapter_holds_a_frame_back(channel: str, latency: float) -> None:
-    assert timing(channel, {})[:2] == (latency, ())
+    assert port_timing(channel, {})[:2] == (latency, ())
 
 
 def test_a_slow_serial_line_takes_its_time() -> None:
-    quick, slow = timing("/dev/ttyACM0@1000000", {})[0], timing("/dev/ttyACM0", {"tty_baudrate": 57_600})[0]
+    quick, slow = (
+        port_timing("/dev/ttyACM0@1000000", {})[0],
+        port_timing("/dev/ttyACM0", {"tty_baudrate": 57_600})[0],
+    )
     assert quick < 0.01 < slow
 
 
 def test_the_command_for_a_rate() -> None:
     back_end = can.interface._get_class_for_interface("slcan")
-    plain = configured(can, "can://slcan/dev/x", 0, {})
-    assert command_of(plain, back_end, 20_000) == "S1"
+    plain = read_options(can, "can://slcan/dev/x", 0, {})
+    assert rate_command(plain, back_end, 20_000) == "S1"
     bits = {"f_clock": 8000000, "brp": 1, "tseg1": 7, "tseg2": 2, "sjw": 1, "nof_samples": 1}
-    assert command_of(configured(can, "can://slcan/dev/x", 0, bits), back_end, 800_000) == "s0016"
+    assert rate_command(read_options(can, "can://slcan/dev/x", 0, bits), back_end, 800_000) == "s0016"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.link.foreign import who_holds
+from motorbus.link.port_users import find_user
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process
 
@@ -28,16 +28,16 @@ sys.stdin.read()
 
 
 def test_a_port_that_nobody_has_is_free(master: PtyMaster) -> None:
-    assert who_holds(master.slave_name) is None
+    assert find_user(master.slave_name) is None
 
 
 def test_a_program_without_any_lock_is_found(master: PtyMaster) -> None:
     with other_process(HOLD, master.slave_name) as process:
-        owner = who_holds(master.slave_name)
+        owner = find_user(master.slave_name)
         assert owner is not None
         assert (owner.pid, owner.port) == (process.pid, master.slave_name)
         assert owner.program.startswith("python")
-    assert who_holds(master.slave_name) is None
+    assert find_user(master.slave_name) is None
 
 
 def test_a_script_is_named_by_its_file(master: PtyMaster, tmp_path: Path) -> None:
@@ -45,16 +45,16 @@ def test_a_script_is_named_by_its_file(master: PtyMaster, tmp_path: Path) -> Non
     (proc / "77" / "fd").mkdir(parents=True)
     (proc / "77" / "fd" / "3").symlink_to(master.slave_name)
     (proc / "77" / "cmdline").write_bytes(b"/usr/bin/python3\0/opt/arm/teleop.py\0--fast\0")
-    assert who_holds(master.slave_name, proc) == (77, "teleop.py", master.slave_name)
+    assert find_user(master.slave_name, proc) == (77, "teleop.py", master.slave_name)
 
 
 def test_the_simulator_behind_a_pseudo_terminal_is_not_its_user(tmp_path: Path) -> None:
     with other_process(SERVE, str(tmp_path / "arm")):
         device = os.path.realpath(tmp_path / "arm")
         assert device.startswith("/dev/pts/")
-        assert who_holds(device) is None
+        assert find_user(device) is None
         with other_process(HOLD, device) as user:
-            owner = who_holds(device)
+            owner = find_user(device)
             assert owner is not None
             assert owner.pid == user.pid
 
@@ -69,10 +69,10 @@ def test_the_same_name_in_a_container_is_another_device(
     (tmp_path / "tty").symlink_to("/dev/null")
     (descriptors / "tty").symlink_to(theirs)
     (descriptors / "3").symlink_to("tty")
-    assert (who_holds("tty", tmp_path / "proc") is not None) is is_found
+    assert (find_user("tty", tmp_path / "proc") is not None) is is_found
 
 
 @pytest.mark.parametrize("gone", ["no such folder", "."])
 def test_where_nothing_is_told_nobody_is_found(gone: str, master: PtyMaster, tmp_path: Path) -> None:
     (tmp_path / "78").mkdir()
-    assert who_holds(master.slave_name, tmp_path / gone) is None
+    assert find_user(master.slave_name, tmp_path / gone) is None

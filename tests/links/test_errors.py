@@ -7,8 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.link.adapters import PortInfo
-from motorbus.link.refusal import Owner, busy, forbidden, full, lost, no_port, not_found, wrong_rate
+from motorbus.link.errors import (
+    Owner,
+    busy,
+    full,
+    lost,
+    no_permission,
+    not_a_port,
+    not_found,
+    unsupported_rate,
+)
+from motorbus.link.usb_adapters import PortInfo
 
 ACM = PortInfo(
     "/dev/ttyACM0", "", 0x1A86, 0x55D3, "", "", "USB Single Serial", "CH343: usual on servo boards"
@@ -34,9 +43,9 @@ def test_a_machine_without_ports_says_so() -> None:
     ],
 )
 def test_what_is_no_port_comes_with_those_that_are_ports(port: str, device: str, says: str) -> None:
-    error = no_port(port, [PLAIN], device)
+    error = not_a_port(port, [PLAIN], device)
     assert (error.summary, error.expected) == (says, "one of /dev/ttyS0")
-    assert error.advice == "`motorbus ports` lists what there is; nothing was sent"
+    assert error.advice == "`motorbus ports` lists what there is"
 
 
 def test_a_symbolic_link_that_leads_nowhere_is_recognised(tmp_path: Path) -> None:
@@ -49,7 +58,7 @@ def test_a_port_without_a_folder_says_relative_to_what_it_is(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     told = not_found("ttyACM9", [])
-    assert told.cause.endswith(f"relative to the folder in which this program runs: {tmp_path}/ttyACM9")
+    assert told.cause.endswith(f"relative to the working directory: {tmp_path}/ttyACM9")
     assert f"{tmp_path}/there/bus" in not_found("./there/bus", []).cause
     assert not_found("tty", []).advice.startswith("did you mean /dev/tty? ")
     assert "did you mean" not in told.advice
@@ -70,13 +79,13 @@ def test_programs_that_grab_adapters_are_known(program: str) -> None:
 
 @pytest.mark.parametrize("group", ["dialout", "uaccess"])
 def test_no_permission_says_how_to_get_it(group: str) -> None:
-    assert group in str(forbidden("/dev/ttyACM0", "/dev/null"))
+    assert group in str(no_permission("/dev/ttyACM0", "/dev/null"))
 
 
 def test_the_group_is_the_one_of_the_device(tmp_path: Path) -> None:
     (tmp_path / "device").touch()
     os.chown(tmp_path / "device", -1, os.getgid())
-    told = str(forbidden("/dev/ttyACM0", str(tmp_path / "device")))
+    told = str(no_permission("/dev/ttyACM0", str(tmp_path / "device")))
     assert "usermod -aG root" not in told
     assert "usermod -aG" in told
 
@@ -90,5 +99,5 @@ def test_the_reason_of_a_loss_is_told() -> None:
 
 
 def test_figures_are_told() -> None:
-    assert "76800 bit/s" in str(wrong_rate("/dev/ttyACM0", 76_800, "no"))
+    assert "76800 bit/s" in str(unsupported_rate("/dev/ttyACM0", 76_800, "no"))
     assert "3 of 8" in str(full("/dev/ttyACM0", 3, 8))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import socket
 from types import SimpleNamespace
 from typing import Any
@@ -13,17 +12,9 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost
-from motorbus.link.can_text import SlcanReader, slcan_line
-from motorbus.link.can_wire import (
-    BUS_OFF,
-    MOST,
-    BusWire,
-    TextWire,
-    build,
-    frame_of,
-    quietly,
-    refuse_bus_off,
-)
+from motorbus.link.can import BUS_OFF, check_bus_off
+from motorbus.link.can_channel import MOST_FRAMES, BusChannel, Port, TextChannel, frame_of, open_bus
+from motorbus.link.slcan import SlcanDecoder, encode
 from tests.links.can_peer import PING
 
 
@@ -35,14 +26,13 @@ class Narrow:
         self.written = b""
         self.coming = b""
 
-    def fileno(self) -> int | None:
-        return None
-
-    def read(self) -> bytes:
+    def receive(self, size: int) -> bytes:
         data, self.coming = self.coming, b""
+        if not data:
+            raise BlockingIOError
         return data
 
-    def write(self, data: bytes) -> int:
+    def send(self, data: bytes) -> int:
         count = min(self.room, len(data))
         self.room -= count
         self.written += data[:count]
@@ -75,12 +65,14 @@ class Bus:
         raise OSError("dead already")
 
 
-def text_wire(port: Narrow) -> TextWire:
-    return TextWire("adapter", port, SlcanReader(), slcan_line, b"?\r", lambda: None)
+def text_wire(port: Narrow) -> TextChannel:
+    return TextChannel(
+        "adapter", Port(port.receive, port.send, None), SlcanDecoder(), encode, b"?\r", lambda: None
+    )
 
 
-def bus_wire(bus: Bus, descriptor: int | None = None) -> BusWire:
-    return BusWire("adapter", bus, can.Message, descriptor)
+def bus_wire(bus: Bus, descriptor: int | None = None) -> BusChannel:
+    return BusChannel("adapter", bus, can.Message, descriptor)
 
 
 def message(id: int = 5, **more: Any) -> can.Message:
@@ -105,14 +97,14 @@ def test_what_did_not_go_out_at_all_leaves_nothing() -> None:
         wire.write(PING)
     port.room = 100
     wire.write(PING)
-    assert port.written == slcan_line(PING)
+    assert port.written == encode(PING)
 
 
 def test_a_port_without_descriptor_is_looked_at_again_and_again() -> None:
     port = Narrow(room=100)
     wire = text_wire(port)
     assert wire.fileno() is None
-    port.coming = b"\r" + slcan_line(PING)
+    port.coming = b"\r" + encode(PING)
     assert wire.read(float("inf")) == [PING]
     assert wire.read(0) == []
     wire.close()
@@ -121,9 +113,9 @@ def test_a_port_without_descriptor_is_looked_at_again_and_again() -> None:
 
 
 def test_all_that_has_come_is_taken_at_once() -> None:
-    bus = Bus(*[message(id) for id in range(MOST + 5)])
+    bus = Bus(*[message(id) for id in range(MOST_FRAMES + 5)])
     wire = bus_wire(bus)
-    assert len(wire.read(0)) == MOST
+    assert len(wire.read(0)) == MOST_FRAMES
     assert len(wire.read(0)) == 5
 
 
@@ -182,7 +174,7 @@ def test_what_is_left_out() -> None:
     assert frame_of(message(is_fd=True)) is None
     assert frame_of(message(is_rx=False)) is None
     wire = bus_wire(Bus(message(is_fd=True), message(3), message(is_rx=False)))
-    assert (wire.read(0), wire.dropped) == ([CanFrame(3, b"")], 2)
+    assert (wire.read(0), wire.counts.dropped) == ([CanFrame(3, b"")], 2)
 
 
 def test_what_fails_to_open_is_closed() -> None:
@@ -197,14 +189,13 @@ def test_what_fails_to_open_is_closed() -> None:
             raise RuntimeError
 
     with pytest.raises(ValueError, match="can0 20000"):
-        build(Failing, "can0", {"bitrate": 20_000})
+        open_bus(Failing, "can0", {"bitrate": 20_000})
     assert len(ended) == 1
 
 
 def test_a_channel_that_was_not_said_is_the_back_ends_own() -> None:
-    made = build(SimpleNamespace, None, {"a": 1})
+    made = open_bus(SimpleNamespace, None, {"a": 1})
     assert made.a == 1
-    quietly(lambda: os.stat("/no/such/file"))
 
 
 @pytest.mark.parametrize("error", [OSError(errno.ENETDOWN, "Network is down"), can.CanOperationError("gone")])
@@ -218,7 +209,7 @@ def test_d13_an_adapter_that_is_down_is_a_lost_link(error: Exception) -> None:
 
 def test_d13_bus_off_is_a_lost_link_and_no_other_error_is() -> None:
     for bits in (0x88, 0x04, 0x100):
-        refuse_bus_off("can0", [CanFrame(ERROR_FLAG | bits, bytes(8)), PING])
-    refuse_bus_off("can0", [CanFrame(BUS_OFF, bytes(8))])
+        check_bus_off("can0", [CanFrame(ERROR_FLAG | bits, bytes(8)), PING])
+    check_bus_off("can0", [CanFrame(BUS_OFF, bytes(8))])
     with pytest.raises(LinkLost, match="can0 is off the bus"):
-        refuse_bus_off("can0", [PING, CanFrame(ERROR_FLAG | BUS_OFF | 0x04, bytes(8))])
+        check_bus_off("can0", [PING, CanFrame(ERROR_FLAG | BUS_OFF | 0x04, bytes(8))])

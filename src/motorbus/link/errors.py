@@ -1,0 +1,116 @@
+"""Errors of ports that cannot be opened, are in use, or are gone; each names its cause and the remedy."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound
+from motorbus.link.usb_adapters import PortInfo
+
+ADVICE = {
+    "ModemManager": "it tries every new adapter for a modem: wait half a minute, or set ID_MM_DEVICE_IGNORE for it",
+    "brltty": "it takes CH340 adapters for Braille displays: remove the package brltty",
+}
+
+
+class Owner(NamedTuple):
+    """A process that holds a port: process id, program name, and the port where it is known."""
+
+    pid: int
+    program: str
+    port: str = ""
+
+
+def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
+    """There is no such port; `others` are the ports of this machine."""
+    relative = os.name != "nt" and "://" not in port and not os.path.isabs(port)
+    advice = "is the adapter plugged in, the simulator running? `motorbus ports` lists what there is"
+    if relative and port.startswith("tty") and os.path.exists(f"/dev/{port}"):
+        advice = f"did you mean /dev/{port}? {advice}"
+    cause = ""
+    if os.path.islink(port):
+        cause = f"it leads to {os.readlink(port)}, which is gone"
+    elif relative:
+        cause = (
+            f"it does not begin with /, so it is relative to the working directory: {os.path.abspath(port)}"
+        )
+    return PortNotFound(
+        f"{port}: there is no such port", expected=_listed(others), cause=cause, advice=advice
+    )
+
+
+def not_a_port(port: str, others: Sequence[PortInfo], device: str = "") -> PortNotFound:
+    """The port, or the `device` in it, exists but is not a serial port."""
+    return PortNotFound(
+        f"{port}{device and f': {device}'} is not a serial port",
+        expected=_listed(others),
+        advice="`motorbus ports` lists what there is",
+    )
+
+
+def _listed(others: Sequence[PortInfo]) -> str:
+    names = [f"{info.device} ({info.guess})" if info.guess else info.device for info in others]
+    return f"one of {', '.join(names)}" if names else "a serial port; this machine has none at present"
+
+
+def busy(port: str, owner: Owner | None) -> PortBusy:
+    """Another program holds the port; None when it is unknown which one."""
+    if owner is None:
+        holder = "another program"
+    elif owner.pid == os.getpid():
+        holder = f"this very program (process {owner.pid})"
+    else:
+        holder = f"process {owner.pid} ({owner.program})"
+    advice = "close it there: a bus has one owner at a time"
+    error = PortBusy(
+        f"{port} is held by {holder}", advice=ADVICE.get(owner.program, advice) if owner else advice
+    )
+    error.owner = owner.pid if owner else None
+    return error
+
+
+def no_permission(port: str, device: str) -> LinkError:
+    """The user has no permission for the port."""
+    group = "dialout"
+    try:
+        import grp
+
+        name = grp.getgrgid(os.stat(device).st_gid).gr_name
+        if name not in ("root", "tty"):  # joining these is bad advice
+            group = name
+    except (ImportError, KeyError, OSError):
+        pass
+    return LinkError(
+        f"{port}: no permission to open it",
+        cause=f"you are not in the group {group}",
+        advice=f"sudo usermod -aG {group} $USER and log in again, or a udev rule with"
+        ' SUBSYSTEM=="tty", TAG+="uaccess" in /etc/udev/rules.d/70-motorbus.rules',
+    )
+
+
+def unsupported_rate(port: str, rate: int, reason: object) -> LinkError:
+    """The adapter does not have this rate (bit/s)."""
+    return LinkError(
+        f"{port} cannot do {rate} bit/s: {reason}",
+        advice="choose another rate, or another adapter for this one",
+    )
+
+
+def lost(port: str, reason: object) -> LinkLost:
+    """The port was open and is gone."""
+    text = reason.strerror if isinstance(reason, OSError) and reason.strerror else reason
+    return LinkLost(
+        f"{port} is gone: {text}",
+        cause="the adapter was unplugged or lost its power, or the server of the port ended",
+        advice="check the other end, then open the bus anew",  # the bus removes the second half where it reconnects
+    )
+
+
+def full(port: str, written: int, length: int) -> LinkError:
+    """The port accepted only `written` of `length` bytes."""
+    return LinkError(
+        f"{port} takes no more bytes: {written} of {length} went out",
+        cause="the other end does not read, or bytes are written faster than the rate allows",
+    )
