@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from motorbus.errors import LinkLost, PortBusy
-from motorbus.link import reconnect
+from motorbus.link import reconnect, usb_adapters
 from motorbus.link.lock import PortLock
 from motorbus.link.reconnect import FIRST_RETRY, LAST_RETRY, Reconnecting, check_reachable, reconnecting
 from motorbus.link.serial import NEGOTIATION_TIME
@@ -49,7 +49,7 @@ class Usb:
 @pytest.fixture
 def usb(monkeypatch: pytest.MonkeyPatch) -> Usb:
     """Pseudo-terminals pass for adapters."""
-    monkeypatch.setattr(reconnect, "PSEUDO_TERMINALS", ("no such prefix",))
+    monkeypatch.setattr(usb_adapters, "PSEUDO_TERMINALS", ("no such prefix",))
     return Usb()
 
 

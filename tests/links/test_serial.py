@@ -17,7 +17,7 @@ import pytest
 import serialx
 
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link import serial, wait
+from motorbus.link import serial, usb_adapters, wait
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
 from motorbus.link.serial import SerialLink, has_fine_clock
@@ -54,7 +54,7 @@ def link(master: PtyMaster) -> Iterator[SerialLink]:
 @pytest.fixture
 def like_a_device(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have pseudo-terminals treated as real devices."""
-    monkeypatch.setattr(serial, "PSEUDO_TERMINALS", ("no such prefix",))
+    monkeypatch.setattr(usb_adapters, "PSEUDO_TERMINALS", ("no such prefix",))
 
 
 def soon(link: Link) -> float:
@@ -265,7 +265,7 @@ def test_what_is_no_serial_port(path: str, tmp_path: Path) -> None:
 FORBIDDEN = """
 import os, sys, tempfile
 from motorbus.errors import LinkError
-from motorbus.link import serial, wait
+from motorbus.link import serial, usb_adapters, wait
 import serialx
 if os.geteuid() == 0:
     os.setgroups([])

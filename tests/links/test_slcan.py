@@ -12,7 +12,7 @@ from motorbus.errors import LinkError, LinkLost
 from motorbus.link import slcan
 from motorbus.link.can_channel import Port
 from motorbus.link.can_options import read_options
-from motorbus.link.slcan import SlcanChannel, port_timing, rate_command
+from motorbus.link.slcan import SlcanChannel, port_latency, rate_command
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
 from motorbus.link.usb_adapters import TERMINAL_LATENCY
 from motorbus.simulation.slcan import SlcanAdapter
@@ -215,13 +215,13 @@ def test_an_adapter_that_is_unplugged() -> None:
     ],
 )
 def test_how_long_an_adapter_holds_a_frame_back(channel: str, latency: float) -> None:
-    assert port_timing(channel, {})[:2] == (latency, ())
+    assert port_latency(channel, {}) == (latency, ())
 
 
 def test_a_slow_serial_line_takes_its_time() -> None:
     quick, slow = (
-        port_timing("/dev/ttyACM0@1000000", {})[0],
-        port_timing("/dev/ttyACM0", {"tty_baudrate": 57_600})[0],
+        port_latency("/dev/ttyACM0@1000000", {})[0],
+        port_latency("/dev/ttyACM0", {"tty_baudrate": 57_600})[0],
     )
     assert quick < 0.01 < slow
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.link.usb_adapters import ADAPTERS, PortInfo, guess, latency_timer, timer_warnings
+from motorbus.link.usb_adapters import ADAPTERS, PortInfo, device_latency, guess, latency_timer
 
 
 def timer_file(sysfs: Path, name: str) -> Path:
@@ -56,9 +56,11 @@ def test_nonsense_in_its_place_is_no_timer(tmp_path: Path) -> None:
     assert latency_timer("/dev/ttyUSB0", tmp_path) is None
 
 
-def test_the_warning_says_what_it_costs_and_what_to_do() -> None:
-    [told] = timer_warnings("/dev/ttyUSB0", 16)
-    assert "16 ms" in told
-    assert "58 reads a second" in told
-    assert "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in told
-    assert 'DRIVER=="ftdi_sio", ATTR{latency_timer}="1"' in told
+def test_a_slow_timer_is_warned_about_with_the_remedy(tmp_path: Path) -> None:
+    timer_file(tmp_path, "ttyUSB0").write_text("16\n")
+    latency, [warning] = device_latency("/dev/ttyUSB0", tmp_path)
+    assert latency == pytest.approx(0.019)
+    assert "16 ms" in warning
+    assert "58 reads a second" in warning
+    assert "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in warning
+    assert 'DRIVER=="ftdi_sio", ATTR{latency_timer}="1"' in warning

@@ -17,14 +17,13 @@ from typing import Any, Final
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
-from motorbus.link import usb_adapters
-from motorbus.link.can_channel import POLL_TIME, BusChannel, Channel, Counts, open_bus
+from motorbus.link import serial, usb_adapters
+from motorbus.link.can_channel import POLL_TIME, BusChannel, Counts, TextChannel, open_bus
 from motorbus.link.can_options import SHARED, CanOptions, read_options
 from motorbus.link.can_rates import check_rate, ip_command, kernel_rate
-from motorbus.link.errors import busy, no_permission, not_a_port, not_found
-from motorbus.link.lock import PortLock, lock_port
-from motorbus.link.port_users import find_user
-from motorbus.link.serial import NO_DEVICE, PSEUDO_TERMINALS, could_be_a_port, ports
+from motorbus.link.errors import busy
+from motorbus.link.lock import PortLock, opening
+from motorbus.link.serial import NO_DEVICE, check_exists, check_unused
 from motorbus.link.slcan import SlcanChannel, open_slcan, rate_command
 from motorbus.link.socketcand import open_socketcand
 
@@ -128,13 +127,12 @@ class CanLink:
         self.lock_name = found.lock_name
         self._changing = False
         self._reported = (0, 0)
-        locked = self.lock_name and not (shared and found.interface == "socketcan")
-        self.lock = lock_port(self.lock_name, lock) if locked else PortLock(self.lock_name or port)
-        try:
+        if self.lock_name and not (shared and found.interface == "socketcan"):
+            with opening(self.lock_name, lock) as self.lock:
+                self._channel = self._open(self.rate, self.listen_only)
+        else:
+            self.lock = PortLock(port)
             self._channel = self._open(self.rate, self.listen_only)
-        except BaseException:
-            self.lock.release()
-            raise
 
     def _checked_rate(self, default_rate: int) -> int:
         """The rate to open with. Raises LinkError when the adapter would make another one."""
@@ -157,7 +155,7 @@ class CanLink:
             )
         return rate
 
-    def _open(self, rate: int, listen_only: bool) -> Channel:
+    def _open(self, rate: int, listen_only: bool) -> TextChannel | BusChannel:
         options = self._options
         if listen_only:
             self._check_can_listen()
@@ -185,15 +183,10 @@ class CanLink:
     def _open_slcan(self, rate: int, listen_only: bool) -> SlcanChannel:
         device = self._options.device
         real = os.path.realpath(device)
-        self.timeless = bool(device) and real.startswith(PSEUDO_TERMINALS)
+        self.timeless = bool(device) and real.startswith(usb_adapters.PSEUDO_TERMINALS)
         if device and os.name != "nt":
-            if not os.path.exists(device):
-                raise not_found(self.name, ports())
-            if not could_be_a_port(device):
-                raise not_a_port(self.name, ports(), device)
-            user = find_user(real)
-            if user is not None:
-                raise busy(self.name, user)
+            check_exists(self.name, device)
+            check_unused(self.name, real)
         channel, self.latency, warnings = open_slcan(self._options, self._back_end)
         self.warnings += warnings
         try:
@@ -347,8 +340,14 @@ def open_error(options: CanOptions, error: Exception) -> MotorbusError:
         return LinkError(f"{name}: the driver of {interface} is missing: {error}", advice=advice)
     if isinstance(error, (ValueError, TypeError)):
         return RequestError(f"{name}: python-can's {interface} refuses this: {error}")
+    if interface == "slcan" and options.device:
+        failure = OSError(code, f"as a serial port: {error}")
+        return serial.open_error(name, os.path.realpath(options.device), failure)
     if interface == "slcan":
-        return _slcan_error(options, error, code)
+        return PortNotFound(
+            f"{name} cannot be reached: {error}",
+            advice="is the bridge switched on, the simulator running, the port number right?",
+        )
     if code in NO_DEVICE:
         return PortNotFound(f"{name}: there is no {interface} channel {options.channel}: {error}")
     if code == errno.EAFNOSUPPORT:
@@ -361,19 +360,3 @@ def open_error(options: CanOptions, error: Exception) -> MotorbusError:
     return LinkError(
         f"{name} cannot be opened: {error}", advice="is the adapter plugged in, the channel right?"
     )
-
-
-def _slcan_error(options: CanOptions, error: Exception, code: int | None) -> MotorbusError:
-    name, device = options.name, options.device
-    if not device:
-        return PortNotFound(
-            f"{name} cannot be reached: {error}",
-            advice="is the bridge switched on, the simulator running, the port number right?",
-        )
-    if code in NO_DEVICE:
-        return not_found(name, ports())
-    if code in (errno.EACCES, errno.EPERM):
-        return no_permission(name, device)
-    if code == errno.EBUSY:
-        return busy(name, find_user(os.path.realpath(device)))
-    return LinkError(f"{name} cannot be opened as a serial port: {error}")

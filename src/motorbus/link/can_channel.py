@@ -36,24 +36,12 @@ class Counts:
         self.damaged = self.refused = self.dropped = 0
 
 
-class Channel(Protocol):
-    """An open adapter. `read`, `write`, `fileno` and `close` as those of a link."""
-
-    counts: Counts
-
-    def read(self, until: float) -> list[Data]: ...
-    def write(self, frame: CanFrame) -> None: ...
-    def fileno(self) -> int | None: ...
-    def close(self) -> None: ...
-
-
 class Decoder(Protocol):
-    """Text of an adapter, cut anywhere -> frames."""
+    """Text of an adapter, cut anywhere -> frames. `feed` returns the frames that it completes, and never raises."""
 
     counts: Counts
 
-    def feed(self, data: bytes) -> list[CanFrame]:
-        """The frames that these bytes complete. Never raises."""
+    def feed(self, data: bytes) -> list[CanFrame]: ...
 
 
 class Port(NamedTuple):
@@ -65,7 +53,7 @@ class Port(NamedTuple):
 
 
 class TextChannel:
-    """A text protocol on a port; `shut` closes the port.
+    """A text protocol on a port; `shut` closes the port. Methods as those of a link.
 
     `cancel` is text that makes an unfinished line invalid. It is sent after a line that was sent in part, which must
     not become a frame later.
@@ -95,9 +83,8 @@ class TextChannel:
     def read(self, until: float) -> list[Data]:
         while True:
             try:
-                pause = until - time.monotonic()
-                if pause > 0:
-                    self._wait(pause)
+                if until > time.monotonic():
+                    self._wait(until)
                 with self._access:
                     self._check()
                     frames = self._read_port()
@@ -151,13 +138,13 @@ class TextChannel:
                 self._shut()
 
 
-def _pause(seconds: float) -> bool:
-    time.sleep(min(POLL_TIME, seconds))
+def _pause(until: float) -> bool:
+    time.sleep(max(0.0, min(POLL_TIME, until - time.monotonic())))
     return True
 
 
 class BusChannel:
-    """Any other back end: an open bus of python-can.
+    """Any other back end: an open bus of python-can. Methods as those of a link.
 
     `message` is its message class; `descriptor` is readable exactly when there is a frame, or None.
     """
@@ -174,7 +161,7 @@ class BusChannel:
     def read(self, until: float) -> list[Data]:
         if self._wait is not None:
             try:
-                if not self._wait(until - time.monotonic()):
+                if not self._wait(until):
                     return []
             except (OSError, ValueError) as error:  # ValueError: another thread has closed it
                 raise lost(self.name, error) from error

@@ -161,12 +161,16 @@ class _BorrowedLock(PortLock):
         return self
 
 
-def lock_port(port: str, held: PortLock | None = None) -> PortLock:
-    """Lock this port, or borrow `held` if that is its lock. Raises PortBusy."""
+@contextlib.contextmanager
+def opening(port: str, held: PortLock | None = None) -> Iterator[PortLock]:
+    """Lock this port, or borrow `held` if that is its lock; release it when the block raises. Raises PortBusy."""
     lock = PortLock(port)
-    if held is not None and held.held and held.path == lock.path:
-        return held.borrow()
-    return lock.acquire()
+    lock = held.borrow() if held is not None and held.held and held.path == lock.path else lock.acquire()
+    try:
+        yield lock
+    except BaseException:
+        lock.release()
+        raise
 
 
 @contextlib.contextmanager

@@ -22,11 +22,12 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import Data
 from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
+from motorbus.link import usb_adapters
 from motorbus.link.base import Link
 from motorbus.link.can_options import SOCKETCAND_PORT
 from motorbus.link.errors import lost
 from motorbus.link.lock import PortLock
-from motorbus.link.serial import PSEUDO_TERMINALS, list_ports
+from motorbus.link.serial import list_ports
 from motorbus.link.tcp import split_address
 from motorbus.link.url import open_link
 
@@ -330,7 +331,7 @@ def reconnecting(
 
         return Reconnecting(link, server)
     real = os.path.realpath(device)
-    if real.startswith(PSEUDO_TERMINALS):
+    if real.startswith(usb_adapters.PSEUDO_TERMINALS):
         if os.path.abspath(device) == real:
             return link
         return Reconnecting(link, _Terminal(name, device, open_again))
@@ -363,7 +364,7 @@ class _Terminal:
         real = os.path.realpath(self._device)
         if not os.path.exists(real):
             raise PortNotFound(f"{self._device} leads nowhere")
-        if not real.startswith(PSEUDO_TERMINALS):
+        if not real.startswith(usb_adapters.PSEUDO_TERMINALS):
             raise another_adapter(self._port, f"a pseudo-terminal, behind {self._device}", real)
         links = _symbolic_links(self._device)
         if links == self._links:  # left over from a killed simulator, whose number the next terminal gets

@@ -23,7 +23,7 @@ from motorbus.core.operation import Data
 from motorbus.errors import LinkError, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.errors import busy, full, lost, no_permission, not_a_port, not_found, unsupported_rate
-from motorbus.link.lock import PortLock, lock_port
+from motorbus.link.lock import PortLock, opening
 from motorbus.link.port_users import find_user
 from motorbus.link.stream import CHUNK, StreamLink
 from motorbus.link.tcp import CONNECT_TIME, send_at_once, split_address
@@ -32,7 +32,6 @@ from motorbus.link.usb_adapters import PortInfo
 if TYPE_CHECKING:
     from serialx import BaseSerial, SerialPortInfo
 
-PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 TOLERANCE = 0.025  # of the rate; with a larger error the stop bit of a byte is missed
 POLL_TIME = 0.001  # s between two reads of a port that has no descriptor
 NEGOTIATION_TIME = 0.5  # s; the least time-out for the options of an RFC 2217 server, a few round trips
@@ -84,35 +83,25 @@ class SerialLink(StreamLink):
         self.rate = rate
         self._serial: BaseSerial | None = None
         device = os.path.realpath(port)
-        self.paced = not device.startswith(PSEUDO_TERMINALS)
-        if not os.path.exists(device):
-            raise not_found(port, ports())
-        if not could_be_a_port(device):
-            raise not_a_port(port, ports())
-        self.lock = lock_port(port, lock)
-        try:
+        self.paced = not device.startswith(usb_adapters.PSEUDO_TERMINALS)
+        check_exists(port, port)
+        with opening(port, lock) as self.lock:
             self._open(device)
-        except BaseException:
-            self.close()
-            raise
-        timer = usb_adapters.latency_timer(device, sysfs)
-        if timer is not None:
-            self.latency = usb_adapters.timer_latency(timer)
-            self.warnings = usb_adapters.timer_warnings(device, timer)
-        else:
-            self.latency = usb_adapters.DEVICE_LATENCY if self.paced else usb_adapters.TERMINAL_LATENCY
+        self.latency, self.warnings = usb_adapters.device_latency(device, sysfs)
 
     def _open(self, device: str) -> None:
-        user = find_user(device)
-        if user is not None:
-            raise busy(self.name, user)
+        check_unused(self.name, device)
         self._serial = _open_serial(self.name, device, self.rate)
         descriptor = self._serial.fileno()
         os.set_blocking(descriptor, False)
         self._attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
-        _check_rate(self.name, descriptor, self.rate)
         if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
             _set_exclusive(descriptor, True)
+        try:
+            _check_rate(self.name, descriptor, self.rate)
+        except LinkError:
+            self.close()
+            raise
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         time.sleep(max(0.0, self._idle_at - time.monotonic()))  # bytes on their way keep their rate
@@ -125,7 +114,7 @@ class SerialLink(StreamLink):
     def close(self) -> None:
         serial, self._serial = self._serial, None
         if serial is not None:
-            if self.paced and self._descriptor >= 0:
+            if self.paced:
                 _set_exclusive(self._descriptor, False)
             self._detach()
             with contextlib.suppress(OSError):
@@ -155,12 +144,8 @@ class PolledLink:
         self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
         self._access = Lock()
         self._closed = False
-        self.lock = lock_port(port, lock)
-        try:
+        with opening(port, lock) as self.lock:
             self._serial = _open_serial(port, port, rate, connect_time)
-        except BaseException:
-            self.lock.release()
-            raise
         connection = getattr(self._serial, "_socket", None)
         if connection is not None:
             send_at_once(connection)
@@ -231,11 +216,21 @@ def has_fine_clock() -> bool:
     return time.get_clock_info("monotonic").resolution <= CLOCK_RESOLUTION
 
 
-def could_be_a_port(device: str) -> bool:
-    """Whether it is a character device other than /dev/null and the like."""
+def check_exists(port: str, device: str) -> None:
+    """Raise PortNotFound when the device of this port does not exist, or is not a serial port: a file, /dev/null."""
+    if not os.path.exists(device):
+        raise not_found(port, ports())
     status = os.stat(device)
     is_memory = sys.platform == "linux" and os.major(status.st_rdev) == MEMORY_DEVICES
-    return stat.S_ISCHR(status.st_mode) and not is_memory
+    if is_memory or not stat.S_ISCHR(status.st_mode):
+        raise not_a_port(port, ports(), "" if device == port else device)
+
+
+def check_unused(port: str, device: str) -> None:
+    """Raise PortBusy when another program has this device open."""
+    user = find_user(device)
+    if user is not None:
+        raise busy(port, user)
 
 
 def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNECT_TIME) -> BaseSerial:
@@ -246,7 +241,7 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
         serial.open()
     except OSError as error:
         raise (
-            _remote_error(port, connect_time, error) if "://" in port else _open_error(port, target, error)
+            _remote_error(port, connect_time, error) if "://" in port else open_error(port, target, error)
         ) from error
     except serialx.UnsupportedSetting as error:
         raise unsupported_rate(port, rate, error) from error
@@ -255,7 +250,8 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
     return serial
 
 
-def _open_error(port: str, device: str, error: OSError) -> LinkError:
+def open_error(port: str, device: str, error: OSError) -> LinkError:
+    """The error for a device that the system did not open."""
     if error.errno in NO_DEVICE:
         return not_found(port, ports())
     if error.errno == errno.EBUSY or (os.name == "nt" and isinstance(error, PermissionError)):

@@ -22,7 +22,6 @@ from motorbus.errors import LinkError
 from motorbus.link import usb_adapters
 from motorbus.link.can_channel import Counts, Port, TextChannel, open_bus
 from motorbus.link.can_options import CanOptions
-from motorbus.link.serial import PSEUDO_TERMINALS
 from motorbus.link.stream import CHUNK
 from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY, send_at_once
 
@@ -135,12 +134,12 @@ class SlcanChannel(TextChannel):
     """An open slcan adapter. `first_reply` is the time-out (s) of its first reply; `shut` closes the port."""
 
     def __init__(
-        self, name: str, port: Port, shut: Callable[[], None], *, first_reply: float | None = None
+        self, name: str, port: Port, shut: Callable[[], None], first_reply: float = FIRST_REPLY
     ) -> None:
         self._decoder = SlcanDecoder()
         super().__init__(name, port, self._decoder, encode, CANCEL, self._close_channel)
         self._shut_port = shut
-        self._first_reply = FIRST_REPLY if first_reply is None else first_reply
+        self._first_reply = first_reply
         self._is_open = False
         self._pid = os.getpid()
         self._rate = ""
@@ -213,16 +212,16 @@ class SlcanChannel(TextChannel):
         """Send a command and wait until there are so many replies in all."""
         self._send(f"{command}\r".encode())
         end = time.monotonic() + timeout
-        while len(self._decoder.replies) < count and (left := end - time.monotonic()) > 0:
-            self._wait(left)
+        while len(self._decoder.replies) < count and time.monotonic() < end:
+            self._wait(end)
             self._drain()
 
     def _settle(self) -> None:
         """Wait for the replies to an earlier program, which was killed, and drop them."""
         end = time.monotonic() + REPLY_TIME
         quiet = time.monotonic() + SILENT_PAUSE
-        while (left := min(quiet, end) - time.monotonic()) > 0:
-            self._wait(left)
+        while time.monotonic() < min(quiet, end):
+            self._wait(min(quiet, end))
             if self._drain():
                 quiet = time.monotonic() + SILENT_PAUSE
         self._decoder.forget()
@@ -278,8 +277,9 @@ def open_slcan(options: CanOptions, back_end: Any) -> tuple[SlcanChannel, float,
         with contextlib.suppress(Exception):  # it may be broken already
             bus.shutdown()
 
-    latency, warnings, first_reply = port_timing(str(options.channel), settings)
-    channel = SlcanChannel(options.name, _port(bus), shut, first_reply=first_reply)
+    latency, warnings = port_latency(str(options.channel), settings)
+    first_reply = FIRST_REPLY_NETWORK if latency == NETWORK_LATENCY else FIRST_REPLY + latency
+    channel = SlcanChannel(options.name, _port(bus), shut, first_reply)
     return channel, latency, warnings
 
 
@@ -318,25 +318,19 @@ def pyserial_port(serial: Any) -> Port:
     return Port(receive, send, None)
 
 
-def port_timing(channel: str, settings: dict[str, Any]) -> tuple[float, tuple[str, ...], float]:
-    """Latency of the adapter (s), warnings, and time-out of its first reply (s).
+def port_latency(channel: str, settings: dict[str, Any]) -> tuple[float, tuple[str, ...]]:
+    """Latency of the adapter (s), and warnings.
 
     A serial line adds the time of one line each way. Adapters with their own USB ignore its rate and are faster.
     """
     if "://" in channel:
-        if urlsplit(channel).hostname in LOOPBACK:
-            return LOOPBACK_LATENCY, (), FIRST_REPLY
-        return NETWORK_LATENCY, (), FIRST_REPLY_NETWORK
+        return LOOPBACK_LATENCY if urlsplit(channel).hostname in LOOPBACK else NETWORK_LATENCY, ()
     device, _, baud = channel.partition("@")
     device = os.path.realpath(device)
-    if device.startswith(PSEUDO_TERMINALS):
-        return usb_adapters.TERMINAL_LATENCY, (), FIRST_REPLY
-    lines = 2 * LINE_BITS / int(baud or settings.get("tty_baudrate", DEFAULT_BAUD))
-    timer = usb_adapters.latency_timer(device)
-    if timer is None:
-        return usb_adapters.DEVICE_LATENCY + lines, (), FIRST_REPLY
-    warnings = usb_adapters.timer_warnings(device, timer)
-    return usb_adapters.timer_latency(timer) + lines, warnings, FIRST_REPLY + timer / 1000
+    latency, warnings = usb_adapters.device_latency(device)
+    if not device.startswith(usb_adapters.PSEUDO_TERMINALS):
+        latency += 2 * LINE_BITS / int(baud or settings.get("tty_baudrate", DEFAULT_BAUD))
+    return latency, warnings
 
 
 def rate_command(options: CanOptions, back_end: Any, rate: int) -> str:

@@ -59,7 +59,7 @@ class StreamLink:
 
     def read(self, until: float) -> list[Data]:
         try:
-            if not self._wait(until - monotonic()):
+            if not self._wait(until):
                 return []
             data = self._receive(CHUNK)
         except BlockingIOError:

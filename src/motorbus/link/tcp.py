@@ -11,7 +11,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from motorbus.errors import LinkError, PortNotFound, RequestError
-from motorbus.link.lock import PortLock, lock_port
+from motorbus.link.lock import PortLock, opening
 from motorbus.link.stream import StreamLink
 
 CONNECT_TIME = 5.0  # s; time-out for a host of the local network
@@ -58,12 +58,8 @@ class TcpLink(StreamLink):
         self.name = url
         self.rate = rate
         host, port = split_address(url)
-        self.lock = lock_port(url, lock)
-        try:
+        with opening(url, lock) as self.lock:
             self._socket = connection = _connect(url, host, port, connect_time)
-        except BaseException:
-            self.lock.release()
-            raise
         self._attach(connection.fileno(), connection.recv, connection.send)
         address = ipaddress.ip_address(connection.getpeername()[0].partition("%")[0])
         self.latency = LOOPBACK_LATENCY if address.is_loopback else NETWORK_LATENCY

@@ -11,6 +11,7 @@ USB_TIME = 0.003  # s; one USB full-speed frame each way and the host's own time
 DEVICE_LATENCY = 0.004  # s; adapters without a timer deliver bytes within 2 to 4 ms
 WINDOWS_LATENCY = 0.019  # s; Windows does not tell the latency timer, so FTDI's 16 ms is assumed
 TERMINAL_LATENCY = 0.002  # s; a pseudo-terminal has no adapter, but two processes are scheduled
+PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 FAST_TIMER = 1  # ms; the lowest FTDI latency timer
 
 KERNEL_CH341 = "Linux drivers/usb/serial/ch341.c"
@@ -92,19 +93,18 @@ def latency_timer(device: str, sysfs: Path = Path("/sys")) -> int | None:
         return None
 
 
-def timer_latency(timer: int) -> float:
-    """Latency (s) of an adapter with this latency timer (ms)."""
-    return timer / 1000 + USB_TIME
-
-
-def timer_warnings(device: str, timer: int) -> tuple[str, ...]:
-    """A warning with the remedy when the latency timer (ms) is slow; empty when it is fast."""
+def device_latency(device: str, sysfs: Path = Path("/sys")) -> tuple[float, tuple[str, ...]]:
+    """Latency (s) of the adapter of a serial port, and a warning with the remedy where its latency timer is slow."""
+    timer = latency_timer(device, sysfs)
+    if timer is None:
+        return (TERMINAL_LATENCY if device.startswith(PSEUDO_TERMINALS) else DEVICE_LATENCY), ()
+    latency = timer / 1000 + USB_TIME
     if timer <= FAST_TIMER:
-        return ()
-    remedy = f"echo {FAST_TIMER} > /sys/bus/usb-serial/devices/{Path(device).name}/latency_timer"
+        return latency, ()
+    command = f"echo {FAST_TIMER} > /sys/bus/usb-serial/devices/{Path(device).name}/latency_timer"
     rule = f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{{latency_timer}}="{FAST_TIMER}"'
     warning = (
         f"its latency timer is {timer} ms, which allows about {1000 // (timer + 1)} reads a second; set it to"
-        f" {FAST_TIMER} ms: as root, {remedy}; permanently, in /etc/udev/rules.d/99-motorbus.rules: {rule}"
+        f" {FAST_TIMER} ms: as root, {command}; permanently, in /etc/udev/rules.d/99-motorbus.rules: {rule}"
     )
-    return (warning,)
+    return latency, (warning,)

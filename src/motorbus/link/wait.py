@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import select
 from collections.abc import Sequence
+from time import monotonic
 
 SELECT_LIMIT = 1024  # FD_SETSIZE: select knows lower descriptors only
 LONGEST = 86_400.0  # s; some systems refuse longer waits
@@ -24,21 +25,21 @@ class Readiness:
             registered.register(descriptor, select.POLLIN)
             self._poll = registered.poll
 
-    def wait(self, seconds: float) -> bool:
-        """Wait for data or for the end of the stream; False after the time-out.
+    def wait(self, until: float) -> bool:
+        """Wait for data or the end of the stream, until this moment (s, monotonic clock); False when none came.
 
         May raise OSError or ValueError when another thread has closed the descriptor.
         """
-        if self._poll is None:
-            return wait_readable(self._descriptor, seconds)
-        milliseconds = int(min(seconds, LONGEST) * 1000) if seconds > 0 else 0
-        try:
-            if self._poll(milliseconds):
-                return True
-        except RuntimeError:  # another thread waits on the same poll object
-            return wait_readable(self._descriptor, seconds)
-        rest = min(seconds, LONGEST) - milliseconds / 1000
-        return rest > 0 and wait_readable(self._descriptor, rest)
+        pause = until - monotonic()
+        if self._poll is not None:
+            try:
+                if self._poll(int(min(pause, LONGEST) * 1000) if pause > 0.0 else 0):
+                    return True
+                if pause <= 0.0:
+                    return False
+            except RuntimeError:  # another thread waits on the same poll object
+                pass
+        return wait_readable(self._descriptor, until - monotonic())
 
 
 def wait_readable(descriptor: int, seconds: float) -> bool:
