@@ -95,18 +95,21 @@ def test_of_several_with_one_serial_number_that_at_its_place_is_it(tmp_path: Pat
 def test_a_port_on_no_usb_is_known_by_its_name(tmp_path: Path) -> None:
     plain = {"vid": None, "pid": None, "serial_number": None}
     mine = identify("/dev/ttyS0", lister({"resolved_device": "/dev/ttyS0", **plain}))
-    assert str(mine) == "the port /dev/ttyS0"
+    assert mine.text == "the port /dev/ttyS0"
     assert find_adapter("bus", mine, lister({"resolved_device": "/dev/ttyS0", **plain})) == "/dev/ttyS0"
     untold = tmp_path / "tty"
     untold.touch()
     assert find_adapter("bus", identify(str(untold), lister()), lister()) == str(untold)
 
 
-def test_without_a_place_the_name_must_be_the_same() -> None:
-    mine = Identity("/dev/ttyUSB0", 0x1A86, 0x7523)
-    assert str(mine) == "the adapter 1a86:7523 at /dev/ttyUSB0"
-    assert mine.is_same(mine)
-    assert not mine.is_same(mine._replace(device="/dev/ttyUSB1"))
+def test_without_a_place_the_name_must_be_the_same(tmp_path: Path) -> None:
+    nameless = {"vid": 0x1A86, "pid": 0x7523, "serial_number": None}
+    here = lister({"resolved_device": "/dev/ttyUSB0", **nameless})
+    mine = identify("/dev/ttyUSB0", here, tmp_path)
+    assert mine.text == "the adapter 1a86:7523 at /dev/ttyUSB0"
+    assert find_adapter("bus", mine, here, tmp_path) == "/dev/ttyUSB0"
+    with pytest.raises(PortNotFound):
+        find_adapter("bus", mine, lister({"resolved_device": "/dev/ttyUSB1", **nameless}), tmp_path)
 
 
 def test_where_the_system_says_nothing_there_is_no_place(tmp_path: Path) -> None:

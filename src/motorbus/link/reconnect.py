@@ -46,53 +46,34 @@ Lister = Callable[[], Iterable[Any]]
 
 
 class Identity(NamedTuple):
-    """What distinguishes a port of an adapter. `vid` is None for a port that is not on USB.
+    """A port of an adapter. Ports with the same `key` are the same, or cannot be distinguished.
 
-    `interface` and `number` distinguish the ports of one adapter; `place` is its USB socket, "" when unknown; `device`
-    is the name it had.
+    `place` is the USB socket, "" when unknown; `device` is the present name; `text` describes it in messages.
     """
 
+    key: tuple[object, ...]
+    place: str
     device: str
-    vid: int | None = None
-    pid: int | None = None
-    serial_number: str = ""
-    interface: int | None = None
-    number: int | None = None
-    place: str = ""
-
-    def __str__(self) -> str:
-        if self.vid is None:
-            return f"the port {self.device}"
-        adapter = f"the adapter {self.vid:04x}:{self.pid or 0:04x}"
-        if self.serial_number:
-            return f"{adapter} with the serial number {self.serial_number}"
-        return f"{adapter} at the USB place {self.place}" if self.place else f"{adapter} at {self.device}"
-
-    def is_same(self, other: Identity) -> bool:
-        """Whether it is the same port of the same adapter."""
-        if self[1:6] != other[1:6]:
-            return False
-        if self.vid is not None and self.serial_number:
-            return True
-        if self.vid is not None and self.place:
-            return self.place == other.place
-        return self.device == other.device
+    text: str
 
 
 def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
     """The identity of every serial port that the system lists."""
-    return [
-        Identity(
-            device=port.resolved_device,
-            vid=port.vid,
-            pid=port.pid,
-            serial_number=port.serial_number or "",
-            interface=port.interface_num,
-            number=port.port_number,
-            place=usb_socket(port.resolved_device, sysfs) if port.vid is not None else "",
-        )
-        for port in lister()
-    ]
+    return [_identity(port, sysfs) for port in lister()]
+
+
+def _identity(port: Any, sysfs: Path) -> Identity:
+    device: str = port.resolved_device
+    if port.vid is None:
+        return Identity((device,), "", device, f"the port {device}")
+    place = usb_socket(device, sysfs)
+    adapter = f"the adapter {port.vid:04x}:{port.pid or 0:04x}"
+    kind = port.vid, port.pid, port.interface_num, port.port_number  # one adapter may have several ports
+    if port.serial_number:
+        text = f"{adapter} with the serial number {port.serial_number}"
+        return Identity((*kind, port.serial_number), place, device, text)
+    text = f"{adapter} at the USB place {place}" if place else f"{adapter} at {device}"
+    return Identity((*kind, "", place or device), place, device, text)
 
 
 def usb_socket(device: str, sysfs: Path = Path("/sys")) -> str:
@@ -104,7 +85,7 @@ def usb_socket(device: str, sysfs: Path = Path("/sys")) -> str:
 def identify(device: str, lister: Lister, sysfs: Path = Path("/sys")) -> Identity:
     """The identity of a port that is present; `device` is a path without symbolic links."""
     found = (one for one in identities(lister, sysfs) if _same_name(one.device, device))
-    return next(found, Identity(device))
+    return next(found, Identity((device,), "", device, f"the port {device}"))
 
 
 def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path("/sys")) -> str:
@@ -114,13 +95,13 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
     could be it.
     """
     present = identities(lister, sysfs)
-    same = [one for one in present if wanted.is_same(one)]
+    same = [one for one in present if one.key == wanted.key]
     if len(same) > 1:  # some makers give one number to a whole batch
         same = [one for one in same if wanted.place and one.place == wanted.place]
         if len(same) != 1:
             raise LinkLost(
                 f"{name} is gone, and several adapters could be it",
-                expected=str(wanted),
+                expected=wanted.text,
                 cause="their maker gave all of them one serial number",
                 advice="plug it in where it was, or open the bus again with the right name",
             )
@@ -128,17 +109,17 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
         return same[0].device
     other = next((one for one in present if _same_name(one.device, wanted.device)), None)
     if other is not None:
-        raise another_adapter(name, wanted, str(other))
-    if wanted.vid is None and os.path.exists(wanted.device):  # a port that the system does not list
+        raise another_adapter(name, wanted.text, other.text)
+    if wanted.key == (wanted.device,) and os.path.exists(wanted.device):  # the system does not list it
         return wanted.device
-    raise PortNotFound(f"{name}: {wanted} is not there")
+    raise PortNotFound(f"{name}: {wanted.text} is not there")
 
 
-def another_adapter(name: str, wanted: Identity | str, present: str) -> AnotherAdapter:
-    """The lost port has its name no more: another one has it."""
+def another_adapter(name: str, wanted: str, present: str) -> AnotherAdapter:
+    """Another adapter has the name of the lost port."""
     return AnotherAdapter(
         f"{name} is gone, and there is another in its place: {present}",
-        expected=str(wanted),
+        expected=wanted,
         cause="another adapter was plugged in and got the name of the lost one",
         advice="plug in the first one, or open the bus again with the right name",
     )
@@ -188,11 +169,6 @@ class Reconnecting:
         self.now = link.now  # type: ignore[method-assign]
         self.read = link.read  # type: ignore[method-assign]
         self.write = link.write  # type: ignore[method-assign]
-
-    @property
-    def listen_only(self) -> bool:
-        """Whether the link cannot send."""
-        return bool(getattr(self._link, "listen_only", False))
 
     @property
     def lock_name(self) -> str:
@@ -245,7 +221,7 @@ class Reconnecting:
             for method in ("read", "write"):  # ours raise the reason
                 self.__dict__.pop(method, None)
             try:
-                link: Any = self._reopen(self.rate, self.listen_only, self._lock)
+                link: Any = self._reopen(self.rate, getattr(self._link, "listen_only", False), self._lock)
             except (MotorbusError, OSError) as error:
                 self._fail(error)
                 raise self._loss() from error
@@ -341,9 +317,10 @@ def reconnecting(
     def adapter(new_rate: int, listen_only: bool, lock: PortLock) -> Link:
         present = find_adapter(name, known, lister, sysfs)
         found = open_again(port_at(present), new_rate, listen_only, lock)
-        if not known.is_same(now := identify(present, lister, sysfs)):  # exchanged meanwhile
+        now = identify(present, lister, sysfs)
+        if now.key != known.key:  # exchanged meanwhile
             found.close()
-            raise another_adapter(name, known, str(now))
+            raise another_adapter(name, known.text, now.text)
         return found
 
     return Reconnecting(link, adapter)
