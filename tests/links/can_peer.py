@@ -1,6 +1,6 @@
-"""The other end of a CAN adapter, for the tests of the link: a real port, a thread that serves it, an adapter behind.
+"""The other end of a CAN link in tests: a real port, a thread that serves it, and an adapter.
 
-What a host sends is noted and comes back with the identifier plus one. `say` puts bytes of our own onto the port.
+Frames of the host are kept, and sent back with the identifier plus one. `say` sends further data.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LONG_PING = CanFrame(0x625, b"\x01", extended=True)
 
 
 class Mute(SlcanAdapter):
-    """An slcan adapter that answers nothing, as there are."""
+    """An slcan adapter that sends no replies, as some do."""
 
     def take(self) -> bytes:
         super().take()
@@ -33,17 +33,17 @@ class Mute(SlcanAdapter):
 
 
 class Picky(SlcanAdapter):
-    """An slcan adapter that says no to some commands, and keeps what it was told."""
+    """An slcan adapter that refuses some commands and keeps all of them."""
 
     def __init__(self, *refused: bytes, strict: bool = False) -> None:
         super().__init__(strict=strict)
         self.refuses = refused
-        self.told: list[bytes] = []
+        self.commands: list[bytes] = []
 
     def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
         frames = []
         for line in data.split(b"\r")[:-1]:
-            self.told.append(line)
+            self.commands.append(line)
             if line in self.refuses:
                 self._answer += b"\a"
             else:
@@ -57,7 +57,7 @@ class Peer:
     def __init__(self, adapter: Adapter, url: str) -> None:
         self.adapter = adapter
         self.url = url
-        self.heard: list[CanFrame] = []
+        self.received: list[CanFrame] = []
         self.echoes = True
         self.write: Callable[[bytes], object] = lambda _: None
 
@@ -66,10 +66,10 @@ class Peer:
         for item in data:
             self.write(self.adapter.deliver(item, 1.0) if isinstance(item, CanFrame) else item)
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         frames = self.adapter.feed(data)
         answer = self.adapter.take()
-        self.heard += frames
+        self.received += frames
         if self.echoes:
             for frame in frames:
                 answer += self.adapter.deliver(frame._replace(id=frame.id + 1), 1.0)
@@ -82,15 +82,15 @@ class Readable(Protocol):
 
 
 @contextlib.contextmanager
-def serving(source: Readable, hear: Callable[[], bool]) -> Iterator[None]:
-    """A thread that calls `hear` whenever there is something, until it says that there will be no more."""
+def serving(source: Readable, receive: Callable[[], bool]) -> Iterator[None]:
+    """A thread that calls `receive` for data, until it returns False."""
     over = Event()
 
     def run() -> None:
         while True:
-            ending = over.is_set()  # what was said before the end is still heard
+            ending = over.is_set()  # data from before the end is still received
             if select((source,), (), (), 0.0 if ending else 0.02)[0]:
-                if not hear():
+                if not receive():
                     return
             elif ending:
                 return
@@ -111,12 +111,12 @@ def on_terminal(adapter: Adapter | None = None) -> Iterator[Peer]:
     peer = Peer(adapter or SlcanAdapter(), f"can://slcan{master.slave_name}")
     peer.write = master.write
 
-    def hear() -> bool:
-        peer.hear(master.read())
+    def receive() -> bool:
+        peer.receive(master.read())
         return True
 
     try:
-        with serving(master, hear):
+        with serving(master, receive):
             yield peer
     finally:
         master.close()
@@ -134,7 +134,7 @@ def on_socket(make: Callable[[], Adapter], url: str) -> Iterator[Peer]:
             peer.adapter = make()
             peer.write = connection.sendall
             peer.write(peer.adapter.greet())
-            ends.enter_context(serving(connection, lambda: _hear(peer, connection)))
+            ends.enter_context(serving(connection, lambda: _receive(peer, connection)))
             return True
 
         with serving(server, accept):
@@ -142,12 +142,12 @@ def on_socket(make: Callable[[], Adapter], url: str) -> Iterator[Peer]:
         ends.close()
 
 
-def _hear(peer: Peer, connection: socket.socket) -> bool:
-    """A host may hang up at any moment, also right behind its last word, so that the answer finds nobody."""
+def _receive(peer: Peer, connection: socket.socket) -> bool:
+    """A host may hang up at any moment, also before it reads the reply."""
     try:
         data = connection.recv(4096)
         if data:
-            peer.hear(data)
+            peer.receive(data)
     except OSError:
         return False
     return bool(data)

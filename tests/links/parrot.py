@@ -1,4 +1,4 @@
-"""The simplest simulated bus there can be, for the tests of what lies between it and a host."""
+"""The simplest simulated bus."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ PING = bytes.fromhex("ff ff 01 02 01 fb")
 
 
 class Parrot:
-    """A simulated bus that says everything back, reversed, after `delay` seconds; a frame with its id plus one."""
+    """A simulated bus that sends bytes back reversed after `delay` seconds, and a frame with its id plus one."""
 
     def __init__(self, delay: float = DELAY) -> None:
         self.delay = delay
         self.rate = 0
-        self.heard: list[tuple[float, Data]] = []
+        self.received: list[tuple[float, Data]] = []
         self.coming: list[tuple[float, Data]] = []
         self.nodes: Mapping[int, SimulatedNode] = {}
 
     def receive(self, data: Data, at: float) -> None:
-        self.heard.append((at, data))
+        self.received.append((at, data))
         said = data._replace(id=data.id + 1) if isinstance(data, CanFrame) else data[::-1]
         self.coming.append((at + self.delay, said))
 

@@ -1,7 +1,4 @@
-"""A small RFC 2217 server, written from the RFC: the far end of a link in the tests.
-
-It agrees to every option, acknowledges every setting, remembers them, and says everything back.
-"""
+"""A small RFC 2217 server. It agrees to every option, acknowledges every setting, and sends all bytes back."""
 
 from __future__ import annotations
 
@@ -16,13 +13,13 @@ COM_PORT, SET_BAUDRATE, ACKNOWLEDGED = 44, 1, 100
 
 
 class Server:
-    """One client at a time; `rate` is what it has set, `heard` what it sent."""
+    """One client at a time; `rate` is what it has set, `received` what it sent."""
 
     def __init__(self) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.url = f"rfc2217://127.0.0.1:{self.listener.getsockname()[1]}"
         self.rate = 0
-        self.heard = bytearray()
+        self.received = bytearray()
         self.client: socket.socket | None = None
         self.thread = Thread(target=self.serve, daemon=True)
         self.thread.start()
@@ -39,7 +36,7 @@ class Server:
 
     def say(self, data: bytes) -> None:
         assert self.client is not None
-        self.heard += data
+        self.received += data
         self.client.sendall(data.replace(b"\xff", b"\xff\xff"))
 
     def command(self, code: int, stream: socket.SocketIO) -> None:

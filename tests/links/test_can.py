@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -13,7 +14,8 @@ import pytest
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.can import CanLink
+from motorbus.link.can import CanLink, open_error
+from motorbus.link.can_options import CanOptions, read_options
 from tests.links.can_peer import (
     LONG_PING,
     PING,
@@ -35,7 +37,9 @@ def virtual_bus() -> Iterator[Peer]:
         peer = Peer(None, "can://virtual/test")  # type: ignore[arg-type]
 
         def answer(message: can.Message) -> None:
-            peer.heard.append(CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id))
+            peer.received.append(
+                CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
+            )
             message.arbitration_id += 1
             message.is_rx = True
             other.send(message)
@@ -72,7 +76,7 @@ def link(peer: Peer) -> Iterator[CanLink]:
 def test_frames_go_and_come(link: CanLink, peer: Peer, frame: CanFrame) -> None:
     link.write(frame)
     assert some(link) == [frame._replace(id=frame.id + 1)]
-    assert peer.heard == [frame]
+    assert peer.received == [frame]
     assert (link.counts.damaged, link.counts.dropped, link.counts.refused) == (0, 0, 0)
 
 
@@ -84,7 +88,7 @@ def test_many_frames_arrive_in_order(link: CanLink) -> None:
     assert link.read(link.now() - 1) == []
 
 
-def test_what_it_says_of_itself(link: CanLink, peer: Peer) -> None:
+def test_its_attributes(link: CanLink, peer: Peer) -> None:
     assert (link.name, link.rate) == (peer.url, 500_000)
     assert (link.paced, link.virtual, link.simulated, link.warnings) == (False, False, False, ())
     assert 0 < link.latency < 0.01
@@ -119,7 +123,7 @@ def test_it_can_be_opened_again_and_again(peer: Peer) -> None:
         link.close()
 
 
-def test_somebody_waits_while_it_is_closed(link: CanLink) -> None:
+def test_close_during_a_read(link: CanLink) -> None:
     ended: list[BaseException | None] = []
 
     def wait() -> None:
@@ -187,11 +191,11 @@ def test_it_is_opened_to_listen_only(transport: str) -> None:
         with pytest.raises(LinkError, match="only listens"):
             link.write(PING)
         link.close()
-        assert peer.heard == []
+        assert peer.received == []
 
 
-def test_a_bus_of_python_can_brings_what_there_is() -> None:
-    """Remote and error frames are told apart; CAN FD and what we sent ourselves is left out and counted."""
+def test_remote_error_and_fd_frames() -> None:
+    """CAN FD and our own frames are dropped and counted."""
     link = open_can("can://virtual/kinds")
     with can.Bus(interface="virtual", channel="kinds") as other:
         other.send(can.Message(arbitration_id=5, is_remote_frame=True, dlc=3, is_extended_id=False))
@@ -204,9 +208,9 @@ def test_a_bus_of_python_can_brings_what_there_is() -> None:
             CanFrame(8, b"\1", True),
         ]
         link.write(remote(9, 2, extended=True))
-        heard = other.recv(30)
-        assert heard is not None
-        assert (heard.is_remote_frame, heard.dlc, heard.arbitration_id, heard.is_extended_id) == (
+        received = other.recv(30)
+        assert received is not None
+        assert (received.is_remote_frame, received.dlc, received.arbitration_id, received.is_extended_id) == (
             True,
             2,
             9,
@@ -216,7 +220,7 @@ def test_a_bus_of_python_can_brings_what_there_is() -> None:
     link.close()
 
 
-def test_what_we_sent_ourselves_is_dropped() -> None:
+def test_our_own_frames_are_dropped() -> None:
     link = open_can("can://virtual/mine", receive_own_messages="yes")
     link.write(PING)
     assert link.read(link.now() + 0.02) == []
@@ -224,7 +228,7 @@ def test_what_we_sent_ourselves_is_dropped() -> None:
     link.close()
 
 
-def test_a_member_that_takes_no_more() -> None:
+def test_a_full_member() -> None:
     link = open_can("can://virtual/slow")
     with can.Bus(interface="virtual", channel="slow", rx_queue_size=2):
         link.write(PING)
@@ -252,7 +256,7 @@ def test_a_member_that_takes_no_more() -> None:
         ("can://", RequestError, "says no interface"),
     ],
 )
-def test_what_cannot_be_opened(url: str, error: type[Exception], words: str) -> None:
+def test_channels_that_cannot_be_opened(url: str, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words) as caught:
         open_can(url)
     assert caught.type is error
@@ -264,3 +268,73 @@ def test_a_missing_python_can_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "can", None)
     with pytest.raises(LinkError, match=r'pip install "motorbus\[can\]"'):
         open_can("can://virtual/test")
+
+
+# -- errors of python-can at open ------------------------------------------------------------------------------
+
+
+def config(port: str) -> CanOptions:
+    return read_options(can, port, 0, {})
+
+
+def caused(error: Exception, cause: Exception) -> Exception:
+    error.__cause__ = cause
+    return error
+
+
+@pytest.mark.parametrize(
+    ("port", "error", "kind", "words"),
+    [
+        (
+            "can://socketcan/can0",
+            OSError(errno.ENODEV, "No such device"),
+            PortNotFound,
+            "no socketcan channel can0",
+        ),
+        ("can://socketcan/can0", OSError(errno.EAFNOSUPPORT, "x"), LinkError, "has no CAN"),
+        ("can://vector/0", OSError(errno.EBUSY, "x"), PortBusy, "held by another program"),
+        ("can://pcan/1", OSError("pcanbasic library not found."), LinkError, "PCAN-Basic"),
+        ("can://kvaser/0", NameError("name 'canOpenChannel' is not defined"), LinkError, "CANlib"),
+        ("can://neovi/0", ImportError("Please install python-ics"), LinkError, r"python-can\[neovi\]"),
+        (
+            "can://systec/0",
+            can.CanInterfaceNotImplementedError("no"),
+            LinkError,
+            "that comes with the adapter",
+        ),
+        (
+            "can://slcan/dev/x",
+            can.CanInterfaceNotImplementedError("no serial"),
+            LinkError,
+            r"motorbus\[can\]",
+        ),
+        ("can://kvaser/0", ValueError("channel must be an integer"), RequestError, "refuses this"),
+        ("can://slcan/dev/x", ValueError("Invalid bitrate"), RequestError, "refuses this"),
+        ("can://pcan/1", can.CanInitializationError("in use"), LinkError, "cannot be opened: in use"),
+    ],
+)
+def test_the_error_for_each_failure(port: str, error: Exception, kind: type[Exception], words: str) -> None:
+    text = open_error(config(port), error)
+    assert type(text) is kind
+    with pytest.raises(kind, match=words):
+        raise text
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [
+        (errno.ENOENT, PortNotFound),
+        (errno.EACCES, LinkError),
+        (errno.EBUSY, PortBusy),
+        (errno.EIO, LinkError),
+    ],
+)
+def test_the_serial_port_of_an_adapter(code: int, kind: type[Exception]) -> None:
+    error = caused(can.CanInitializationError("could not open port"), OSError(code, os.strerror(code)))
+    assert type(open_error(config("can://slcan/dev/ttyACM0"), error)) is kind
+
+
+def test_the_device_of_an_adapter() -> None:
+    assert config("can://slcan/dev/ttyACM0@1000000").device == "/dev/ttyACM0"
+    assert config("can://slcan/socket://127.0.0.1:4000").device == ""
+    assert config("can://socketcan/can0").device == ""

@@ -75,7 +75,7 @@ def test_what_a_socketcand_server_writes_is_read(frame: CanFrame, cut: int) -> N
 
 
 @given(data=st.binary(max_size=80))
-def test_nothing_makes_a_reader_raise(data: bytes) -> None:
+def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
     for reader, good in ((SlcanDecoder(), b"\r" + SOME), (SocketcandDecoder(), b">< frame 625 1.0 40 >")):
         reader.feed(data)
         assert reader.feed(good)[-1:], "the next good frame is read"
@@ -83,7 +83,7 @@ def test_nothing_makes_a_reader_raise(data: bytes) -> None:
 
 @given(place=st.integers(0, 20), byte=st.integers(0, 255))
 def test_one_damaged_character_is_no_frame_or_one_of_its_form(place: int, byte: int) -> None:
-    """Only a digit that has become another digit cannot be told: slcan has no checksum."""
+    """Only a digit that became another digit is not noticed: slcan has no checksum."""
     reader = SlcanDecoder()
     line = bytearray(SOME)
     line[place] = byte
@@ -160,7 +160,7 @@ def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFr
         assert all(len(one.data) == len(frame.data) for one in others)
 
 
-def test_answers_are_no_frames() -> None:
+def test_replies_are_no_frames() -> None:
     reader = SlcanDecoder()
     assert reader.feed(b"\rz\rZ\rV1013\rNSIMU\rF00\rA\r") == []
     assert (reader.counts.damaged, reader.replies) == (0, [True] * 7)
@@ -170,7 +170,7 @@ def test_answers_are_no_frames() -> None:
     assert reader.replies == []
 
 
-def test_answers_are_not_kept_for_ever() -> None:
+def test_the_number_of_kept_replies_is_limited() -> None:
     """Every frame that is sent brings one."""
     reader = SlcanDecoder()
     reader.feed(b"\r\a" + b"z\r" * 100_000)
@@ -191,7 +191,7 @@ def test_frames_of_can_fd_are_foreign() -> None:
 
 
 @pytest.mark.parametrize("reader", [SlcanDecoder(), SocketcandDecoder()])
-def test_what_does_not_end_is_given_up(reader: SlcanDecoder | SocketcandDecoder) -> None:
+def test_text_without_end_is_dropped(reader: SlcanDecoder | SocketcandDecoder) -> None:
     for _ in range(40):
         reader.feed(b"x" * 100)
     assert reader.counts.damaged >= 40 * 100 // (LONGEST + 100)
@@ -224,7 +224,7 @@ def test_an_element_that_is_no_frame_is_counted(element: bytes) -> None:
     assert reader.counts.damaged == 1
 
 
-def test_other_elements_are_let_be() -> None:
+def test_other_elements_are_ignored() -> None:
     reader = SocketcandDecoder()
     assert reader.feed(b"< hi >< ok > < echo > < > < frame 00000625 1.000000 AB CD >") == [
         CanFrame(0x625, b"\xab\xcd", True)

@@ -56,7 +56,7 @@ def test_an_address_with_a_gap(port: str) -> None:
         parse_port(port)
 
 
-def test_what_the_user_says_wins(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_user_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_INTERFACE", "socketcan")
     monkeypatch.setenv("CAN_CHANNEL", "can7")
     monkeypatch.setenv("CAN_BITRATE", "250000")
@@ -112,7 +112,7 @@ def test_the_environment_wins_over_files(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert (both.channel, both.rate, both.settings) == ("c", 50_000, {"rx_queue_size": 9})
 
 
-def test_what_a_configuration_says_in_vain_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unsuitable_configuration_is_dropped_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_CONFIG", '{"interface": "virtual", "channel": "c", "tty_baudrate": 9600}')
     found = config("can://")
     assert found.settings == {}
@@ -144,7 +144,7 @@ def test_an_unknown_option_comes_with_those_that_exist() -> None:
 
 
 @pytest.mark.parametrize("name", ["timeout", "channel", "kwargs", "poll_interval", "can_filters"])
-def test_what_would_have_no_effect_is_no_option(name: str) -> None:
+def test_settings_of_the_link_are_no_options(name: str) -> None:
     with pytest.raises(RequestError, match="has no option"):
         config("can://slcan/dev/ttyACM0", **dict[str, Any]({name: "1"}))
 

@@ -28,9 +28,9 @@ def config(port: str, rate: int = 0, **options: object) -> CanOptions:
 
 def ip(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str, code: int = 0) -> None:
     """A program `ip` that says this."""
-    (folder / "told").write_text(text)
+    (folder / "output").write_text(text)
     program = folder / "ip"
-    program.write_text(f"#!/bin/sh\ncat {folder}/told\nexit {code}\n")
+    program.write_text(f"#!/bin/sh\ncat {folder}/output\nexit {code}\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder), prepend=":")
 
@@ -61,7 +61,7 @@ def test_s7_means_two_things_so_neither_is_used(rate: int) -> None:
     with on_terminal() as peer, pytest.raises(LinkError, match="S7 is 800 kbit/s") as caught:
         open_can(peer, rate)
     assert "f_clock=8000000,brp=1,tseg1=7,tseg2=2" in caught.value.advice
-    assert (peer.heard, peer.adapter.open) == ([], False)
+    assert (peer.received, peer.adapter.open) == ([], False)
 
 
 @pytest.mark.usefixtures("long_timeouts")

@@ -1,4 +1,4 @@
-"""What people are told when a port fails them."""
+"""What people are text when a port fails them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ ACM = PortInfo(
 PLAIN = PortInfo("/dev/ttyS0", "", None, None, "", "", "", "")
 
 
-def test_a_port_that_is_not_there_comes_with_those_that_are() -> None:
-    told = str(not_found("/dev/ttyACM9", [ACM, PLAIN]))
-    assert "/dev/ttyACM9: there is no such port" in told
-    assert "one of /dev/ttyACM0 (CH343: usual on servo boards), /dev/ttyS0" in told
+def test_a_missing_port_lists_the_ports() -> None:
+    text = str(not_found("/dev/ttyACM9", [ACM, PLAIN]))
+    assert "/dev/ttyACM9: there is no such port" in text
+    assert "one of /dev/ttyACM0 (CH343: usual on servo boards), /dev/ttyS0" in text
 
 
 def test_a_machine_without_ports_says_so() -> None:
@@ -42,7 +42,7 @@ def test_a_machine_without_ports_says_so() -> None:
         ("can://slcan/tmp", "/tmp", "can://slcan/tmp: /tmp is not a serial port"),
     ],
 )
-def test_what_is_no_port_comes_with_those_that_are_ports(port: str, device: str, says: str) -> None:
+def test_another_file_lists_the_ports(port: str, device: str, says: str) -> None:
     error = not_a_port(port, [PLAIN], device)
     assert (error.summary, error.expected) == (says, "one of /dev/ttyS0")
     assert error.advice == "`motorbus ports` lists what there is"
@@ -57,11 +57,11 @@ def test_a_port_without_a_folder_says_relative_to_what_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    told = not_found("ttyACM9", [])
-    assert told.cause.endswith(f"relative to the working directory: {tmp_path}/ttyACM9")
+    text = not_found("ttyACM9", [])
+    assert text.cause.endswith(f"relative to the working directory: {tmp_path}/ttyACM9")
     assert f"{tmp_path}/there/bus" in not_found("./there/bus", []).cause
     assert not_found("tty", []).advice.startswith("did you mean /dev/tty? ")
-    assert "did you mean" not in told.advice
+    assert "did you mean" not in text.advice
     for port in ("/dev/ttyACM9", "rfc2217://host:4001", "can://slcan/dev/ttyACM9"):
         assert not not_found(port, []).cause
 
@@ -85,12 +85,12 @@ def test_no_permission_says_how_to_get_it(group: str) -> None:
 def test_the_group_is_the_one_of_the_device(tmp_path: Path) -> None:
     (tmp_path / "device").touch()
     os.chown(tmp_path / "device", -1, os.getgid())
-    told = str(no_permission("/dev/ttyACM0", str(tmp_path / "device")))
-    assert "usermod -aG root" not in told
-    assert "usermod -aG" in told
+    text = str(no_permission("/dev/ttyACM0", str(tmp_path / "device")))
+    assert "usermod -aG root" not in text
+    assert "usermod -aG" in text
 
 
-def test_the_reason_of_a_loss_is_told() -> None:
+def test_the_reason_of_a_loss() -> None:
     assert (
         lost("/dev/ttyACM0", OSError(5, "Input/output error")).summary
         == "/dev/ttyACM0 is gone: Input/output error"
@@ -98,6 +98,6 @@ def test_the_reason_of_a_loss_is_told() -> None:
     assert lost("/dev/ttyACM0", "it hung up").summary == "/dev/ttyACM0 is gone: it hung up"
 
 
-def test_figures_are_told() -> None:
+def test_values_and_limits() -> None:
     assert "76800 bit/s" in str(unsupported_rate("/dev/ttyACM0", 76_800, "no"))
     assert "3 of 8" in str(full("/dev/ttyACM0", 3, 8))

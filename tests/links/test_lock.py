@@ -135,16 +135,16 @@ def test_the_file_is_private_and_tells_its_owner() -> None:
 
 
 def test_a_second_one_in_this_process_is_refused() -> None:
-    with PortLock(PORT), pytest.raises(PortBusy, match="this very program") as refused:
+    with PortLock(PORT), pytest.raises(PortBusy, match="this very program") as caught:
         PortLock(PORT).acquire()
-    assert refused.value.owner == os.getpid()
+    assert caught.value.owner == os.getpid()
 
 
-def test_l13_a_second_opener_is_told_the_owners_process() -> None:
+def test_l13_the_error_names_the_process_of_the_owner() -> None:
     with other_process(HOLD, PORT) as process:
-        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as refused:
+        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as caught:
             PortLock(PORT).acquire()
-        assert refused.value.owner == process.pid
+        assert caught.value.owner == process.pid
         assert [owner.port for owner in holders()] == [PORT]
 
 
@@ -187,9 +187,9 @@ def test_an_owner_that_never_signs_still_keeps_others_out(monkeypatch: pytest.Mo
     monkeypatch.setattr(lock, "TRIES", 2)
     with PortLock(PORT) as held:
         held.path.write_bytes(b"")
-        with pytest.raises(PortBusy, match="another program") as refused:
+        with pytest.raises(PortBusy, match="another program") as caught:
             PortLock(PORT).acquire()
-        assert refused.value.owner is None
+        assert caught.value.owner is None
 
 
 def test_holders_lists_the_living_only() -> None:

@@ -52,7 +52,7 @@ def test_what_has_arrived_is_there_for_a_read_in_the_past() -> None:
     assert (link.now(), link.read(0.0)) == (1.0, [PING[::-1]])
 
 
-def test_it_tells_when_something_happens_next() -> None:
+def test_due_is_the_next_event() -> None:
     link = MemoryLink(Parrot())
     assert link.due() == float("inf")
     link.write(PING)
@@ -65,7 +65,7 @@ def test_it_tells_when_something_happens_next() -> None:
     assert link.due() == float("inf")
 
 
-def test_it_starts_when_told() -> None:
+def test_the_clock_starts_at_a_given_moment() -> None:
     link = MemoryLink(Parrot(), start=17.0)
     link.write(PING)
     assert link.read(20.0) == [PING[::-1]]
@@ -103,14 +103,14 @@ def test_what_arrives_at_once_comes_as_it_would_piece_by_piece(seed: int) -> Non
     for line in (PerfectLine(), Carrier()):
         random, parrot = Random(seed), Parrot(delay=0.002)
         link = MemoryLink(parrot, line=line)
-        heard: list[tuple[float, list[Data], int]] = []
+        seen: list[tuple[float, list[Data], int]] = []
         for number in range(60):
             for _ in range(random.randrange(3)):
                 link.write(bytes([number, random.randrange(256)]))
                 link.rest(link.now() + random.choice([0.0, 0.0005, 0.003]))
             arrived = link.read(link.now() + random.choice([0.0, 0.001, 0.002, 0.01]))
-            heard.append((link.now(), arrived, len(parrot.heard)))
-        said.append(heard)
+            seen.append((link.now(), arrived, len(parrot.received)))
+        said.append(seen)
     assert said[0] == said[1]
 
 
@@ -122,7 +122,7 @@ def test_eight_bytes_at_one_megabaud_take_eighty_microseconds_each_way() -> None
     link = MemoryLink(parrot, rate=1_000_000, pace=True)
     link.write(bytes(8))
     assert link.read(1.0) == [bytes(8)]
-    assert [at for at, _ in parrot.heard] == [pytest.approx(80e-6)]
+    assert [at for at, _ in parrot.received] == [pytest.approx(80e-6)]
     assert link.now() == pytest.approx(80e-6 + DELAY + 80e-6)
 
 
@@ -132,7 +132,7 @@ def test_a_second_request_queues_behind_the_first() -> None:
     link.write(bytes(11))
     link.write(bytes(11))
     drain(link)
-    assert [at for at, _ in parrot.heard] == pytest.approx([110 / 9600, 220 / 9600])
+    assert [at for at, _ in parrot.received] == pytest.approx([110 / 9600, 220 / 9600])
 
 
 def test_replies_of_one_moment_queue_behind_each_other() -> None:
@@ -155,7 +155,7 @@ def test_a_frame_takes_its_bits() -> None:
         link.write(frame)
     drain(link)
     first, second = map(bits, frames)
-    assert [at for at, _ in parrot.heard] == pytest.approx([first * 1e-6, (first + second) * 1e-6])
+    assert [at for at, _ in parrot.received] == pytest.approx([first * 1e-6, (first + second) * 1e-6])
 
 
 def test_frames_share_one_wire_in_both_directions() -> None:
@@ -183,7 +183,7 @@ def test_without_pace_bytes_arrive_at_once() -> None:
     link = MemoryLink(parrot, rate=9600)
     link.write(bytes(226))
     drain(link)
-    assert [at for at, _ in parrot.heard] == [0.0]
+    assert [at for at, _ in parrot.received] == [0.0]
 
 
 # -- gone and back ----------------------------------------------------------------------------------------------
@@ -216,7 +216,7 @@ def test_it_can_vanish_between_request_and_reply() -> None:
     assert link.now() == DELAY / 2
 
 
-def test_a_closed_link_says_so_and_closing_again_does_nothing() -> None:
+def test_a_closed_link_is_lost_and_may_be_closed_again() -> None:
     link = MemoryLink(Parrot())
     link.close()
     link.close()
@@ -224,7 +224,7 @@ def test_a_closed_link_says_so_and_closing_again_does_nothing() -> None:
         link.read(1.0)
 
 
-def test_a_runaway_writer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_only_writes_gets_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motorbus.link.memory.BACKLOG", 3)
     link = MemoryLink(Parrot())
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""Which other process has a port open, told by the real /proc."""
+"""Which other process has a port open, from the real /proc."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ sys.stdin.read()
 """
 
 
-def test_a_port_that_nobody_has_is_free(master: PtyMaster) -> None:
+def test_an_unused_port(master: PtyMaster) -> None:
     assert find_user(master.slave_name) is None
 
 
@@ -73,6 +73,6 @@ def test_the_same_name_in_a_container_is_another_device(
 
 
 @pytest.mark.parametrize("gone", ["no such folder", "."])
-def test_where_nothing_is_told_nobody_is_found(gone: str, master: PtyMaster, tmp_path: Path) -> None:
+def test_without_proc_no_program_is_found(gone: str, master: PtyMaster, tmp_path: Path) -> None:
     (tmp_path / "78").mkdir()
     assert find_user(master.slave_name, tmp_path / gone) is None

@@ -10,21 +10,20 @@ import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Thread
 from types import SimpleNamespace
 
 import pytest
 import serialx
 
-from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link import serial, usb_adapters, wait
+from motorbus.errors import LinkError, PortBusy, PortNotFound, RequestError
+from motorbus.link import serial, usb_adapters
 from motorbus.link.base import Link
 from motorbus.link.lock import holders
-from motorbus.link.serial import SerialLink, has_fine_clock
+from motorbus.link.serial import SerialLink, has_fine_clock, line_speed, ports
 from motorbus.link.wait import wait_readable
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process, run
-from tests.links.usb import usb_port
+from tests.links.usb import fake_usb, usb_port
 
 PING = bytes.fromhex("ff ff 01 02 01 fb")
 ALL_BYTES = bytes(range(256))
@@ -61,69 +60,26 @@ def soon(link: Link) -> float:
     return link.now() + 30
 
 
-def heard(master: PtyMaster, count: int) -> bytes:
+def received(master: PtyMaster, count: int) -> bytes:
     """That many bytes at the simulator's end."""
-    told = b""
-    while len(told) < count:
+    text = b""
+    while len(text) < count:
         assert wait_readable(master.fileno(), 30)
-        told += master.read()
-    return told
+        text += master.read()
+    return text
 
 
 # -- bytes ------------------------------------------------------------------------------------------------------
 
 
-def test_every_byte_passes_both_ways(link: SerialLink, master: PtyMaster) -> None:
-    link.write(ALL_BYTES)
-    assert heard(master, 256) == ALL_BYTES
-    master.write(ALL_BYTES)
-    assert b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes)) == ALL_BYTES
-
-
-def test_what_it_says_of_itself(link: SerialLink, master: PtyMaster) -> None:
+def test_its_attributes(link: SerialLink, master: PtyMaster) -> None:
     face: Link = link
     assert (face.name, face.rate, face.warnings) == (master.slave_name, 1_000_000, ())
     assert (face.paced, face.virtual, face.simulated, face.latency) == (False, False, False, 0.002)
     assert face.fileno() == link._descriptor >= 0
 
 
-def test_nothing_by_the_deadline_is_nothing(link: SerialLink) -> None:
-    until = link.now() + 0.002
-    assert link.read(until) == []
-    assert link.now() >= until
-
-
-@pytest.mark.parametrize("until", [0.0, float("-inf")])
-def test_a_deadline_in_the_past_never_waits(
-    until: float, link: SerialLink, master: PtyMaster, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(wait, "wait_readable", None)  # calling it would raise
-    assert link.read(until) == []
-    master.write(PING)
-    while not (arrived := link.read(until)):
-        pass
-    assert arrived == [PING]
-
-
-def test_a_look_where_nothing_has_come_tries_to_read_nothing(
-    link: SerialLink, master: PtyMaster, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tried: list[int] = []
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "read", lambda descriptor, count: tried.append(descriptor))
-        assert link.read(float("-inf")) == link.read(link.now()) == []
-    assert not tried
-    master.write(PING)
-    assert wait_readable(link.fileno() or 0, 30)
-    assert link.read(float("-inf")) == [PING]
-
-
-def test_a_port_that_takes_no_more_blocks_nobody(link: SerialLink) -> None:
-    with pytest.raises(LinkError, match=r"takes no more bytes: \d+ of 1000000"):
-        link.write(bytes(1_000_000))
-
-
-def test_what_lay_in_the_port_before_it_was_opened_is_not_read(master: PtyMaster) -> None:
+def test_bytes_from_before_the_open_are_not_read(master: PtyMaster) -> None:
     master.write(b"stale")
     link = SerialLink(master.slave_name, rate=1_000_000)
     assert link.read(0.0) == []
@@ -131,50 +87,6 @@ def test_what_lay_in_the_port_before_it_was_opened_is_not_read(master: PtyMaster
 
 
 # -- gone -------------------------------------------------------------------------------------------------------
-
-
-def test_a_port_that_vanished_is_a_lost_link(link: SerialLink, master: PtyMaster) -> None:
-    master.close()
-    with pytest.raises(LinkLost, match="is gone"):
-        link.read(soon(link))
-    with pytest.raises(LinkLost, match="is gone"):
-        link.write(PING)
-
-
-def test_a_port_that_vanishes_while_one_waits_is_a_lost_link(link: SerialLink, master: PtyMaster) -> None:
-    errors: list[Exception] = []
-
-    def wait() -> None:
-        try:
-            link.read(soon(link))
-        except LinkError as error:
-            errors.append(error)
-
-    reader = Thread(target=wait)
-    reader.start()
-    master.close()
-    reader.join(30)
-    assert [type(error) for error in errors] == [LinkLost]
-
-
-def test_what_came_before_the_end_is_read_first(link: SerialLink, master: PtyMaster) -> None:
-    master.write(b"last words")
-    assert wait_readable(link._descriptor, 30)
-    assert link.read(soon(link)) == [b"last words"]
-    master.close()
-    with pytest.raises(LinkLost):
-        link.read(soon(link))
-
-
-def test_used_after_close_it_is_lost(link: SerialLink) -> None:
-    link.close()
-    link.close()
-    with pytest.raises(LinkLost):
-        link.write(PING)
-    with pytest.raises(LinkLost):
-        link.read(soon(link))
-    with pytest.raises(LinkLost):
-        link.tune(9600)
 
 
 def test_no_descriptor_is_left_behind(master: PtyMaster) -> None:
@@ -186,41 +98,35 @@ def test_no_descriptor_is_left_behind(master: PtyMaster) -> None:
     assert len(os.listdir("/proc/self/fd")) == before
 
 
-# -- held by somebody -------------------------------------------------------------------------------------------
+# -- in use -----------------------------------------------------------------------------------------------------
 
 
-def test_a_second_link_in_this_process_is_refused(link: SerialLink, master: PtyMaster) -> None:
-    with pytest.raises(PortBusy, match="this very program") as refused:
-        SerialLink(master.slave_name, rate=1_000_000)
-    assert refused.value.owner == os.getpid()
-
-
-def test_another_motorbus_process_is_named_by_any_name_of_the_port(master: PtyMaster, tmp_path: Path) -> None:
+def test_another_motorbus_process_is_named_under_any_name_of_the_port(
+    master: PtyMaster, tmp_path: Path
+) -> None:
     (tmp_path / "arm").symlink_to(master.slave_name)
     with other_process(HOLD_LINK, master.slave_name) as process:
-        with pytest.raises(PortBusy, match=f"process {process.pid}") as refused:
+        with pytest.raises(PortBusy, match=f"process {process.pid}") as caught:
             SerialLink(str(tmp_path / "arm"), rate=1_000_000)
-        assert refused.value.owner == process.pid
+        assert caught.value.owner == process.pid
         assert [owner.pid for owner in holders()] == [process.pid]
 
 
-def test_a_foreign_program_is_named(master: PtyMaster) -> None:
+def test_another_program_is_named(master: PtyMaster) -> None:
     with other_process(HOLD_OPEN, master.slave_name) as process:
-        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as refused:
+        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as caught:
             SerialLink(master.slave_name, rate=1_000_000)
-        assert refused.value.owner == process.pid
+        assert caught.value.owner == process.pid
     SerialLink(master.slave_name, rate=1_000_000).close()
 
 
-def test_a_program_that_locks_the_device_is_seen_even_where_nobody_can_look(
-    master: PtyMaster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_locked_device_is_busy_without_proc(master: PtyMaster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial, "find_user", lambda _: None)
     held = os.open(master.slave_name, os.O_RDWR | os.O_NOCTTY)
     fcntl.flock(held, fcntl.LOCK_EX)
-    with pytest.raises(PortBusy, match="another program") as refused:
+    with pytest.raises(PortBusy, match="another program") as caught:
         SerialLink(master.slave_name, rate=1_000_000)
-    assert refused.value.owner is None
+    assert caught.value.owner is None
     os.close(held)
 
 
@@ -230,7 +136,7 @@ def test_a_killed_owner_leaves_the_port_free(master: PtyMaster) -> None:
         process.wait(timeout=30)
         link = SerialLink(master.slave_name, rate=1_000_000)
         link.write(PING)
-        assert heard(master, 6) == PING
+        assert received(master, 6) == PING
         link.close()
 
 
@@ -248,18 +154,18 @@ def test_the_kernel_keeps_others_out_of_a_device(master: PtyMaster) -> None:
 # -- refused ----------------------------------------------------------------------------------------------------
 
 
-def test_a_port_that_does_not_exist_comes_with_those_that_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_for_a_missing_port_lists_the_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serialx, "list_serial_ports", lambda: [usb_port()])
     with pytest.raises(PortNotFound, match=r"one of /dev/ttyACM0 \(CH343"):
         SerialLink("/dev/no-such-port", rate=1_000_000)
 
 
 @pytest.mark.parametrize("path", ["/dev/null", "/tmp", "file"])
-def test_what_is_no_serial_port(path: str, tmp_path: Path) -> None:
+def test_other_files_are_no_serial_ports(path: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(PortNotFound, match="is not a serial port") as refused:
+    with pytest.raises(PortNotFound, match="is not a serial port") as caught:
         SerialLink(str(tmp_path / path), rate=1_000_000)
-    assert "`motorbus ports`" in refused.value.advice
+    assert "`motorbus ports`" in caught.value.advice
 
 
 FORBIDDEN = """
@@ -282,10 +188,10 @@ with tempfile.TemporaryDirectory(dir="/tmp") as folder:
 
 def test_no_permission_says_how_to_get_it(master: PtyMaster) -> None:
     Path(master.slave_name).chmod(0)
-    told = run(FORBIDDEN, master.slave_name)
-    assert "no permission to open it" in told
-    assert "dialout" in told
-    assert "uaccess" in told
+    text = run(FORBIDDEN, master.slave_name)
+    assert "no permission to open it" in text
+    assert "dialout" in text
+    assert "uaccess" in text
 
 
 # -- latency ----------------------------------------------------------------------------------------------------
@@ -333,10 +239,10 @@ def test_the_rate_can_be_changed_and_bytes_still_pass(link: SerialLink, master: 
         link.tune(rate)
         assert (link.rate, master.rate()) == (rate, rate)
         link.write(PING)
-        assert heard(master, 6) == PING
+        assert received(master, 6) == PING
 
 
-def test_what_is_going_out_keeps_its_rate(link: SerialLink) -> None:
+def test_bytes_on_their_way_keep_their_rate(link: SerialLink) -> None:
     link.tune(9600)
     begin = link.now()
     link.write(bytes(48))
@@ -353,7 +259,7 @@ def test_an_adapter_that_rounds_too_far_is_refused(
     SerialLink(master.slave_name, rate=115_000).close()
 
 
-def test_what_is_no_rate(link: SerialLink) -> None:
+def test_a_rate_must_be_positive(link: SerialLink) -> None:
     with pytest.raises(RequestError, match="0 is not a rate"):
         link.tune(0)
 
@@ -372,9 +278,82 @@ def test_terminal_settings_are_not_left_cooked(link: SerialLink, master: PtyMast
 
 
 @pytest.mark.parametrize(("resolution", "sharp"), [(1e-9, True), (1e-7, True), (0.0156, False)])
-def test_a_clock_of_coarse_ticks_cannot_tell_how_long_a_frame_took(
+def test_a_coarse_clock_is_recognised(
     monkeypatch: pytest.MonkeyPatch, resolution: float, sharp: bool
 ) -> None:
     found = SimpleNamespace(resolution=resolution)
     monkeypatch.setattr(time, "get_clock_info", lambda name: found)
     assert has_fine_clock() is sharp
+
+
+# -- line speed ------------------------------------------------------------------------------------------------
+
+
+FEETECH_RATES = (
+    1_000_000,
+    500_000,
+    250_000,
+    128_000,
+    115_200,
+    76_800,
+    57_600,
+    38_400,
+    19_200,
+    14_400,
+    9_600,
+    4_800,
+)
+
+
+@pytest.mark.parametrize("rate", FEETECH_RATES)
+def test_every_rate_of_the_servos_is_read_at_both_ends(rate: int, master: PtyMaster) -> None:
+    port = serialx.serial_for_url(master.slave_name, baudrate=rate)
+    port.open()
+    assert (line_speed(port.fileno()), line_speed(master.fileno())) == (rate, rate)
+    port.close()
+
+
+def test_the_standard_rates_are_read_without_termios2(
+    master: PtyMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial, "_termios2_speed", lambda _: 0)
+    settings = termios.tcgetattr(master.fileno())
+    settings[4] = settings[5] = termios.B57600
+    termios.tcsetattr(master.fileno(), termios.TCSANOW, settings)
+    assert line_speed(master.fileno()) == 57_600
+
+
+def test_a_file_has_no_rate() -> None:
+    with open(os.devnull) as nothing:
+        assert line_speed(nothing.fileno()) is None
+
+
+# -- the list of ports -----------------------------------------------------------------------------------------
+
+
+PLAIN = usb_port(device="/dev/ttyS0", resolved_device="/dev/ttyS0", vid=None, pid=None, product=None)
+
+
+def test_ports_are_listed_with_what_they_probably_are() -> None:
+    usb, plain = ports(lambda: [PLAIN, usb_port()])
+    assert usb.device == "/dev/ttyACM0"
+    assert usb.stable == "/dev/serial/by-id/usb-1a86_USB_Single_Serial_585A-if00"
+    assert (usb.vid, usb.pid, usb.serial_number) == (0x1A86, 0x55D3, "585A0076891")
+    assert usb.guess == "CH343: usual on FEETECH and Waveshare servo boards"
+    assert (plain.device, plain.stable, plain.vid, plain.guess) == ("/dev/ttyS0", "", None, "")
+
+
+def test_ports_from_the_tree_of_the_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sysfs, devices = fake_usb(tmp_path)
+    monkeypatch.setattr("serialx.platforms.serial_linux.SYS_ROOT", sysfs)
+    monkeypatch.setattr("serialx.platforms.serial_linux.DEV_ROOT", devices)
+    [port] = ports()
+    assert port.device == str(devices / "ttyACM3")
+    assert port.stable == str(devices / "serial" / "by-id" / "usb-STM_3669-if00")
+    assert (port.vid, port.pid, port.serial_number) == (0x0483, 0x5740, "3669")
+    assert port.description == "STM Virtual ComPort"
+    assert port.guess.startswith("STM32")
+
+
+def test_the_ports_of_this_machine() -> None:
+    assert all(port.device for port in ports())

@@ -38,25 +38,25 @@ def remote(server: Server) -> Iterator[PolledLink]:
 
 
 def everything(link: Link, count: int) -> bytes:
-    told = b""
-    while len(told) < count:
-        told += b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes))
-    return told
+    text = b""
+    while len(text) < count:
+        text += b"".join(part for part in link.read(soon(link)) if isinstance(part, bytes))
+    return text
 
 
 def test_bytes_pass_through_a_server_and_back(remote: PolledLink, server: Server) -> None:
     remote.write(PING + ALL_BYTES)
     assert everything(remote, 262) == PING + ALL_BYTES
-    assert bytes(server.heard) == PING + ALL_BYTES
+    assert bytes(server.received) == PING + ALL_BYTES
 
 
-def test_the_server_is_told_the_rate(remote: PolledLink, server: Server) -> None:
+def test_the_rate_is_set_at_the_server(remote: PolledLink, server: Server) -> None:
     assert server.rate == 1_000_000
     remote.tune(76_800)
     assert (server.rate, remote.rate) == (76_800, 76_800)
 
 
-def test_what_a_remote_link_says_of_itself(remote: PolledLink, server: Server) -> None:
+def test_its_attributes(remote: PolledLink, server: Server) -> None:
     link: Link = remote
     assert (link.name, link.fileno(), link.paced, link.virtual) == (server.url, None, False, False)
     assert link.latency > 0.01
@@ -106,7 +106,7 @@ def test_no_server_is_no_port(server: Server) -> None:
         open_serial(server.url, rate=1_000_000)
 
 
-def test_a_server_that_does_not_speak_it_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_without_rfc2217(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial, "CONNECT_TIME", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as raw, pytest.raises(LinkError, match="socket://"):
         open_serial(f"rfc2217://127.0.0.1:{raw.getsockname()[1]}", rate=1_000_000)

@@ -40,19 +40,19 @@ class Cramped:
 
 
 @pytest.mark.parametrize("strict", [False, True])
-def test_it_is_told_the_rate_and_opened_once(strict: bool) -> None:
+def test_the_commands_at_open(strict: bool) -> None:
     adapter = Picky(strict=strict)
     with on_terminal(adapter) as peer:
         link = open_can(peer, 250_000)
-        assert adapter.told == [b"C", b"S5", b"O"]
+        assert adapter.commands == [b"C", b"S5", b"O"]
         assert (adapter.bitrate, adapter.open, link.counts.refused) == (250_000, True, 0)
         link.write(PING)
         assert some(link) == [PONG]
         link.close()
-    assert adapter.told[-1] == b"C"
+    assert adapter.commands[-1] == b"C"
 
 
-def test_a_mute_adapter_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_adapter_costs_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slcan, "FIRST_REPLY", 0.01)
     with on_terminal(Mute()) as peer:
         link = open_can(peer)
@@ -67,7 +67,7 @@ def test_a_rate_that_the_adapter_refuses(strict: bool) -> None:
     with on_terminal(adapter) as peer:
         with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
             open_can(peer, 500_000)
-        assert adapter.told == [b"C", b"S6"]
+        assert adapter.commands == [b"C", b"S6"]
         assert not adapter.open
         open_can(peer, 250_000).close()
 
@@ -83,7 +83,7 @@ def test_a_refusal_that_comes_late_counts(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_refusal_that_comes_after_it_was_opened_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As over Bluetooth: the first answers come when somebody reads already. Nothing goes out at a wrong rate then."""
+    """Over Bluetooth the first replies may come after the open. Then nothing is sent at the wrong rate."""
     monkeypatch.setattr(slcan, "FIRST_REPLY", 0.0)
     monkeypatch.setattr(slcan, "SILENT_PAUSE", 0.0)
     adapter = Mute()
@@ -95,7 +95,7 @@ def test_a_refusal_that_comes_after_it_was_opened_counts(monkeypatch: pytest.Mon
         with pytest.raises(LinkError, match="channel of the adapter is closed"):
             link.write(PING)
         link.close()
-    assert peer.heard == []
+    assert peer.received == []
 
 
 def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
@@ -105,7 +105,7 @@ def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
         adapter._answer += b"z\rz\r"
         with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
             open_can(peer, 500_000)
-    assert adapter.told == [b"C", b"S6"]
+    assert adapter.commands == [b"C", b"S6"]
 
 
 def test_a_fork_that_closes_leaves_the_channel_to_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,7 +155,7 @@ def test_a_rate_that_is_refused_later_leaves_it_as_it_was() -> None:
         link.close()
 
 
-def test_what_was_heard_at_another_rate_is_dropped() -> None:
+def test_frames_of_another_rate_are_dropped() -> None:
     with on_terminal() as peer:
         link = open_can(peer)
         peer.echoes = False
@@ -167,7 +167,7 @@ def test_what_was_heard_at_another_rate_is_dropped() -> None:
 
 
 def test_frames_that_come_while_it_is_opened_are_no_answers() -> None:
-    """The adapter was left open by somebody, on a busy bus."""
+    """A killed program left the channel open, on a busy bus."""
     adapter = Picky()
     adapter.open = True
     with on_terminal(adapter) as peer:
@@ -187,7 +187,7 @@ def test_damage_is_counted_and_survived() -> None:
         assert some(link) == [PONG]
         assert link.counts.refused == 2
         assert "refused 2 frames" in link.trouble()
-        assert link.trouble() == "", "told once"
+        assert link.trouble() == "", "reported once"
         peer.say(b"t6254\r", PONG)
         assert some(link) == [PONG]
         assert "1 lines of the adapter were damaged" in link.trouble()

@@ -17,7 +17,7 @@ from tests.links.can_peer import PING, PONG, open_can, serving, socketcand_serve
 
 @contextlib.contextmanager
 def server(*words: bytes) -> Iterator[str]:
-    """It says the first word unasked, each other one when it has heard something, and hangs up after the last."""
+    """It sends the first word at once and each other one for a request, and hangs up after the last."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def accept() -> bool:
@@ -46,7 +46,7 @@ def test_a_server_of_another_kind(words: tuple[bytes, ...], complaint: str) -> N
         open_can(url)
 
 
-def test_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_server(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socketcand, "REPLY_TIME", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(LinkError, match="does not greet"):
         open_can(f"can://socketcand/127.0.0.1:{mute.getsockname()[1]}/can0")
@@ -72,7 +72,7 @@ def test_a_server_that_talks_without_end(monkeypatch: pytest.MonkeyPatch, word: 
 
 
 @pytest.mark.parametrize("words", [(), (b"< hi >",), (b"< hi >", b"< ok >")])
-def test_a_server_that_falls_silent_when_it_was_asked_before(
+def test_a_server_that_falls_silent_after_the_check(
     monkeypatch: pytest.MonkeyPatch, words: tuple[bytes, ...]
 ) -> None:
     """It has greeted who knocked; python-can would wait for it without end."""
@@ -85,7 +85,7 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
             for number, word in enumerate(next(scripts)):
                 if number:
                     connection.recv(256)
-                    # for what is said after this one
+                    # for the next reply
                     monkeypatch.setattr(socketcand, "REPLY_TIME", 0.1)
                 connection.sendall(word)
             return True
@@ -94,7 +94,7 @@ def test_a_server_that_falls_silent_when_it_was_asked_before(
             open_can(f"can://socketcand/127.0.0.1:{listener.getsockname()[1]}/can0")
 
 
-def test_a_rate_that_was_said_cannot_be_checked() -> None:
+def test_a_given_rate_cannot_be_checked() -> None:
     with socketcand_server() as peer:
         link = open_can(peer, 250_000)
         assert link.rate == 250_000

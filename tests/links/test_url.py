@@ -23,7 +23,7 @@ def test_a_device_is_opened(master: PtyMaster) -> None:
     link.close()
 
 
-def test_a_latency_that_is_said_holds_and_else_that_of_the_link(master: PtyMaster) -> None:
+def test_the_latency_option_wins(master: PtyMaster) -> None:
     for options, latency in (({"latency": 0.0}, 0.0), ({"latency": 0.0005}, 0.0005), ({}, TERMINAL_LATENCY)):
         link = open_link(master.slave_name, rate=500_000, options=options)
         assert link.latency == latency
@@ -82,13 +82,13 @@ def test_a_port_of_the_other_kind(port: str, kind: str, words: str) -> None:
 
 
 @pytest.mark.parametrize("port", ["can://slcan/dev/tty\0ACM0", "can://virtual/\0"])
-def test_what_is_no_channel(port: str) -> None:
+def test_invalid_channels(port: str) -> None:
     with pytest.raises(RequestError, match="is not a port"):
         open_link(port, rate=500_000, kind="frames")
 
 
 @pytest.mark.parametrize("port", ["", "   ", "/dev/tty\0ACM0"])
-def test_what_is_no_port(port: str) -> None:
+def test_invalid_ports(port: str) -> None:
     with pytest.raises(RequestError, match="is not a port"):
         open_link(port, rate=1_000_000)
 
@@ -100,6 +100,6 @@ def test_a_bad_address(scheme: str) -> None:
 
 
 @pytest.mark.parametrize("rate", [0, -9600])
-def test_what_is_no_rate(rate: int, master: PtyMaster) -> None:
+def test_a_rate_must_be_positive(rate: int, master: PtyMaster) -> None:
     with pytest.raises(RequestError, match="not a rate"):
         open_link(master.slave_name, rate=rate)

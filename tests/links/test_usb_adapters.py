@@ -35,11 +35,11 @@ def test_the_usual_adapters_are_known(ids: tuple[int, int], text: str) -> None:
 
 
 @pytest.mark.parametrize("ids", [(0xDEAD, 0xBEEF), (None, None), (0x1A86, None)])
-def test_nothing_is_guessed_of_others(ids: tuple[int | None, int | None]) -> None:
+def test_unknown_adapters(ids: tuple[int | None, int | None]) -> None:
     assert guess(*ids) == ""
 
 
-def test_the_description_is_what_the_adapter_says() -> None:
+def test_the_description() -> None:
     port = PortInfo("/dev/ttyACM0", "", None, None, "", "QinHeng", "USB Single Serial", "")
     assert port.description == "QinHeng USB Single Serial"
     assert port._replace(manufacturer="").description == "USB Single Serial"
@@ -51,7 +51,7 @@ def test_the_latency_timer_is_read(tmp_path: Path) -> None:
     assert latency_timer("/dev/ttyUSB1", tmp_path) is None
 
 
-def test_nonsense_in_its_place_is_no_timer(tmp_path: Path) -> None:
+def test_an_unreadable_timer(tmp_path: Path) -> None:
     timer_file(tmp_path, "ttyUSB0").write_text("fast\n")
     assert latency_timer("/dev/ttyUSB0", tmp_path) is None
 

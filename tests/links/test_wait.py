@@ -28,12 +28,12 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None
         monkeypatch.setattr(wait, "SELECT_LIMIT", 0)
 
 
-def test_what_is_there_is_seen(pipe: tuple[int, int]) -> None:
+def test_data_is_seen(pipe: tuple[int, int]) -> None:
     os.write(pipe[1], b"x")
     assert wait_readable(pipe[0], float("inf"))
 
 
-def test_nothing_is_nothing(pipe: tuple[int, int]) -> None:
+def test_a_time_out(pipe: tuple[int, int]) -> None:
     assert not wait_readable(pipe[0], 0.001)
 
 
@@ -81,7 +81,7 @@ def test_the_end_of_the_other_side_is_seen(pipe: tuple[int, int]) -> None:
     os.close(reader)
 
 
-def test_of_several_those_are_told_that_have_something(pipe: tuple[int, int]) -> None:
+def test_of_several_the_readable_ones_are_returned(pipe: tuple[int, int]) -> None:
     reader, writer = os.pipe()
     try:
         assert wait_any([pipe[0], reader], 0.001) == []
@@ -96,6 +96,6 @@ def test_of_several_those_are_told_that_have_something(pipe: tuple[int, int]) ->
         wait_any([pipe[0], pipe_end], 1.0)
 
 
-def test_a_number_that_is_no_descriptor_is_refused(pipe: tuple[int, int]) -> None:
+def test_an_invalid_descriptor_raises(pipe: tuple[int, int]) -> None:
     with pytest.raises((OSError, ValueError)):
         wait_any([pipe[0], -1], 1.0)
