@@ -130,8 +130,7 @@ class Bus:
             request.course = engine.prepare(request)
         job = RequestJob(request, losses=engine.losses)
         engine.submit(job, self.link.now())
-        value: T = self._finish(job)
-        return value
+        return self._finish(job)
 
     def _continue(self, prepared: Prepared, chunks: Sequence[Data]) -> Any:
         """The reply to a prepared request is in pieces, damaged or missing: go on by the general path."""
