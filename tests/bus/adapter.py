@@ -12,7 +12,7 @@ from motorbus.bus import blocking, engine
 from motorbus.bus.crank import crank
 from motorbus.bus.pump import Bus
 from motorbus.bus.run import Run
-from motorbus.bus.stop import StopOutcome
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import TaskTree
 from motorbus.core.goal import Goal
 from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen, Operation

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import request_estop
+from motorbus.bus.stop_socket import request_estop
 from motorbus.core.operation import Effect, Operation, Pause
 from motorbus.errors import Interrupted, LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
@@ -161,7 +161,7 @@ def test_another_process_can_stop_the_bus(tmp_path: Path) -> None:
     path = tmp_path / "stop"
     bus, responder = served(path)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    script = "import sys; from pathlib import Path; from motorbus.bus.stop import request_estop; "
+    script = "import sys; from pathlib import Path; from motorbus.bus.stop_socket import request_estop; "
     script += "print(request_estop(Path(sys.argv[1])).acknowledged)"
     source = str(Path(sys.modules["motorbus"].__file__ or "").parent.parent)
     done = subprocess.run(

@@ -9,7 +9,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import request_estop
+from motorbus.bus.stop_socket import request_estop
 from motorbus.errors import LinkError, PortNotFound
 from motorbus.families.feetech import FAMILY, Servo
 from motorbus.link.memory import MemoryLink

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus import stop
+from motorbus.bus import stop_socket
 from motorbus.cli import estop
 from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Data
@@ -283,11 +283,11 @@ def test_without_a_bus_real_ports_and_the_machine_file_are_stopped_and_the_other
 def test_a_process_that_is_still_opening_the_port_is_stopped_once_it_offers_that(
     served: Simulated, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    request = stop.request_estop
+    request = stop_socket.request_estop
     monkeypatch.setattr(estop, "OPENING", 30.0)
     with program(OPENING, served.bus) as process:
 
-        def first_in_vain(path: Path) -> stop.StopOutcome:
+        def first_in_vain(path: Path) -> stop_socket.StopOutcome:
             try:
                 return request(path)
             except motorbus.PortNotFound:
@@ -296,7 +296,7 @@ def test_a_process_that_is_still_opening_the_port_is_stopped_once_it_offers_that
                 process.stdin.flush()
                 raise
 
-        monkeypatch.setattr(stop, "request_estop", first_in_vain)
+        monkeypatch.setattr(stop_socket, "request_estop", first_in_vain)
         ran = run("estop", served.bus, "--json")
     (one,) = ran.document["buses"]
     assert (ran.code, one["acknowledged"]) == (0, [1])
@@ -417,7 +417,7 @@ def test_ports_that_are_gone_end_it_as_they_end_a_stop(bench: Bench, run: Run) -
 def test_a_suspended_process_is_named_and_the_supply_is_what_is_left(
     served: Simulated, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stop, "request_estop", partial(stop.request_estop, timeout=0.2))
+    monkeypatch.setattr(stop_socket, "request_estop", partial(stop_socket.request_estop, timeout=0.2))
     with program(WATCHING, served.bus) as process:
         process.send_signal(signal.SIGSTOP)
         try:

@@ -16,7 +16,7 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.crank import crank
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import StopOutcome
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.ticket import Flight
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.bus.turns import Turns

@@ -3,91 +3,80 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
+from select import POLLIN, poll
 from threading import get_ident
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.engine import Engine
+from motorbus.bus.base import IDLE, BaseBus
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN
-from motorbus.bus.jobs import RateJob, RequestJob
+from motorbus.bus.jobs import RequestJob
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
-from motorbus.bus.stop_rounds import StopOutcome, run_rounds
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
-from motorbus.bus.turn import Turn
 from motorbus.core.operation import UNLIKE, Data, Exchange, Runnable
-from motorbus.errors import LinkError, LinkLost, MotorbusError
-from motorbus.link.base import Link
+from motorbus.errors import LinkError, MotorbusError
 
 T = TypeVar("T")
 
-IDLE = 0.25
-"""s; the longest wait for a notification before the procedure is looked at again."""
-SLICE = 0.002
-"""s for which a thread that only waits for a notification keeps the turn while others want it."""
+LOOK: Final = 0.001
+"""s between two looks at a link without descriptor, while several buses are waited for."""
 
 
-class Bus:
+class Bus(BaseBus):
     """An open bus. Any number of threads may call `run`; the holder of `turn` alone has requests in flight."""
-
-    def __init__(self, link: Link, engine: Engine) -> None:
-        self.link = link
-        self.engine = engine
-        self.turn = Turn()
-        self.now = link.now
 
     def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
         """Run a procedure and return its value; `report` gets its events.
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
-        if isinstance(procedure, Exchange) and not (procedure.effect and self._required_reads(procedure)):
+        if isinstance(procedure, Exchange) and not (
+            procedure.effect in GATED and self.required_reads(procedure)
+        ):
             return self.transact(procedure)  # type: ignore[no-any-return]
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
         signals.depth += 1
         try:
             part = _Part(self, procedure, report)
-            _run_tree(part)
+            _run_parts([part])
             return part.tree.result()
         finally:
             signals.depth -= 1
             if signals.pending is not None and not signals.depth:
                 raise signals.take()  # type: ignore[misc]
 
-    def _required_reads(self, request: Exchange[Any]) -> Sequence[Runnable[Any]]:
-        interlock = self.engine.interlock
-        return interlock.required_reads(request) if interlock is not None and request.effect in GATED else ()
-
     def transact(self, request: Exchange[Any]) -> Any:
         """Carry out one request."""
         engine, link, turn = self.engine, self.link, self.turn
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+        stops = engine.positions.stops_for(request) if request.effect in GATED else None
         signals.depth += 1
         try:
             turn.acquire(request.rank)
             try:
                 prepared: Prepared | None = request.course
                 if prepared is None or prepared.engine is not engine:
-                    return self._carry_out(request)
+                    return self._carry_out(request, stops)
                 if not engine.ready and not engine.check_ready():
-                    return self._carry_out(request)
+                    return self._carry_out(request, stops)
                 single = prepared.single
                 if single is not None and single.length == prepared.length:
                     prepared = prepared.alternate
                 if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
-                    return self._carry_out(request)
+                    return self._carry_out(request, stops)
                 if prepared.timing != engine.timing:
                     engine.measure(prepared)
                 if stale := link.read(-inf):
                     engine.feed(stale, link.now())
-                    return self._carry_out(request)
+                    return self._carry_out(request, stops)
                 now = link.now()
                 if now < engine.free_at:
-                    return self._carry_out(request)
+                    return self._carry_out(request, stops)
                 attempt = prepared.attempt
                 attempt.sent_at = now
                 attempt.deadline = deadline = now + prepared.budget
@@ -108,7 +97,7 @@ class Bus:
                         return value
                 return self._continue(prepared, chunks)
             except LinkError as error:
-                engine.lost(error)
+                self._lost(error)
                 raise
             finally:
                 turn.release()
@@ -117,18 +106,13 @@ class Bus:
             if signals.pending is not None and not signals.depth:
                 raise signals.take()  # type: ignore[misc]
 
-    def estop(self) -> StopOutcome:
-        """Emergency stop, in the calling thread."""
-        with self.turn:
-            self.engine.latch(self.now(), "in this process")
-            return run_rounds(self)
-
-    def _carry_out(self, request: Exchange[Any]) -> Any:
+    def _carry_out(self, request: Exchange[Any], stops: int | None) -> Any:
         """One request by the general path. The caller holds the turn."""
         engine = self.engine
-        if request.course is None:
+        if request.course is None or getattr(request.course, "engine", None) is not engine:
             request.course = engine.prepare(request)
         job = RequestJob(request, losses=engine.losses)
+        job.stops = stops
         engine.submit(job, self.link.now())
         return self._finish(job)
 
@@ -151,60 +135,61 @@ class Bus:
                 self.receive(inf)
         return job.result()
 
-    def send(self) -> None:
-        """Write all that may be sent now."""
-        engine, link = self.engine, self.link
-        try:
-            now = link.now()
-            if engine.queue and (stale := link.read(now)):  # it cannot answer what has not left
-                engine.feed(stale, now)
-            while (out := engine.next_frame(now)) is not None:
-                if isinstance(out, RateJob):
-                    self._set_rate(out)
-                else:
-                    link.write(out)
-                    engine.written()
-        except LinkError as error:
-            engine.lost(error)
+    def volley(self, *exchanges: Exchange[Any]) -> list[Any]:
+        """Carry out several requests in order, as a control loop does in every cycle; their values.
 
-    def _set_rate(self, job: RateJob) -> None:
-        try:
-            if job.tune.rate:
-                self.link.tune(job.tune.rate, job.tune.listen_only or self.engine.always_listening)
-        except MotorbusError as error:
-            self.engine.rate_changed(job, error)
-            if isinstance(error, LinkLost):
-                raise
-        else:
-            self.engine.rate_changed(job)
-
-    def receive(self, until: float) -> None:
-        """Wait for data, at most until this moment or the next deadline, and feed the engine.
-
-        Only what was due before this look is overdue after it: the reply may be in the buffer of a host that was late.
+        Raises the first error; what comes behind it has not been sent then.
         """
-        engine, link = self.engine, self.link
-        try:
-            looked = link.now()
-            chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
-            engine.feed(chunks, link.now(), looked)
-        except LinkError as error:
-            engine.lost(error)
+        return [self.run(exchange) for exchange in exchanges]
+
+    def close(self) -> None:
+        """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
+        self._hang_up()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[Bus, Any]:
+    """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
+
+    Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
+    """
+    signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+    signals.depth += 1
+    try:
+        parts = [_Part(bus, procedure, None) for bus, procedure in procedures.items()]
+        _run_parts(parts)
+        return {part.bus: part.outcome() for part in parts}
+    finally:
+        signals.depth -= 1
+        if signals.pending is not None and not signals.depth:
+            raise signals.take()  # type: ignore[misc]
 
 
 class _Part(Generic[T]):
-    """The tree on one bus; `news` is set when it can go on."""
+    """A procedure on one bus; `news` is set when its tree can go on."""
 
     def __init__(self, bus: Bus, procedure: Runnable[T], report: Notify | None) -> None:
         self.bus = bus
         self.news = True
         self.holds_turn = False
         self.tree: TaskTree[T] = TaskTree(
-            bus.engine, procedure, now=bus.link.now, report=report, settled=self._settled
+            bus.engine, procedure, now=bus.link.now, report=bus.listener(report), settled=self._settled
         )
 
     def _settled(self) -> None:
         self.news = True
+
+    def outcome(self) -> Any:
+        """The value or the MotorbusError; raises any other error."""
+        error = self.tree.error()
+        if error is None or isinstance(error, MotorbusError):
+            return self.tree.root.value if error is None else error
+        raise error
 
     def take_turn(self) -> None:
         if not self.holds_turn:
@@ -220,18 +205,24 @@ class _Part(Generic[T]):
 
     def advance(self) -> bool:
         """Step the tree and send; True when it has ended."""
+        if self.tree.root.finished:
+            return True
         self.take_turn()
         while self.news and not self.tree.root.finished:
             self.news = False
-            if self.tree.advance():
-                break
-            self.bus.send()
+            if not self.tree.advance():
+                self.bus.send()
         return self.tree.root.finished
+
+    @property
+    def only_sleeps(self) -> bool:
+        """It waits for nothing but a moment."""
+        return self.bus.engine.idle and not self.bus.engine.listeners
 
     def wait(self) -> None:
         """Wait until something comes, a deadline, or a moment that the tree waits for."""
         bus, moment = self.bus, self.tree.next_moment()
-        if bus.engine.idle and not bus.engine.listeners and not bus.link.virtual:
+        if self.only_sleeps and not bus.link.virtual:
             self.release_turn()
             time.sleep(max(0.0, min(moment - bus.link.now(), IDLE)))
         else:
@@ -239,24 +230,75 @@ class _Part(Generic[T]):
         self.news = True
 
 
-def _run_tree(part: _Part[Any]) -> None:
-    """Run a tree to its end. An interrupt cancels it; it cleans up and is finished then."""
+def _run_parts(parts: Sequence[_Part[Any]]) -> None:
+    """Run all trees to their end. An interrupt, or an error that is none of ours, cancels them; they clean up."""
     signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
     try:
         while True:
             try:
-                if part.advance():
+                going = [part for part in parts if not part.advance()]
+                if not going:
                     return
-                signals.waiting = part.bus.engine.idle
-                if signals.pending is not None and (error := signals.take()) is not None:
+                _raise_interrupt(parts)
+                signals.waiting = all(part.bus.engine.idle for part in going)
+                if (error := signals.take()) is not None:
                     raise error
-                part.wait()
+                _wait(going)
             except BaseException as error:
-                part.take_turn()
-                part.tree.cancel(error)
-                part.news = True
+                for part in parts:
+                    if not part.tree.root.finished:
+                        part.take_turn()
+                        part.tree.cancel(error)
+                        part.news = True
             finally:
                 signals.waiting = False
     finally:
-        if part.holds_turn:
-            part.bus.turn.release()
+        for part in parts:
+            if part.holds_turn:
+                part.holds_turn = False
+                part.bus.turn.release()
+
+
+def _raise_interrupt(parts: Sequence[_Part[Any]]) -> None:
+    """Raise what ended one tree and is no MotorbusError, so that the others end, too."""
+    for part in parts:
+        error = part.tree.root.error
+        if part.tree.cancellation is None and not isinstance(error, MotorbusError | None):
+            part.tree.cancellation = error
+            raise error
+
+
+def _wait(parts: Sequence[_Part[Any]]) -> None:
+    """Wait until one of these can go on."""
+    if len(parts) == 1:
+        parts[0].wait()
+    elif all(part.bus.link.virtual for part in parts):
+        first = min(parts, key=_next_event)
+        first.wait()
+    else:
+        _poll(parts)
+
+
+def _next_event(part: _Part[Any]) -> float:
+    """When something happens on this simulated bus, in s of its clock."""
+    link = part.bus.link
+    due = link.due() if hasattr(link, "due") else inf
+    moment = min(part.tree.next_moment(), part.bus.engine.next_deadline(), due)
+    return max(moment, link.now())
+
+
+def _poll(parts: Sequence[_Part[Any]]) -> None:
+    """One wait on the descriptors of all links, then take what has come."""
+    waiter, seconds = poll(), IDLE
+    for part in parts:
+        descriptor = part.bus.link.fileno()
+        if descriptor is None:
+            seconds = min(seconds, LOOK)
+        else:
+            waiter.register(descriptor, POLLIN)
+        moment = min(part.tree.next_moment(), part.bus.engine.next_deadline())
+        seconds = min(seconds, max(0.0, moment - part.bus.link.now()))
+    waiter.poll(1000 * seconds)
+    for part in parts:
+        part.bus.receive(-inf)
+        part.news = True

@@ -657,14 +657,19 @@ class Engine:
             moments.append(self.free_at)
         return min(moments, default=inf)
 
-    def latch(self, now: float, by: str) -> None:
-        """Emergency stop: end what waits, let a reply in flight pass, refuse motion until `reset`.
-
-        `by` names the process and the time; the first one counts until `reset`.
-        """
+    def announce_stop(self, by: str) -> None:
+        """Refuse motion and torque from now on; from any thread. `by` of the first stop counts until `reset`."""
         self.latched_by = self.latched_by if self.latched else by
         self.latched = self.stopping = True
         self.ready = False
+
+    def stop_delay(self, now: float) -> float:
+        """s that a stop waits for what is on the wire; from any thread."""
+        return max((self._remaining(one, now) for one in tuple(self.in_flight.values())), default=0.0)
+
+    def latch(self, now: float, by: str) -> None:
+        """Emergency stop: end what waits, let a reply in flight pass, refuse motion until `reset`."""
+        self.announce_stop(by)
         error = failures.latched(self.latched_by)
         for job in list(self.queue):
             if not (isinstance(job, RequestJob) and job.request.effect in KEPT_BY_STOP):

@@ -10,7 +10,8 @@ from typing import Any
 
 from motorbus.bus.look import questions
 from motorbus.bus.statistics import Statistics
-from motorbus.bus.stop import StopOutcome, Stopper, asked_by
+from motorbus.bus.stop import Stopper
+from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turns import GATED, Admit, Turns
 from motorbus.core.family import Family, Readdressed

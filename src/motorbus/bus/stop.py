@@ -15,44 +15,29 @@ import atexit
 import contextlib
 import json
 import os
-import shlex
 import socket
-import sys
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
-from typing import NamedTuple
 
 from motorbus.bus import obedience
 from motorbus.bus.crank import crank, retune
 from motorbus.bus.pace import MARGIN
+from motorbus.bus.stop_socket import PATIENCE, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.ticket import Flight, Retune
 from motorbus.bus.turns import GATED, Turns
 from motorbus.core.family import Stop
 from motorbus.core.operation import Answer, Exchange, Timeout, Tune
-from motorbus.errors import LinkError, LinkLost, PortNotFound
+from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Link
-from motorbus.link.lock import program_name
 
 ROUNDS = 5
 TRIES = 3  # of a stop that is interrupted
 ROUND_TIME = 0.25  # s for all frames of one round, beyond what they need
 BREATH = 0.05  # s; the shortest round after which something is missing
 CLIENT_TIME = 0.05  # s; a client that is ready has its request ready too
-COMMAND_SHOWN = 60  # characters of a command line in the message of the stop it asked for
-PATIENCE = 5.0  # s that a caller waits for the stop thread
 STOP, END = b"!", b"."  # what wakes the thread
-
-
-class StopOutcome(NamedTuple):
-    """What an emergency stop achieved: who acknowledged, who did not, and what that promises."""
-
-    acknowledged: tuple[int, ...]
-    silent: tuple[int, ...]
-    rounds: int
-    promise: str
 
 
 class Wish:
@@ -61,11 +46,6 @@ class Wish:
     def __init__(self) -> None:
         self.outcome: StopOutcome | None = None
         self.fulfilled = Event()
-
-
-def asked_by(client: str = "") -> str:
-    """Which process asked for a stop, and the local time, for the errors of what is refused after it."""
-    return f"{f'by {client}' if client else 'in this process'} at {time.strftime('%H:%M:%S')}"
 
 
 def _no_thread() -> LinkError:
@@ -286,7 +266,7 @@ class Stopper:
     def _serve(self) -> None:
         assert self._pair is not None
         wish = self._pair[0]
-        with _listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
+        with listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
             if listener is not None:
                 ready.register(listener, EVENT_READ)
             try:
@@ -339,7 +319,7 @@ class Stopper:
             client.settimeout(CLIENT_TIME)
             word, _, about = client.recv(4096).strip().partition(b" ")
             if word == b"estop":
-                outcome = self._stop_and_tell(_client(about))
+                outcome = self._stop_and_tell(client_name(about))
                 client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
 
     def close(self) -> None:
@@ -353,74 +333,3 @@ class Stopper:
             self._thread.join(PATIENCE)
         for end in self._pair or ():
             end.close()
-
-
-def _client(about: bytes) -> str:
-    """Who asks over the socket: "process 12 (motorbus estop)"; "another process" where it does not say."""
-    try:
-        said = json.loads(about)
-        pid, command = int(said["pid"]), str(said["command"])
-    except Exception:  # whatever it says, it asks for a stop
-        return "another process"
-    command = command if len(command) <= COMMAND_SHOWN else f"{command[:COMMAND_SHOWN]}…"
-    return f"process {pid} ({command})"
-
-
-def _request() -> bytes:
-    """What a client sends: the word, its process id and its command line."""
-    command = shlex.join([program_name(), *sys.argv[1:]])[: 2 * COMMAND_SHOWN]
-    return f"estop {json.dumps({'pid': os.getpid(), 'command': command})}\n".encode()
-
-
-@contextlib.contextmanager
-def _listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[socket.socket | None]:
-    """A local socket at this path, mode 0600, or None where there is none to serve; `now` tells where it is by then."""
-    if path is None or not hasattr(socket, "AF_UNIX"):
-        yield None
-        return
-    with socket.socket(socket.AF_UNIX) as listener:
-        try:
-            path.unlink(missing_ok=True)
-            listener.bind(str(path))
-            path.chmod(0o600)  # before `listen`, until which nobody can connect
-            listener.listen(4)
-        except OSError:  # a full disk must not take the stop away from this process
-            yield None
-            return
-        try:
-            yield listener
-        finally:
-            (now() or path).unlink(missing_ok=True)
-
-
-def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
-    """Ask the process that serves this socket for an emergency stop, and wait for what came of it.
-
-    Raises PortNotFound when nobody serves it, LinkError when the process does not answer in time.
-    """
-    reply = _ask(path, _request(), timeout) or _ask(path, b"estop\n", timeout)  # as older versions know it
-    if not reply.endswith(b"\n"):
-        raise LinkError("the process that holds the bus ended without answering", received=reply)
-    outcome = json.loads(reply)
-    return StopOutcome(
-        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
-    )
-
-
-def _ask(path: Path, request: bytes, timeout: float) -> bytes:
-    """Send one request to the process that serves this socket; its reply, b"" where it hangs up without one."""
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(timeout)
-        try:
-            client.connect(str(path))
-            client.sendall(request)
-            return client.makefile("rb").readline()
-        except (ConnectionResetError, BrokenPipeError):
-            return b""
-        except (FileNotFoundError, ConnectionRefusedError):
-            raise PortNotFound(
-                "no motorbus process offers an emergency stop for this bus",
-                cause="none holds it",
-            ) from None
-        except OSError as error:
-            raise LinkError(f"the process that holds the bus did not answer: {error}") from error

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Final, NamedTuple, Protocol
+from collections.abc import Iterable, Sequence
+from typing import Final, Protocol
 
 from motorbus.bus.engine import MARGIN, Engine
 from motorbus.bus.jobs import RateJob, RequestJob
 from motorbus.bus.positions import GATED
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.core.operation import ANY, Answer, Due, Exchange, Timeout, Tune
 from motorbus.errors import DeviceError, LinkLost
 
@@ -18,21 +19,12 @@ SHORTEST_ROUND: Final = 0.05
 """s of a round in which an acknowledgement is missing."""
 
 
-class StopOutcome(NamedTuple):
-    """What an emergency stop achieved: who acknowledged, who did not, and what that promises."""
-
-    acknowledged: tuple[int, ...]
-    silent: tuple[int, ...]
-    rounds: int
-    promise: str
-
-
 class Wire(Protocol):
     """What the rounds need of a bus; the caller holds its turn."""
 
     engine: Engine
-    now: Callable[[], float]
 
+    def now(self) -> float: ...
     def send(self) -> None: ...
     def receive(self, until: float) -> None: ...
 

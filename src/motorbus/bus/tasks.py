@@ -281,6 +281,16 @@ class TaskTree(Generic[T]):
             self.extension = 0.0
             self.deadline = min(self.deadline, self.now() + SECOND_TIMEOUT)
 
+    def drop(self) -> None:
+        """Forget the procedure where it stands: its generators are not resumed, what they wait for is cancelled."""
+        for task in self._waiting(self.root):
+            if task.job is not None:
+                self.engine.cancel(task.job)
+            if isinstance(task.job, Timer) and task.job in self.timers:
+                self._end(task.job)
+            if task.claims:
+                self.engine.release(task.owner)
+
     def _cancel(self, task: Task) -> None:
         if task.finished or task.cancelled:
             return

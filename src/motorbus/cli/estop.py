@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from motorbus.bus.pump import Bus
-    from motorbus.bus.stop import StopOutcome
+    from motorbus.bus.stop_socket import StopOutcome
     from motorbus.core.family import Family
     from motorbus.link.errors import Owner
 
@@ -203,7 +203,7 @@ def _stop(wanted: Wanted, options: dict[str, str], output: Output) -> dict[str, 
 
 def _ask(port: str, owner: Owner | None) -> StopOutcome:
     """Let whoever holds this port stop it. Raises PortNotFound for nobody, NoReply for a process that is not heard."""
-    from motorbus.bus.stop import request_estop
+    from motorbus.bus.stop_socket import request_estop
     from motorbus.link.lock import PortLock, socket_path
 
     limit = time.monotonic() + OPENING

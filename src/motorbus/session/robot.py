@@ -22,7 +22,7 @@ from typing import Any, Final, Self
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import StopOutcome
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import group
 from motorbus.motion.abreast import Abreast, Led, LedAsync, together

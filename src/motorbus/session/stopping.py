@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from threading import Thread
 
-from motorbus.bus.stop import StopOutcome
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from motorbus.bus.pump import Bus
-from motorbus.bus.stop import StopOutcome
+from motorbus.bus.stop_socket import StopOutcome
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,

@@ -1,0 +1,322 @@
+"""What blocking and asyncio buses have in common: their parts, their observers, the emergency stop."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from motorbus.bus import failures
+from motorbus.bus.emergency import EmergencyStop
+from motorbus.bus.engine import Engine
+from motorbus.bus.interlock import Interlock
+from motorbus.bus.jobs import RateJob
+from motorbus.bus.positions import Reading
+from motorbus.bus.statistics import Statistics
+from motorbus.bus.stop_socket import StopOutcome, asked_by
+from motorbus.bus.tasks import Notify
+from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.bus.turn import Turn
+from motorbus.core.family import Family, Readdressed
+from motorbus.core.operation import Exchange, Journal, Notice, Runnable
+from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
+from motorbus.link.base import Link, Renewable
+
+IDLE = 0.25
+"""s; the longest wait for data before the caller looks at its procedure again."""
+
+
+class BaseBus:
+    """An open bus: one link, one family, one engine.
+
+    `interlock` judges requests that move a motor or switch torque; without it they are refused. `report` gets the
+    events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
+    an emergency stop. `warnings` are for the user. `readdressed` is called before a device gets another id.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        family: Family,
+        *,
+        interlock: Interlock | None = None,
+        report: Notify | None = None,
+        journal: Notify | None = None,
+        stop_socket: Path | None = None,
+    ) -> None:
+        self.link = link
+        self.family = family
+        self.report = report
+        self.journal = journal
+        self.readdressed: Callable[[Readdressed], None] | None = None
+        self.warnings: tuple[str, ...] = tuple(link.warnings)
+        self.engine = Engine(
+            family,
+            rate=link.rate,
+            latency=link.latency,
+            paced=link.paced,
+            listen_only=bool(getattr(link, "listen_only", False)),
+        )
+        self.engine.diagnosis = getattr(link, "trouble", str)
+        self.turn = Turn()
+        self.stopper = EmergencyStop(self, stop_socket)
+        self.interlock = interlock
+        self._reconnects = isinstance(link, Renewable)
+        self._on_reconnect: list[Callable[[], None]] = []
+        self._missed_rate: RateJob | None = None
+        if stop_socket is not None:
+            self.stopper.start()
+
+    @property
+    def interlock(self) -> Interlock | None:
+        """What judges motion requests."""
+        return self._interlock
+
+    @interlock.setter
+    def interlock(self, interlock: Interlock | None) -> None:
+        self._interlock = interlock
+        self.engine.interlock = None if interlock is None else _Arming(self, interlock)
+
+    def now(self) -> float:
+        """s on the clock of the link."""
+        return self.link.now()
+
+    # -- the link ----------------------------------------------------------------------------------------------
+
+    def send(self) -> None:
+        """Write all that may be sent now. The caller holds the turn; a lost link fails all requests."""
+        engine, link = self.engine, self.link
+        if engine.gone is not None and not self._reconnect():
+            return
+        try:
+            now = link.now()
+            if engine.queue and (stale := link.read(now)):  # it cannot answer what has not left
+                engine.feed(stale, now)
+            while (out := engine.next_frame(now)) is not None:
+                if isinstance(out, RateJob):
+                    self._set_rate(out)
+                else:
+                    link.write(out)
+                    engine.written()
+        except LinkError as error:
+            self._lost(error)
+
+    def receive(self, until: float) -> None:
+        """Wait for data, at most until this moment or the next deadline, and feed the engine.
+
+        Only what was due before this look is overdue after it: the reply may be in the buffer of a host that was late.
+        """
+        engine, link = self.engine, self.link
+        if engine.gone is not None:
+            self._wait_without_link(until)
+            return
+        try:
+            looked = link.now()
+            chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
+            engine.feed(chunks, link.now(), looked)
+        except LinkError as error:
+            self._lost(error)
+
+    def _lost(self, error: LinkError) -> None:
+        if isinstance(error, LinkLost) and self._reconnects:
+            error = failures.reconnecting(error)
+        self.engine.lost(error)
+
+    def _set_rate(self, job: RateJob) -> None:
+        try:
+            if job.tune.rate:
+                self.link.tune(job.tune.rate, job.tune.listen_only or self.engine.always_listening)
+        except MotorbusError as error:
+            self.engine.rate_changed(job, error)
+            if isinstance(error, LinkLost):
+                raise
+        else:
+            self.engine.rate_changed(job)
+
+    def _reconnect(self) -> bool:
+        """Open the lost port again if it is there; False when it is not, and every request has failed."""
+        link, engine = self.link, self.engine
+        if not self._reconnects or not isinstance(link, Renewable):
+            engine.lost(engine.gone or LinkLost("the port is gone"))
+            return False
+        try:
+            link.renew(engine.losses)
+        except LinkError as error:
+            self._lost(error)
+            return False
+        engine.reconnected(link.now(), link.latency)
+        for function in self._on_reconnect:
+            function()
+        if link.rate != engine.rate:
+            with contextlib.suppress(MotorbusError):
+                link.tune(engine.rate, engine.listening)
+        return True
+
+    def _wait_without_link(self, until: float) -> None:
+        if isinstance(self.link, Renewable) and self._reconnects:
+            self.link.rest(min(until, self.link.now() + IDLE))
+
+    # -- observers ---------------------------------------------------------------------------------------------
+
+    def listener(self, report: Notify | None) -> Notify | None:
+        """What gets the events of a procedure: the journal first, then `report` or that of the bus."""
+        observer, journal, readdressed = report or self.report, self.journal, self.readdressed
+        if journal is None and readdressed is None:
+            return observer
+
+        def deliver(event: object) -> None:
+            if readdressed is not None and isinstance(event, Readdressed):
+                readdressed(event)
+            if journal is not None and isinstance(event, Journal):
+                journal(event)
+            if observer is not None:
+                observer(event)
+
+        return deliver
+
+    @property
+    def statistics(self) -> Statistics:
+        """Counts and latencies per node."""
+        return self.engine.statistics
+
+    @property
+    def trace(self) -> Feed[TraceRecord]:
+        """Subscribe to every request and delivery."""
+        return self.engine.trace
+
+    @property
+    def notices(self) -> Feed[Notice]:
+        """Subscribe to what devices send without a request."""
+        return self.engine.notices
+
+    @property
+    def simulated(self) -> bool:
+        """There is no real device behind this bus."""
+        return self.link.simulated
+
+    @property
+    def rate(self) -> int:
+        """Bit rate (bit/s)."""
+        return self.engine.rate
+
+    @property
+    def latency(self) -> float:
+        """s that the adapter may hold data back; part of every deadline."""
+        return self.engine.latency
+
+    @latency.setter
+    def latency(self, seconds: float) -> None:
+        self.engine.latency = seconds
+
+    @property
+    def lock(self) -> Turn:
+        """Held while the state of this bus is read or changed as a whole. Keep it for microseconds only."""
+        return self.turn
+
+    @property
+    def positions(self) -> Mapping[int, Reading]:
+        """The last request that read a position and its reply, by node."""
+        return self.engine.positions
+
+    def stop_count(self, node: int | None = None) -> int:
+        """Number of stops sent to this node, those for all nodes included; None: of all stops sent on this bus."""
+        positions = self.engine.positions
+        return positions.stop_total if node is None else positions.stop_count(node)
+
+    @property
+    def loss_count(self) -> int:
+        """Number of times the port was lost."""
+        return self.engine.losses
+
+    @property
+    def reconnects(self) -> bool:
+        """A lost port is opened again by the next request. Can be set to False only."""
+        return self._reconnects
+
+    @reconnects.setter
+    def reconnects(self, wanted: bool) -> None:
+        if wanted:
+            raise RequestError("a bus cannot begin to reconnect", advice="open it with reconnect=yes")
+        self._reconnects = False
+
+    def on_reconnect(self, function: Callable[[], None]) -> None:
+        """Call this function each time the lost port was opened again, before anything is sent."""
+        self._on_reconnect.append(function)
+
+    def required_reads(self, request: Exchange[Any]) -> Sequence[Runnable[Any]]:
+        """The reads that the interlock needs before it can check this request."""
+        return () if self._interlock is None else self._interlock.required_reads(request)
+
+    def attach(self, gate: Any) -> None:
+        """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
+        positions = self.engine.positions
+        gate.watch(positions, self.link.now, positions.stop_count, positions.accepted_count, None)
+        self.interlock = gate
+        self.on_reconnect(gate.forget)
+
+    def expect_echo(self, test: Exchange[Any]) -> None:
+        """Let the next reply to this request show whether the adapter echoes."""
+        self.engine.echo.test = test
+
+    @property
+    def echoes(self) -> bool:
+        """The adapter echoes what is sent."""
+        return bool(self.engine.echo.present)
+
+    # -- emergency stop ----------------------------------------------------------------------------------------
+
+    @property
+    def latched(self) -> bool:
+        """An emergency stop is latched: motion and torque are refused until `reset`."""
+        return self.engine.latched
+
+    def move_stop_socket(self, path: Path | None) -> None:
+        """Accept emergency stops of other processes at this socket from now on."""
+        self.stopper.move(path)
+
+    def estop(self) -> StopOutcome:
+        """Emergency stop: drop what waits, send the stop frames until acknowledged or five times, and latch.
+
+        Motion and torque are refused with Interrupted until `reset()`. May be called from any thread, but not from a
+        signal handler (see `trigger_estop`). Raises LinkLost when the bus is closed.
+        """
+        return self.stopper.estop()
+
+    def trigger_estop(self) -> None:
+        """Request an emergency stop and return at once; for signal handlers.
+
+        Does nothing before the stop thread exists: on a simulated bus that is the first motion or torque request.
+        """
+        self.stopper.trigger()
+
+    def latch(self) -> None:
+        """Refuse motion and torque until `reset`, as after an emergency stop; sends nothing."""
+        with self.turn:
+            self.engine.latch(self.link.now(), asked_by())
+            self.engine.stopped()
+
+    def reset(self) -> None:
+        """Take the latch off. Nothing is sent and nothing moves."""
+        self.engine.reset()
+
+    def _hang_up(self) -> None:
+        """End the stop thread, then give the port back."""
+        self.stopper.close()
+        self._reconnects = False
+        self.link.close()
+
+
+class _Arming:
+    """Starts the stop thread before the first request that passes the interlock leaves."""
+
+    def __init__(self, bus: BaseBus, interlock: Interlock) -> None:
+        self._bus = bus
+        self._interlock = interlock
+        self.required_reads = interlock.required_reads
+        self.stopped = interlock.stopped
+
+    def check(self, request: Exchange[Any], now: float) -> None:
+        self._interlock.check(request, now)
+        self._bus.stopper.start()
+        self._bus.engine.interlock = self._interlock

@@ -1,0 +1,217 @@
+"""The emergency stop of one bus: a thread that sleeps until a stop is requested.
+
+It exists from the first motion or torque request on, or from `open` on where other processes can request a stop. It
+needs neither the event loop nor the thread that uses the bus: a signal handler, another thread or another process wakes
+it by one byte. It latches the engine, waits for the turn at most as long as a reply is on the wire, writes the stop
+frames in any case, and then repeats them with the turn until all nodes acknowledge. On a simulated bus with virtual
+time the caller does the same work without a thread. Decision record 0015.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import socket
+from pathlib import Path
+from selectors import EVENT_READ, DefaultSelector
+from threading import Event, Lock, Thread
+from typing import Final, Protocol
+
+from motorbus.bus.engine import Engine
+from motorbus.bus.stop_rounds import run_rounds
+from motorbus.bus.stop_socket import PATIENCE, StopOutcome, asked_by, client_name, listening
+from motorbus.bus.turn import Turn
+from motorbus.core.operation import Rank
+from motorbus.errors import LinkError, LinkLost
+from motorbus.link.base import Link
+
+CLIENT_TIME: Final = 0.05
+"""s for a client to send its request."""
+STOP, END = b"!", b"."
+
+
+class StoppableBus(Protocol):
+    """What the stop needs of a bus."""
+
+    link: Link
+    engine: Engine
+    turn: Turn
+
+    def now(self) -> float: ...
+    def send(self) -> None: ...
+    def receive(self, until: float) -> None: ...
+
+
+class StopRequest:
+    """A caller that waits for the outcome of a stop."""
+
+    def __init__(self) -> None:
+        self.outcome: StopOutcome | None = None
+        self.done = Event()
+
+
+class EmergencyStop:
+    """The emergency stop of one bus."""
+
+    def __init__(self, bus: StoppableBus, socket_path: Path | None = None) -> None:
+        self.bus = bus
+        self.socket_path = socket_path
+        self._pair: tuple[socket.socket, socket.socket] | None = None
+        self._requests: list[StopRequest] = []
+        self._ready = Event()
+        self._starting = Lock()
+        self._thread: Thread | None = None
+        self._closed = False
+
+    def start(self) -> None:
+        """Start the thread, unless it runs or time is virtual.
+
+        Raises LinkError where the system gives no more threads: what moves must be stoppable.
+        """
+        if self._thread is not None or self.bus.link.virtual:
+            return
+        with self._starting:
+            if self._thread is None and not self._closed:
+                self._pair = self._pair or socket.socketpair()
+                thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
+                try:
+                    thread.start()
+                except RuntimeError as error:
+                    raise LinkError(
+                        "the system gives no more threads, and what moves needs one that can stop it",
+                        advice="end processes that hold many threads; nothing was sent",
+                    ) from error
+                self._thread = thread
+                self._ready.wait(PATIENCE)
+                atexit.register(self.close)
+
+    def move(self, path: Path | None) -> None:
+        """Serve this path from now on; None: a hidden one, for the old path belongs to another process now."""
+        before = self.socket_path
+        if before is None:
+            return
+        self.socket_path = path or before.with_name(f".{os.getpid()}-{before.name}")
+        with contextlib.suppress(OSError):
+            before.replace(self.socket_path)
+
+    def trigger(self) -> None:
+        """Request a stop and return at once; for signal handlers. Does nothing before `start`."""
+        self._wake(STOP)
+
+    def _wake(self, word: bytes) -> None:
+        if self._pair is not None:
+            with contextlib.suppress(OSError):
+                self._pair[1].send(word)
+
+    def estop(self) -> StopOutcome:
+        """Stop and wait for the outcome. Raises LinkLost when the bus is closed."""
+        if self._closed:
+            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
+        if not self.bus.link.virtual:
+            with contextlib.suppress(LinkError):
+                self.start()
+        if self._thread is None:
+            return self.stop()
+        request = StopRequest()
+        self._requests.append(request)
+        self.trigger()
+        request.done.wait(PATIENCE)
+        silent = tuple(sorted(self.bus.engine.positions.nodes))
+        return request.outcome or StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
+
+    def stop(self, client: str = "") -> StopOutcome:
+        """Latch the engine and send the stop frames, in the calling thread."""
+        bus, engine = self.bus, self.bus.engine
+        by = asked_by(client)
+        engine.announce_stop(by)
+        if bus.turn.acquire(Rank.STOP, engine.stop_delay(bus.now())):
+            return self._stop_with_turn(by)
+        stop = engine.positions.frames(bus.now())
+        for request in stop.exchanges:
+            with contextlib.suppress(LinkError):
+                bus.link.write(request.request)
+        if bus.turn.acquire(Rank.STOP, PATIENCE):
+            return self._stop_with_turn(by)
+        engine.stopped()
+        silent = tuple(sorted(engine.positions.nodes))
+        return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
+
+    def _stop_with_turn(self, by: str) -> StopOutcome:
+        try:
+            self.bus.engine.latch(self.bus.now(), by)
+            return run_rounds(self.bus)
+        finally:
+            self.bus.engine.stopped()
+            self.bus.turn.release()
+
+    # -- the thread --------------------------------------------------------------------------------------------
+
+    def _serve(self) -> None:
+        assert self._pair is not None
+        ear = self._pair[0]
+        with listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
+            if listener is not None:
+                ready.register(listener, EVENT_READ)
+            try:
+                ready.register(ear, EVENT_READ)
+            except ValueError:  # closed while it was started
+                return
+            finally:
+                self._ready.set()
+            ended = False
+            while not ended:
+                try:
+                    ended = self._wait(ready, ear, listener)
+                except Exception:  # the next request must be heard
+                    ended = self._closed
+            for key in list(ready.get_map().values()):
+                if key.fileobj not in (ear, listener) and isinstance(key.fileobj, socket.socket):
+                    key.fileobj.close()
+
+    def _wait(self, ready: DefaultSelector, ear: socket.socket, listener: socket.socket | None) -> bool:
+        """Serve the requests of this process first, then those of clients; True at the end."""
+        ends = [key.fileobj for key, _ in ready.select()]
+        if ear in ends:
+            words = ear.recv(4096)
+            if STOP in words:
+                self._stop_and_answer()
+            if END in words:
+                return True
+        for end in ends:
+            if end is listener and listener is not None:
+                with contextlib.suppress(OSError):
+                    ready.register(listener.accept()[0], EVENT_READ)
+            elif end is not ear and isinstance(end, socket.socket):
+                ready.unregister(end)
+                self._serve_client(end)
+        return False
+
+    def _stop_and_answer(self, client: str = "") -> StopOutcome:
+        requests, self._requests = self._requests, []
+        outcome = self.stop(client)
+        for request in requests:
+            request.outcome = outcome
+            request.done.set()
+        return outcome
+
+    def _serve_client(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError), client:
+            client.settimeout(CLIENT_TIME)
+            word, _, about = client.recv(4096).strip().partition(b" ")
+            if word == b"estop":
+                outcome = self._stop_and_answer(client_name(about))
+                client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
+
+    def close(self) -> None:
+        """End the thread when a stop that has begun is over. Nothing else is sent."""
+        self._closed = True
+        if self._starting.acquire(timeout=PATIENCE):
+            self._starting.release()
+        atexit.unregister(self.close)
+        self._wake(END)
+        if self._thread is not None:
+            self._thread.join(PATIENCE)
+        for end in self._pair or ():
+            end.close()

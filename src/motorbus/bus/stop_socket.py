@@ -1,0 +1,107 @@
+"""The local socket by which another process asks for an emergency stop, and what an emergency stop achieved."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from motorbus.errors import LinkError, PortNotFound
+from motorbus.link.lock import program_name
+
+COMMAND_SHOWN: Final = 60
+"""Characters of a command line in the message of the stop that it asked for."""
+PATIENCE: Final = 5.0
+"""s that a caller waits for the outcome of a stop."""
+
+
+class StopOutcome(NamedTuple):
+    """What an emergency stop achieved: who acknowledged, who did not, and what that promises."""
+
+    acknowledged: tuple[int, ...]
+    silent: tuple[int, ...]
+    rounds: int
+    promise: str
+
+
+def asked_by(client: str = "") -> str:
+    """Which process asked for a stop, and the local time, for the errors of what is refused after it."""
+    return f"{f'by {client}' if client else 'in this process'} at {time.strftime('%H:%M:%S')}"
+
+
+def client_name(about: bytes) -> str:
+    """The process that asks: "process 12 (motorbus estop)"; "another process" where it does not say."""
+    try:
+        request = json.loads(about)
+        pid, command = int(request["pid"]), str(request["command"])
+    except Exception:  # a stop is a stop, whatever else the request says
+        return "another process"
+    command = command if len(command) <= COMMAND_SHOWN else f"{command[:COMMAND_SHOWN]}…"
+    return f"process {pid} ({command})"
+
+
+def _request() -> bytes:
+    """What a client sends: the word, its process id and its command line."""
+    command = shlex.join([program_name(), *sys.argv[1:]])[: 2 * COMMAND_SHOWN]
+    return f"estop {json.dumps({'pid': os.getpid(), 'command': command})}\n".encode()
+
+
+@contextlib.contextmanager
+def listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[socket.socket | None]:
+    """A local socket at this path, mode 0600, None where there is none; `now` gives its path at the end."""
+    if path is None or not hasattr(socket, "AF_UNIX"):
+        yield None
+        return
+    with socket.socket(socket.AF_UNIX) as listener:
+        try:
+            path.unlink(missing_ok=True)
+            listener.bind(str(path))
+            path.chmod(0o600)  # before `listen`, until which nobody can connect
+            listener.listen(4)
+        except OSError:  # a full disk must not take the stop away from this process
+            yield None
+            return
+        try:
+            yield listener
+        finally:
+            (now() or path).unlink(missing_ok=True)
+
+
+def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
+    """Ask the process that serves this socket for an emergency stop, and wait for its outcome.
+
+    Raises PortNotFound when no process serves it, LinkError when the process does not answer in time.
+    """
+    reply = _ask(path, _request(), timeout) or _ask(path, b"estop\n", timeout)  # as older versions know it
+    if not reply.endswith(b"\n"):
+        raise LinkError("the process that holds the bus ended without answering", received=reply)
+    outcome = json.loads(reply)
+    return StopOutcome(
+        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
+    )
+
+
+def _ask(path: Path, request: bytes, timeout: float) -> bytes:
+    """Send one request to the process that serves this socket; its reply, b"" where it hangs up without one."""
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(timeout)
+        try:
+            client.connect(str(path))
+            client.sendall(request)
+            return client.makefile("rb").readline()
+        except (ConnectionResetError, BrokenPipeError):
+            return b""
+        except (FileNotFoundError, ConnectionRefusedError):
+            raise PortNotFound(
+                "no motorbus process offers an emergency stop for this bus",
+                cause="none holds it",
+            ) from None
+        except OSError as error:
+            raise LinkError(f"the process that holds the bus did not answer: {error}") from error
