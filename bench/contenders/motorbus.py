@@ -60,7 +60,7 @@ class MemoryLink:
 
 def _in_memory(workload: Workload) -> Bus:
     """A bus as `motorbus.open` would leave it, after the test of the echo."""
-    bus = Bus(MemoryLink(workload), feetech.FAMILY, admit=Gate())
+    bus = Bus(MemoryLink(workload), feetech.FAMILY, interlock=Gate())
     test = feetech.FAMILY.echo_test()
     bus.turns.expect_echo(test)
     bus.run(test)

@@ -136,7 +136,7 @@ def _feetech(line: Line) -> Reader:
         there.nodes[ID].raw_position = place(heard)
 
     servos = Turning(there, turn)
-    bus = _opened(Bus(MemoryLink(servos, line=line), feetech.FAMILY, admit=Gate()))
+    bus = _opened(Bus(MemoryLink(servos, line=line), feetech.FAMILY, interlock=Gate()))
     devices = {node: feetech.Servo(bus, node) for node in (ID, NOBODY)}
 
     def read(node: int) -> int | None:
@@ -160,7 +160,9 @@ def _kst(line: Line) -> Reader:
         there.nodes[ID].raw_position = where(heard)
 
     servos = Turning(there, turn)
-    bus = Bus(MemoryLink(servos, rate=500_000, line=line, pace=True), kst.FAMILY.configured(), admit=Gate())
+    bus = Bus(
+        MemoryLink(servos, rate=500_000, line=line, pace=True), kst.FAMILY.configured(), interlock=Gate()
+    )
     devices = {node: kst.Servo(bus, node) for node in (ID, NOBODY)}
 
     def read(node: int) -> int | None:
@@ -184,7 +186,9 @@ def _stepper(line: Line) -> Reader:
 
     servos = Turning(there, turn)
     bus = _opened(
-        Bus(MemoryLink(servos, rate=9600, line=line, pace=True), stepper.FAMILY.configured(), admit=Gate())
+        Bus(
+            MemoryLink(servos, rate=9600, line=line, pace=True), stepper.FAMILY.configured(), interlock=Gate()
+        )
     )
     device = stepper.Controller(bus)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from motorbus.bus import blocking, engine
+from motorbus.bus import blocking
 from motorbus.bus.crank import crank
 from motorbus.bus.pump import Bus
 from motorbus.bus.run import Run
@@ -228,7 +228,7 @@ class OldEngine(Engine):
     bus: Bus
 
     def open(self, check: Callable[[Any], None] | None, latency: float) -> Bus:
-        bus = Bus(self.link, self.family, admit=check)
+        bus = Bus(self.link, self.family, interlock=check)
         bus.latency = latency
         return bus
 
@@ -262,30 +262,6 @@ class OldEngine(Engine):
         return call.root.value if call.told() is None else call.told()
 
 
-class NewBus:
-    """What the tests ask of a bus, over the engine that replaces the old one."""
-
-    def __init__(self, blocking: blocking.Bus) -> None:
-        self._blocking = blocking
-        self._engine = blocking.engine
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._engine, name)
-
-    def run(self, work: Any, report: Any = None) -> Any:
-        return self._blocking.run(work, report)
-
-    def estop(self) -> Any:
-        return self._blocking.estop()
-
-    @property
-    def echoes(self) -> bool:
-        return bool(self._engine.echo.present)
-
-    def expect_echo(self, test: Any) -> None:
-        self._engine.echo.test = test
-
-
 class Check:
     """An interlock of one function."""
 
@@ -307,16 +283,13 @@ class NewEngine(Engine):
 
     settled = False
 
-    def open(self, check: Callable[[Any], None] | None, latency: float) -> NewBus:
-        self.engine = engine.Engine(
-            self.family,
-            rate=self.link.rate,
-            latency=latency,
-            listen_only=self.link.listen_only,
-            interlock=None if check is None else Check(check),
-        )
-        self.blocking = blocking.Bus(self.link, self.engine)
-        return NewBus(self.blocking)
+    bus: blocking.Bus
+
+    def open(self, check: Callable[[Any], None] | None, latency: float) -> blocking.Bus:
+        bus = blocking.Bus(self.link, self.family, interlock=None if check is None else Check(check))
+        bus.latency = latency
+        self.engine = bus.engine
+        return bus
 
     @property
     def deadline(self) -> float:
@@ -346,10 +319,10 @@ class NewEngine(Engine):
             if self.engine.gone is not None:
                 self._look_for_link(end)
             else:
-                self.blocking.send()
+                self.bus.send()
                 if self.settled:
                     continue
-                self.blocking.receive(min([end, *(call.next_moment() for call in self.calls.values())]))
+                self.bus.receive(min([end, *(call.next_moment() for call in self.calls.values())]))
                 if self.engine.gone is None:
                     self.link.advance(0.0)
             same = same + 1 if before == self._state() else 0

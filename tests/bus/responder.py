@@ -108,10 +108,10 @@ def guarded(node: int, value: int) -> Operation[None]:
 def memory_bus(line: Line | None = None, **options: Any) -> tuple[Bus, Responder]:
     responder = Responder()
     link = MemoryLink(responder, line=line, **options)
-    return Bus(link, FAMILY, admit=admit_all), responder
+    return Bus(link, FAMILY, interlock=admit_all), responder
 
 
 def async_bus(line: Line | None = None, **options: Any) -> tuple[AsyncBus, Responder]:
     responder = Responder()
     link = MemoryLink(responder, line=line, **options)
-    return AsyncBus(link, FAMILY, admit=admit_all), responder
+    return AsyncBus(link, FAMILY, interlock=admit_all), responder

@@ -80,7 +80,7 @@ class Scene:
         self.wire = Wire()
         self.link = link(self.simulator, rate=found.link.rate, line=line or self.wire, **more)
         self.events: list[object] = []
-        self.bus: Any = face(self.link, self.family, admit=Gate(), report=self.events.append)
+        self.bus: Any = face(self.link, self.family, interlock=Gate(), report=self.events.append)
         self.run: Callable[[Any], Any] = self.bus.run  # on an event loop whoever has one sets another
         self.devices: list[Any] = [self.family.devices.blocking(self.bus, node) for node in self.ids]
         self.count = 0

@@ -147,7 +147,7 @@ def test_l14_on_a_real_port_every_call_of_every_thread_ends_and_so_does_a_stop(p
     """And nobody is told anything but that it was not sent, or was not answered."""
     failed: list[MotorbusError] = []
     with port() as (link, _):
-        bus = Bus(link, FAMILY, admit=admit_all)
+        bus = Bus(link, FAMILY, interlock=admit_all)
         assert fill(link) > 0, "until it refused"
 
         def call(node: int) -> None:
@@ -173,7 +173,7 @@ def test_l14_on_a_real_port_every_call_of_every_thread_ends_and_so_does_a_stop(p
 def test_l14_a_terminal_that_is_read_again_is_right_again() -> None:
     """What had piled up is heard late and answered late; none of it is taken for the answer to what is asked now."""
     with terminal() as (link, master):
-        bus = Bus(link, FAMILY, admit=admit_all)
+        bus = Bus(link, FAMILY, interlock=admit_all)
         fill(link)
         with pytest.raises(LinkError):
             bus.run(position(1))

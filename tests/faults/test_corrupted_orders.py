@@ -48,7 +48,7 @@ class Forger(PerfectLine):
 def bus_of(family: Family, simulator: Simulator, rate: int, line: PerfectLine) -> Bus:
     """An open bus over this line."""
     link = MemoryLink(simulator, rate=rate, line=line)
-    return Bus(link, family.configured(), admit=Gate(), report=lambda event: None)
+    return Bus(link, family.configured(), interlock=Gate(), report=lambda event: None)
 
 
 def servo_mended(packet: bytes) -> bytes:

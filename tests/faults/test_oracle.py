@@ -34,7 +34,7 @@ class Bench:
         self.simulator = FAMILY.simulator((1,))
         self.history = History(self.simulator)
         self.link = MemoryLink(self.history)
-        self.bus = Bus(self.link, FAMILY, admit=Gate())
+        self.bus = Bus(self.link, FAMILY, interlock=Gate())
         self.oracle = Oracle(self.link, self.history)
 
     def put(self, raw: int) -> None:

@@ -371,6 +371,6 @@ def test_what_goes_on_without_an_end_is_stopped_when_it_is_left() -> None:
             with Robot.of(made) as robot:
                 robot["a1"].device.set_mode("velocity")
                 robot["a1"].device.enable_torque()
-                robot.buses["arm"].admit.attended = False  # type: ignore[union-attr]  # as if nobody had to attend
+                robot.buses["arm"].interlock.attended = False  # type: ignore[union-attr]  # as if nobody had to attend
                 robot["a1"].device.set_velocity(1.0)
             assert bool(sims["arm"][1].memory["goal_velocity"]) == turns

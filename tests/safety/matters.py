@@ -128,7 +128,7 @@ class Matters(Courses):
 
         def ordered() -> None:
             bus: Any = self.robot.buses[spot[0]]
-            faults = bus.admit.faults
+            faults = bus.interlock.faults
             faults[spot[1]] = "of this test"
             try:
                 order()

@@ -23,7 +23,7 @@ DOWN = {"sign": -1, "gear": 2.0, "low": "-40 deg", "high": "20 deg", "max_step":
 
 
 def gate_of(robot: Any, bus: str = "arm") -> Gate:
-    gate = robot.buses[bus].admit
+    gate = robot.buses[bus].interlock
     assert isinstance(gate, Gate)
     return gate
 

@@ -39,7 +39,7 @@ def test_where_axes_are_is_asked_anew() -> None:
     with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
         robot.positions()
         gone_and_back(robot, "arm")
-        gate = robot.buses["arm"].admit
+        gate = robot.buses["arm"].interlock
         assert isinstance(gate, Gate)
         for axis in robot.axes.values():
             guard = gate.guards[axis.spec.node]
@@ -105,7 +105,7 @@ def test_where_a_stepper_stands_is_not_known_any_more() -> None:
 
 def test_what_waits_in_a_servo_is_not_let_begin_unseen() -> None:
     with machine(arm="1", exit="leave") as (made, _), Robot.of(made) as robot:
-        gate = robot.buses["arm"].admit
+        gate = robot.buses["arm"].interlock
         assert isinstance(gate, Gate)
         waiting = gate._waiting
         gone_and_back(robot, "arm")

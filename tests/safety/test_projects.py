@@ -52,7 +52,7 @@ def test_an_endless_one_needs_somebody_who_attends_and_ends_with_him() -> None:
     with machine(lift=True) as (file, sims), Robot.of(file) as robot:
         robot["lift"].declare(0.1)
         stored(sims, made(TURN, BACK, project_loop=255))
-        lift, gate = robot["lift"], robot.buses["stage"].admit
+        lift, gate = robot["lift"], robot.buses["stage"].interlock
         with pytest.raises(Refused, match="nobody attends") as caught:
             lift.device.start_project(2, endless=True)
         assert caught.value.reason == "unattended"

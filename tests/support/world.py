@@ -51,12 +51,12 @@ def make_bus(
     journal: Notify | None = None,
 ) -> Bus:
     """A blocking bus around a link that the test has made, with a gate that admits motion unless `gate` is off."""
-    return Bus(link, family, admit=Gate() if gate else None, report=report, journal=journal)
+    return Bus(link, family, interlock=Gate() if gate else None, report=report, journal=journal)
 
 
 def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) -> AsyncBus:
     """An async bus around a link that the test has made."""
-    return AsyncBus(link, family, admit=Gate(), report=report)
+    return AsyncBus(link, family, interlock=Gate(), report=report)
 
 
 def exclude_echo(bus: AnyBus) -> None:

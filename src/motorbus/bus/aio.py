@@ -6,6 +6,7 @@ Over a link with virtual time whoever awaits turns the crank; elsewhere `watch` 
 from __future__ import annotations
 
 import asyncio
+import os
 from functools import cached_property
 from math import inf
 from typing import Any, Self, TypeVar
@@ -77,3 +78,9 @@ class AsyncBus(BusFace):
 
     async def __aexit__(self, *exc: object) -> None:
         await self.close()
+
+
+if os.environ.get("MOTORBUS_ENGINE") == "new":  # until every part runs on it
+    from motorbus.bus import asynchronous
+
+    AsyncBus = asynchronous.AsyncBus  # type: ignore[assignment, misc]

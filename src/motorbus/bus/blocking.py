@@ -109,7 +109,7 @@ class Bus(BaseBus):
     def _carry_out(self, request: Exchange[Any], stops: int | None) -> Any:
         """One request by the general path. The caller holds the turn."""
         engine = self.engine
-        if request.course is None or getattr(request.course, "engine", None) is not engine:
+        if request.whole is not None and getattr(request.course, "engine", None) is not engine:
             request.course = engine.prepare(request)
         job = RequestJob(request, losses=engine.losses)
         job.stops = stops

@@ -496,10 +496,18 @@ class Engine:
                 continue
             for event in self.receiver.flush():  # all replies are here, so what is held is surplus
                 self._take(event, now)
+            if self._may_be_echo(attempt) and not attempt.surplus and now < attempt.deadline:
+                continue
             if attempt.fault or attempt.surplus:
                 self._fail(lane, attempt, now)
             else:
                 self._accept(lane, attempt, now)
+
+    def _may_be_echo(self, attempt: Attempt) -> bool:
+        """Whether echo is unknown and the reply is the beginning of the request: the rest of an echo may follow."""
+        return self.echo.present is None and any(
+            self.echo.may_be(reply.data) for reply in attempt.replies.values()
+        )
 
     def expire(self, now: float) -> None:
         """End every attempt whose deadline has passed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -25,7 +26,7 @@ Notify = Callable[[object], None]
 class BusFace:
     """An open bus: one link, one family, one set of turns.
 
-    `admit` is asked before anything that moves a motor or switches torque is sent; without it such exchanges are
+    `interlock` is asked before anything that moves a motor or switches torque is sent; without it such exchanges are
     refused. `report` gets the events of operations (progress, early results, journal records). `journal` gets the
     journal records before anybody else, whoever listens. `stop_socket` is where another process can ask for an
     emergency stop. `warnings` are what the user ought to know about this bus. `readdressed`, where somebody has set it,
@@ -38,14 +39,14 @@ class BusFace:
         link: Link,
         family: Family,
         *,
-        admit: Admit | None = None,
+        interlock: Admit | None = None,
         report: Notify | None = None,
         journal: Notify | None = None,
         stop_socket: Path | None = None,
     ) -> None:
         self.link = link
         self.family = family
-        self.admit = admit
+        self.interlock = interlock
         self.report = report
         self.journal = journal
         self.readdressed: Callable[[Readdressed], None] | None = None
@@ -56,7 +57,7 @@ class BusFace:
             latency=link.latency,
             paced=link.paced or (None if family.link.kind == "frames" and _takes_time(link) else False),
             listen_only=bool(getattr(link, "listen_only", False)),
-            admit=self._armed(admit) if admit is not None else None,
+            admit=self._armed(interlock) if interlock is not None else None,
         )
         self.turns.trouble = getattr(link, "trouble", str)
         self.turns.renewal = link if isinstance(link, Renewable) else None
@@ -227,3 +228,9 @@ class BusFace:
 def _takes_time(link: Link) -> bool:
     """Frames may need their time here; whether they do will show."""
     return not link.simulated and not getattr(link, "timeless", False)
+
+
+if os.environ.get("MOTORBUS_ENGINE") == "new":  # until every part runs on it
+    from motorbus.bus import base
+
+    BusFace = base.BaseBus  # type: ignore[assignment, misc]

@@ -6,6 +6,7 @@ an operation is begun, and how it is left when its caller is interrupted.
 
 from __future__ import annotations
 
+import os
 from functools import cached_property
 from typing import Any, Self, TypeVar
 
@@ -67,3 +68,9 @@ class Bus(BusFace):
 
     def __exit__(self, *exc: object) -> None:
         self.close()
+
+
+if os.environ.get("MOTORBUS_ENGINE") == "new":  # until every part runs on it
+    from motorbus.bus import blocking
+
+    Bus = blocking.Bus  # type: ignore[assignment, misc]

@@ -83,7 +83,9 @@ class DryBus:
         self.link = bus.link
         self.frames: list[bytes] = []
         self._bus = bus
-        self.admit = bus.admit.rehearsing() if isinstance(bus.admit, Gate) else bus.admit or Gate()
+        self.admit = (
+            bus.interlock.rehearsing() if isinstance(bus.interlock, Gate) else bus.interlock or Gate()
+        )
         self._written: set[int] = set()
         self._waited = 0.0
         self._read: dict[Data, Any] = {}

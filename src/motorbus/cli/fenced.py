@@ -47,6 +47,6 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
 
 def pace(bus: BusFace, nodes: Iterable[int]) -> float | None:
     """The greatest speed (rad/s) that the file allows to all of these; None where it bounds none of them."""
-    guards = getattr(bus.admit, "guards", {})
+    guards = getattr(bus.interlock, "guards", {})
     speeds = [guards[node].bounds.speed for node in nodes if node in guards]
     return min(speeds, default=None)

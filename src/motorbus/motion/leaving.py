@@ -230,10 +230,10 @@ def moves(axis: AxisVerbs) -> bool:
 
 def goes_on(axis: AxisVerbs) -> bool:
     """Whether it was told to go on without an end, by whatever spelling, and nothing else since."""
-    gate = axis.bus.admit
+    gate = axis.bus.interlock
     return isinstance(gate, Gate) and gate.goes_on(axis.spec.node)
 
 
 def _lost(axis: AxisVerbs) -> bool:
-    gate = axis.bus.admit
+    gate = axis.bus.interlock
     return isinstance(gate, Gate) and gate.loss() is not None

@@ -62,8 +62,8 @@ class Leased(Body):
             self._sentry.end()
         self._lease, self._sentry = lease, None
         for bus in self.buses.values():
-            if isinstance(bus.admit, Gate):
-                bus.admit.lease = lease
+            if isinstance(bus.interlock, Gate):
+                bus.interlock.lease = lease
 
     def _lay_down(self) -> None:
         """The machine is left: only a lease that was lost keeps it from parking."""

@@ -74,7 +74,7 @@ def _opened(
         bus = kind(
             link,
             opening.family,
-            admit=Gate(),
+            interlock=Gate(),
             report=report,
             journal=journal,
             stop_socket=_stop_socket(opening, link),

@@ -53,7 +53,7 @@ def distrust(body: Body) -> None:
 def distrust_on(bus: BusFace) -> None:
     """The same for the devices of a bus over which there are guards: by the old id and by the new one of the change,
     whether an axis has that or not. Nothing is sent."""
-    gate, change = bus.admit, _doubtful(bus)
+    gate, change = bus.interlock, _doubtful(bus)
     if change is None or not isinstance(gate, Gate):
         return
     concerned = _concerned(change)

@@ -147,8 +147,8 @@ def test_an_alarm_keeps_everyone_where_he_is_unless_somebody_wants_it_so() -> No
 
 def test_a_goal_that_the_gate_refuses_keeps_everyone_where_he_is() -> None:
     with four() as (sim, bus, servos, wire):
-        assert isinstance(bus.admit, Gate)
-        bus.admit.faults[3] = "it has started anew"
+        assert isinstance(bus.interlock, Gate)
+        bus.interlock.faults[3] = "it has started anew"
         with pytest.raises(MotorbusError, match="started anew"):
             bus.run(reg_write_all(orders(servos)))
         assert wire.said(ACTION) == []

@@ -62,7 +62,7 @@ class Bench:
         self.link = link(simulator, rate=rate, line=line)
         self.events: list[Any] = []
         self.on: Callable[[Any], None] = lambda event: None
-        self.bus = Bus(self.link, self.family, admit=Gate(), report=self._heard)
+        self.bus = Bus(self.link, self.family, interlock=Gate(), report=self._heard)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)
 
     def _heard(self, event: object) -> None:

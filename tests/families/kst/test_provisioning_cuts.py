@@ -113,7 +113,7 @@ class World:
         """A host that provisions, with somebody beside it who takes the supply away when he is asked to."""
         link = self.link = Doomed(self, cut)
         family = FAMILY.configured()
-        bus = Bus(link, family, admit=Gate(), report=self._asked)
+        bus = Bus(link, family, interlock=Gate(), report=self._asked)
         try:
             return Servo(bus, OLD).provision(**self.wanted, patience=5.0)
         except MotorbusError as error:

@@ -15,7 +15,7 @@ def blamed(error: MotorbusError, buses: Iterable[Any]) -> MotorbusError:
     `buses` are those that it was on.
     """
     ended = isinstance(error, Interrupted) or (isinstance(error, Refused) and error.reason == "lease")
-    gates = (bus.admit for bus in buses if isinstance(bus.admit, Gate)) if ended else ()
+    gates = (bus.interlock for bus in buses if isinstance(bus.interlock, Gate)) if ended else ()
     loss = next((loss for gate in gates if (loss := gate.loss()) is not None), None)
     if loss is None:
         return error

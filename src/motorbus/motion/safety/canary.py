@@ -224,7 +224,7 @@ def _faulted(axis: AxisVerbs, health: Health, reason: str) -> Faulted:
 
 
 def _gate(axis: AxisVerbs) -> Gate | None:
-    gate = getattr(axis.bus, "admit", None)
+    gate = getattr(axis.bus, "interlock", None)
     return gate if isinstance(gate, Gate) else None
 
 

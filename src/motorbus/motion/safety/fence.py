@@ -30,13 +30,13 @@ def fence(body: Body) -> None:
     """Set a guard over every axis of this machine, by what is known of it by now; endless motion is to be attended."""
     for name, bus in body.buses.items():  # axes of the file that were not opened are there all the same
         enclose(bus, {one: spec for one, spec in body.machine.axes.items() if spec.bus == name})
-        if isinstance(bus.admit, Gate):
-            bus.admit.attended, bus.admit.origin = True, body.origins[name]
+        if isinstance(bus.interlock, Gate):
+            bus.interlock.attended, bus.interlock.origin = True, body.origins[name]
             here = [axis for axis in body.axes.values() if axis.spec.bus == name]
             for axis in here:
                 bus.on_reconnect(partial(unknown, axis))
     for axis in body.axes.values():
-        gate = body.buses[axis.spec.bus].admit
+        gate = body.buses[axis.spec.bus].interlock
         if isinstance(gate, Gate):
             gate.guards[axis.spec.node] = guard(axis)
 
@@ -46,15 +46,15 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
 
     Nothing is sent. Who they are is asked when the first of them is ordered to a place.
     """
-    if not isinstance(bus.admit, Gate):
+    if not isinstance(bus.interlock, Gate):
         return
-    _watched(bus, bus.admit)
+    _watched(bus, bus.interlock)
     for name, spec in axes.items():
         try:
             ask = _asking(bus, spec.node)
         except RequestError:  # an id that cannot be is nobody's
             continue
-        bus.admit.guards[spec.node] = _guard(name, spec, ask)
+        bus.interlock.guards[spec.node] = _guard(name, spec, ask)
 
 
 def _watched(bus: BusFace, gate: Gate) -> None:

@@ -123,6 +123,18 @@ class Gate:
                 found[goal.node] = guard.ask()
         return list(found.values())
 
+    def check(self, exchange: Exchange[Any], now: float) -> None:
+        """Raise Refused if this must not leave now."""
+        if not (exchange.sure and self.passes(exchange)):
+            self(exchange)
+
+    def required_reads(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
+        """The reads that must be carried out before this can be checked."""
+        return self.look(exchange)
+
+    def stopped(self, nodes: Iterable[int]) -> None:
+        """A stop of these nodes is about to leave; nothing is to be done for it here."""
+
     def lets_move(self) -> bool:
         """Whether anybody may be moved at this moment: nobody is at fault, and a lease that there is holds."""
         return not self.faults and (self.lease is None or self.lease.lets_move(self._now() - self.origin))

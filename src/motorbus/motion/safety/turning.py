@@ -54,7 +54,7 @@ class Resting:
     """What an axis went on by when somebody began to stop it; call `certain` once it is certain that it rests."""
 
     def __init__(self, axis: AxisVerbs) -> None:
-        gate: Any = axis.bus.admit
+        gate: Any = axis.bus.interlock
         self._node = axis.spec.node
         self._lock = axis.bus.lock
         self._turning: Turning | None = getattr(gate, "turning", None)
