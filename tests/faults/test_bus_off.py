@@ -20,7 +20,7 @@ from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.faults.scenes import Scene
 from tests.faults.test_reconnect import again, free_port
 from tests.support.mounts import served
-from tests.support.world import said
+from tests.support.world import is_queued, said
 
 IDS = (0x21, 0x22, 0x23)
 SOON = 1.0
@@ -97,7 +97,7 @@ def test_d13_bus_off_is_told_its_queue_is_dropped_and_nothing_is_sent_again() ->
         assert failing.refused
         assert all(isinstance(one, LinkLost) for one in told), told
         assert "off the bus" in str(told[0])
-        assert not bus.turns.waiting
+        assert not is_queued(bus)
         failing.off = False
         on_its_way(bus, failing)
         failing.heard.clear()
@@ -123,7 +123,7 @@ def test_d13_where_nobody_acknowledges_it_is_told_soon_and_nothing_is_sent_later
     told = there.bus.run(moves(devices))
     assert there.link.now() - now <= SOON
     assert all(isinstance(one, MotorbusError) for one in told)
-    assert not there.bus.turns.waiting
+    assert not is_queued(there.bus)
     for node in there.simulator.nodes.values():
         node.plug()
     sent = len(there.wire.sent)

@@ -32,7 +32,7 @@ WALL = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.ctim
 WALL |= {
     f"{name}.{call}" for name in ("datetime", "datetime.datetime") for call in ("now", "utcnow", "today")
 }
-STAMPS = {"bus/stop.py", "journal.py", "cli/simulate.py", "cli/stepper/copies.py"}
+STAMPS = {"bus/stop_socket.py", "journal.py", "cli/simulate.py", "cli/stepper/copies.py"}
 """Who may ask the wall clock: a stamp on a record, on a recording, on a copy, on a latched stop."""
 DAY, NIGHT = 86_400.0, 8 * 3600.0
 

@@ -34,7 +34,7 @@ class Exact(MemoryLink):
     expired = late = 0
 
     def _read_virtual(self, until: float) -> list[Data]:
-        waits = until > self._now
+        waits = until > self.clock.now
         arrived = super()._read_virtual(self._woken(until) if waits else until)
         if waits and arrived:
             self._seen(until)
@@ -55,15 +55,15 @@ class TimeOuts(Exact):
         return tick(until)
 
     def _seen(self, until: float) -> None:
-        self.late += self._now > until
+        self.late += self.clock.now > until
 
 
 class Sleeps(TimeOuts):
     """A host that sleeps and looks: what comes is seen at its next tick."""
 
     def _seen(self, until: float) -> None:
-        self._now = tick(self._now)
-        self._happen_until(self._now)
+        self.clock.now = tick(self.clock.now)
+        self._happen_until(self.clock.now)
         super()._seen(until)
 
 

@@ -108,7 +108,7 @@ def test_l12_a_simulator_that_is_killed_and_started_again(way: str, tmp_path: Pa
         with Simulated(family, ids=ids, **place) as after:
             assert after.process.pid != before.process.pid
             assert again(bus) == told
-            assert bus.turns.losses == 1
+            assert bus.loss_count == 1
             link: Any = bus.link
             assert socket_path(link.lock_name).exists(), "it is to be stopped by other programs there"
 
@@ -168,7 +168,7 @@ def test_l12_a_terminal_pulled_again_and_again_leaves_nothing_behind(
         seen = list(cycles(bus, mount, count))
         right = sum(one.value == told for one in seen)
         assert right == count
-        assert bus.turns.losses == count + 3
+        assert bus.loss_count == count + 3
         leaked = sum(counts()) - sum(before)
         assert counts() == before
     longest: dict[str, Any] = {

@@ -25,6 +25,7 @@ from motorbus.cli.simulated import Simulated
 from motorbus.core.operation import Report
 from motorbus.errors import MotorbusError
 from tests.support.machines import machine
+from tests.support.world import is_stopping
 
 ROOT = Path(__file__).parents[2]
 LONG = 60.0  # s until a test that hangs says so
@@ -140,7 +141,7 @@ def test_15_whoever_asked_for_a_stop_has_gone_away(tmp_path: Path) -> None:
             client.connect(str(place))
             client.sendall(b"estop\n")
         for _ in range(int(LONG / 0.01)):
-            if bus.turns.latched and not bus.turns.stopping:
+            if bus.latched and not is_stopping(bus):
                 break
             Event().wait(0.01)
         assert [servo.read("torque_enable")["torque_enable"] for servo in servos] == [0, 0]

@@ -17,6 +17,7 @@ from motorbus.core.operation import Data
 from motorbus.simulation.named import Simulation
 from tests.safety.test_estop import MOST, is_stop, is_target, queued
 from tests.support.machines import machine
+from tests.support.world import is_stopping
 
 CHUNK = 0.001  # s of the line that one piece of garbage fills
 FAMILIES = {"arm": "feetech", "can": "kst", "stage": "stepper"}
@@ -106,9 +107,9 @@ def measured(robot: AsyncRobot, freed: Event) -> Went:
     others = [bus for name, bus in robot.buses.items() if name != "can"]
     for _ in range(int(LONG / 0.01)):
         stopping.join(0.01)
-        if all(bus.turns.latched and not bus.turns.stopping for bus in others):
+        if all(bus.latched and not is_stopping(bus) for bus in others):
             break
-    waiting = {name for name, bus in robot.buses.items() if bus.turns.stopping or not bus.turns.latched}
+    waiting = {name for name, bus in robot.buses.items() if is_stopping(bus) or not bus.latched}
     freed.set()
     stopping.join(LONG)
     assert not stopping.is_alive()

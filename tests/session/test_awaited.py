@@ -41,8 +41,8 @@ def test_the_async_bus_finds_out_about_echo_when_it_is_entered() -> None:
     async def main() -> None:
         with buses.simulate("feetech") as sim:
             bus = buses.open_async(sim.url)
-            assert bus.turns.echo.present is None
+            assert not bus.echoes
             async with bus:
-                assert bus.turns.echo.present is False
+                assert not bus.echoes
 
     asyncio.run(main())

@@ -110,7 +110,7 @@ def test_an_echoing_adapter_is_found_at_open_and_told(caplog: pytest.LogCaptureF
     with motorbus.simulate("feetech", ids="1-2") as sim:
         sim.line = NoisyLine(1, echo=True)
         with caplog.at_level(logging.WARNING, "motorbus"), motorbus.open(sim.url) as bus:
-            assert bus.turns.echo.present is True
+            assert bus.echoes
             assert motorbus.feetech.Servo(bus, 2).position() > 0
             assert bus.statistics.of(2).retries == 0
     assert "echoes" in caplog.text
@@ -118,7 +118,7 @@ def test_an_echoing_adapter_is_found_at_open_and_told(caplog: pytest.LogCaptureF
 
 def test_without_echo_nothing_is_told(caplog: pytest.LogCaptureFixture) -> None:
     with motorbus.simulate("feetech", ids="2") as sim, motorbus.open(sim.url) as bus:
-        assert bus.turns.echo.present is False, "found out although node 1 is not there"
+        assert not bus.echoes, "found out although node 1 is not there"
     assert caplog.text == ""
 
 

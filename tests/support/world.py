@@ -6,6 +6,7 @@ This file alone knows the engine (`motorbus.bus`). Every other helper and every 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -13,8 +14,11 @@ from typing import Any, Protocol, cast
 
 from motorbus.bus import verdict
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.crank import crank
+from motorbus.bus.engine import Engine
 from motorbus.bus.face import BusFace
+from motorbus.bus.jobs import RequestJob
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.ticket import Flight
@@ -61,23 +65,46 @@ def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) 
 
 def exclude_echo(bus: AnyBus) -> None:
     """Tell the bus that its line has no echo, as the echo test of `motorbus.open` finds out."""
-    bus.turns.echo.excluded()
+    _engine(bus).echo.excluded()
+
+
+def _engine(bus: Any) -> Any:
+    """The engine of a bus, old or new."""
+    return bus.engine if hasattr(bus, "engine") else bus.turns
 
 
 def is_idle(bus: AnyBus) -> bool:
     """Nothing is queued or awaited, and no caller holds the bus or its lock."""
+    if hasattr(bus, "engine"):
+        new: Any = bus
+        return bool(new.engine.idle and not new.turn.held)
     owned: bool = cast("Any", bus.turns.lock)._is_owned()
     return bus.turns.idle and not owned
 
 
 def is_queued(bus: AnyBus) -> bool:
     """Requests wait to be sent."""
-    return bus.turns.waiting
+    return bool(bus.engine.queue) if hasattr(bus, "engine") else bus.turns.waiting
+
+
+def is_listening(bus: AnyBus) -> bool:
+    """The bus sends nothing."""
+    return bool(_engine(bus).listening)
+
+
+def is_stopping(bus: AnyBus) -> bool:
+    """An emergency stop is being sent."""
+    return bool(_engine(bus).stopping)
+
+
+def set_rate(bus: AnyBus, rate: int) -> None:
+    """Let the bus compute with this bit rate."""
+    _engine(bus).rate = rate
 
 
 def receiver_of(bus: AnyBus) -> object:
     """The receiver of the family that cuts the incoming bytes into frames."""
-    return bus.turns.receiver
+    return _engine(bus).receiver
 
 
 class Pending(Protocol):
@@ -91,6 +118,10 @@ class Pending(Protocol):
 
 def queue(bus: AnyBus, exchange: Exchange[Any]) -> Pending:
     """Queue a request without waiting for its reply."""
+    if hasattr(bus, "engine"):
+        job = RequestJob(exchange)
+        bus.engine.submit(job, bus.link.now())
+        return job
     flight = Flight(exchange)
     bus.turns.submit(flight, bus.link.now())
     return flight
@@ -98,6 +129,11 @@ def queue(bus: AnyBus, exchange: Exchange[Any]) -> Pending:
 
 def turn(bus: AnyBus, seconds: float) -> None:
     """Send what may be sent, and receive for at most so long."""
+    if hasattr(bus, "engine"):
+        new: Any = bus
+        new.send()
+        new.receive(bus.link.now() + seconds)
+        return
     crank(bus.link, bus.turns, bus.link.now() + seconds)
 
 
@@ -108,18 +144,28 @@ class Tries:
     """s from the request to its reply."""
 
     def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
-        self.turns = Turns(family, rate=rate)
+        self.is_new = os.environ.get("MOTORBUS_ENGINE") == "new"
+        self.turns: Any = Engine(family, rate=rate) if self.is_new else Turns(family, rate=rate)
         if not echo:
             self.turns.echo.excluded()
 
     def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
+        if self.is_new:
+            return self._answered(exchange, data)
         flight = Flight(exchange)
         if self.turns.short(flight, 0.0) is not None:
             self.turns.feed(data, self.SOON)
             self.turns.expire(flight.deadline)
         value = flight.value if flight.done and flight.error is None else None
         return value, verdict.fault(flight)
+
+    def _answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
+        attempt = Attempt(exchange, None)
+        self.turns.begin(attempt, 0.0)
+        self.turns.feed(data, self.SOON)
+        self.turns.expire(attempt.deadline)
+        return None if attempt.fault else attempt.answer(self.SOON), attempt.failure()
 
 
 IDS = (1, 2, 3)

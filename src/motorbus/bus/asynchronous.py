@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, Final, Self, TypeVar
+from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.base import IDLE, BaseBus
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.operation import Runnable
+from motorbus.errors import MotorbusError
+from motorbus.link.memory import MemoryLink
 
 T = TypeVar("T")
 
+LONGEST: Final = 3600.0
+"""s; the longest time that a task waits before it looks again."""
 LOOK: Final = 0.001
 """s between two looks at a link without descriptor."""
 
@@ -25,50 +30,11 @@ class AsyncBus(BaseBus):
 
     async def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
         """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
-        news = asyncio.Event()
-        tree = TaskTree(self.engine, procedure, now=self.now, report=self.listener(report), settled=news.set)
-        try:
-            while not self._advance(tree, news):
-                try:
-                    await self._wait(tree, news)
-                except asyncio.CancelledError as error:
-                    with self.turn:
-                        tree.cancel(error)
-        except GeneratorExit:  # the coroutine was closed: nothing is sent any more
-            with self.turn:
-                tree.drop()
-            raise
-        return tree.result()
+        part = _Part(self, procedure, report, asyncio.Event())
+        await _run_parts([part])
+        return part.tree.result()
 
-    def _advance(self, tree: TaskTree[Any], news: asyncio.Event) -> bool:
-        """Step the tree and send, until it waits for something; True when it has ended."""
-        with self.turn:
-            while not tree.advance():
-                news.clear()
-                self.send()
-                if not news.is_set():
-                    self._watch()
-                    return False
-        return True
-
-    async def _wait(self, tree: TaskTree[Any], news: asyncio.Event) -> None:
-        """Wait until something that the tree waits for has ended, or a moment that it waits for."""
-        if self.link.virtual:
-            with self.turn:
-                self.receive(tree.next_moment())
-            await asyncio.sleep(0)
-            return
-        moment = tree.next_moment()
-        if moment == inf:
-            await news.wait()
-        else:
-            timer = asyncio.get_running_loop().call_later(max(0.0, moment - self.now()), news.set)
-            try:
-                await news.wait()
-            finally:
-                timer.cancel()
-
-    def _watch(self) -> None:
+    def watch(self) -> None:
         """Have `_look` called when data has come, or at the next deadline."""
         if self.link.virtual:
             return
@@ -94,7 +60,7 @@ class AsyncBus(BaseBus):
         with self.turn:
             self.receive(-inf)
             self.send()
-            self._watch()
+            self.watch()
 
     def _unwatch(self) -> None:
         if self._timer is not None:
@@ -114,3 +80,107 @@ class AsyncBus(BaseBus):
 
     async def __aexit__(self, *exc: object) -> None:
         await self.close()
+
+
+async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus, Any]:
+    """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
+
+    Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
+    """
+    news = asyncio.Event()
+    parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
+    await _run_parts(parts)
+    return {part.bus: part.outcome() for part in parts}
+
+
+class _Part(Generic[T]):
+    """A procedure on one bus; `news` is set when a tree can go on."""
+
+    def __init__(
+        self, bus: AsyncBus, procedure: Runnable[T], report: Notify | None, news: asyncio.Event
+    ) -> None:
+        self.bus = bus
+        self.news = news
+        self.tree: TaskTree[T] = TaskTree(
+            bus.engine, procedure, now=bus.now, report=bus.listener(report), settled=news.set
+        )
+
+    def outcome(self) -> Any:
+        """The value or the MotorbusError; raises any other error."""
+        error = self.tree.error()
+        if error is None or isinstance(error, MotorbusError):
+            return self.tree.root.value if error is None else error
+        raise error
+
+    def advance(self) -> bool:
+        """Step the tree and send, until it waits for something; True when it has ended."""
+        with self.bus.turn:
+            while not self.tree.advance():
+                self.news.clear()
+                self.bus.send()
+                if not self.news.is_set():
+                    self.bus.watch()
+                    return False
+        return True
+
+    def receive(self, until: float) -> None:
+        with self.bus.turn:
+            self.bus.receive(until)
+
+    def next_event(self) -> float:
+        """When something happens on this simulated bus, in s of its clock."""
+        link = self.bus.link
+        due = link.due() if isinstance(link, MemoryLink) else inf
+        moment = min(self.tree.next_moment(), self.bus.engine.next_deadline(), due)
+        return max(moment, link.now())
+
+    def cancel(self, error: BaseException) -> None:
+        if not self.tree.root.finished:
+            with self.bus.turn:
+                self.tree.cancel(error)
+
+    def drop(self) -> None:
+        with self.bus.turn:
+            self.tree.drop()
+
+
+async def _run_parts(parts: Sequence[_Part[Any]]) -> None:
+    """Run all trees to their end. A cancellation, or an error that is none of ours, cancels them; they clean up."""
+    try:
+        while True:
+            try:
+                going = [part for part in parts if not part.advance()]
+                if not going:
+                    return
+                for part in parts:
+                    error = part.tree.root.error
+                    if part.tree.cancellation is None and not isinstance(error, MotorbusError | None):
+                        part.tree.cancellation = error
+                        raise error
+                await _wait(going)
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                for part in parts:
+                    part.cancel(error)
+    except GeneratorExit:  # the coroutine was closed: nothing is sent any more
+        for part in parts:
+            part.drop()
+        raise
+
+
+async def _wait(parts: Sequence[_Part[Any]]) -> None:
+    """Wait until one of these can go on."""
+    if all(part.bus.link.virtual for part in parts):
+        moment = min(part.next_event() for part in parts)
+        for part in sorted(parts, key=_Part.next_event):
+            part.receive(moment if moment < inf else part.bus.now() + IDLE)
+        await asyncio.sleep(0)
+        return
+    news = parts[0].news
+    seconds = min(max(0.0, part.tree.next_moment() - part.bus.now()) for part in parts)
+    timer = asyncio.get_running_loop().call_later(min(seconds, LONGEST), news.set)
+    try:
+        await news.wait()
+    finally:
+        timer.cancel()

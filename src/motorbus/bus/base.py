@@ -15,7 +15,7 @@ from motorbus.bus.jobs import RateJob
 from motorbus.bus.positions import Reading
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop_socket import StopOutcome, asked_by
-from motorbus.bus.tasks import Notify
+from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import Family, Readdressed
@@ -64,7 +64,8 @@ class BaseBus:
         self.interlock = interlock
         self._reconnects = isinstance(link, Renewable)
         self._on_reconnect: list[Callable[[], None]] = []
-        self._missed_rate: RateJob | None = None
+        self.beside: list[TaskTree[Any]] = []
+        """Procedures that are stepped whenever the bus is used; see `Beside`."""
         if stop_socket is not None:
             self.stopper.start()
 
@@ -87,6 +88,9 @@ class BaseBus:
     def send(self) -> None:
         """Write all that may be sent now. The caller holds the turn; a lost link fails all requests."""
         engine, link = self.engine, self.link
+        for tree in tuple(self.beside):
+            if tree.advance() and tree in self.beside:
+                self.beside.remove(tree)
         if engine.gone is not None and not self._reconnect():
             return
         try:
@@ -108,6 +112,7 @@ class BaseBus:
         Only what was due before this look is overdue after it: the reply may be in the buffer of a host that was late.
         """
         engine, link = self.engine, self.link
+        until = min([until, *(tree.next_moment() for tree in self.beside)])
         if engine.gone is not None:
             self._wait_without_link(until)
             return

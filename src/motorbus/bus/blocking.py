@@ -18,8 +18,9 @@ from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
+from motorbus.core.entry import shown
 from motorbus.core.operation import UNLIKE, Data, Exchange, Runnable
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
 
@@ -39,16 +40,7 @@ class Bus(BaseBus):
             procedure.effect in GATED and self.required_reads(procedure)
         ):
             return self.transact(procedure)  # type: ignore[no-any-return]
-        signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        signals.depth += 1
-        try:
-            part = _Part(self, procedure, report)
-            _run_parts([part])
-            return part.tree.result()
-        finally:
-            signals.depth -= 1
-            if signals.pending is not None and not signals.depth:
-                raise signals.take()  # type: ignore[misc]
+        return run_here(self, procedure, report)
 
     def transact(self, request: Exchange[Any]) -> Any:
         """Carry out one request."""
@@ -135,12 +127,89 @@ class Bus(BaseBus):
                 self.receive(inf)
         return job.result()
 
-    def volley(self, *exchanges: Exchange[Any]) -> list[Any]:
+    def volley(self, *requests: Exchange[Any]) -> list[Any]:
         """Carry out several requests in order, as a control loop does in every cycle; their values.
 
-        Raises the first error; what comes behind it has not been sent then.
+        A request without reply leaves in one write with the next one, where the bus is idle: goals out, positions in.
+        Raises the first error; requests behind it have not been sent then.
         """
-        return [self.run(exchange) for exchange in exchanges]
+        return self.exchange(requests)
+
+    def exchange(
+        self, requests: Sequence[Exchange[Any]], forgiven: tuple[type[Exception], ...] = ()
+    ) -> list[Any]:
+        """`volley`; an error of a `forgiven` type becomes the value of its request."""
+        _check_requests(requests)
+        if len(requests) == 2:
+            try:
+                value = self._burst(requests[0], requests[1])
+            except LinkError:
+                raise
+            except forgiven as error:
+                return [None, error]
+            if value is not UNLIKE:
+                return [None, value]
+        values: list[Any] = []
+        for request in requests:
+            try:
+                values.append(self.run(request))
+            except forgiven as error:
+                values.append(error)
+        return values
+
+    def _burst(self, order: Exchange[Any], question: Exchange[Any]) -> Any:
+        """Send an order without reply and a prepared request in one write; UNLIKE when nothing was sent."""
+        engine, link = self.engine, self.link
+        prepared: Prepared | None = question.course
+        if order.replies != () or prepared is None or prepared.engine is not engine:
+            return UNLIKE
+        if order.effect in GATED and self.required_reads(order):
+            return UNLIKE
+        with self.turn:
+            if not engine.ready and not engine.check_ready():
+                return UNLIKE
+            single = prepared.single
+            if single is not None and single.length == prepared.length:
+                prepared = prepared.alternate
+            now = link.now()
+            if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
+                return UNLIKE
+            if now < engine.free_at or link.read(-inf):
+                return UNLIKE
+            if prepared.timing != engine.timing:
+                engine.measure(prepared)
+            engine.time = now
+            engine.check(RequestJob(order, losses=engine.losses))
+            try:
+                return self._send_burst(order, prepared, now)
+            except LinkError as error:
+                self._lost(error)
+                raise
+
+    def _send_burst(self, order: Exchange[Any], prepared: Prepared, now: float) -> Any:
+        engine, link, attempt = self.engine, self.link, prepared.attempt
+        engine.positions.sent(order)
+        engine.statistics.asked(order.replies)
+        start = now + engine.air_time(order)
+        attempt.sent_at = start if engine.paced else now
+        attempt.deadline = deadline = start + prepared.budget
+        engine.free_at = start
+        engine.in_flight[prepared.lane] = attempt
+        wire: Any = order.request
+        if engine.trace.subscriptions:
+            engine.trace.put(TraceRecord(now, "tx", wire))
+            engine.trace.put(TraceRecord(now, "tx", prepared.wire))
+        link.write(wire + prepared.wire)
+        chunks = link.read(deadline)
+        if len(chunks) == 1:
+            at = min(link.now(), deadline)
+            value = prepared.decode(chunks[0], at)
+            if value is not UNLIKE:
+                if engine.trace.subscriptions:
+                    engine.trace.put(TraceRecord(at, "rx", chunks[0]))
+                engine.accepted(prepared, chunks[0], at)
+                return value
+        return self._continue(prepared, chunks)
 
     def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
@@ -153,7 +222,31 @@ class Bus(BaseBus):
         self.close()
 
 
-def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[Bus, Any]:
+def _check_requests(requests: Sequence[Any]) -> None:
+    for one in requests:
+        if not isinstance(one, Exchange):
+            raise RequestError(
+                f"{shown(one)} is not a request",
+                expected="as bus.volley(write(goals), sync_read_positions(servos)): single requests, made before",
+                advice="use run() for a procedure; nothing was sent",
+            )
+
+
+def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None) -> T:
+    """Run a procedure in this thread, also on a bus of an event loop; see `Bus.run`."""
+    signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+    signals.depth += 1
+    try:
+        part = _Part(bus, procedure, report)
+        _run_parts([part])
+        return part.tree.result()
+    finally:
+        signals.depth -= 1
+        if signals.pending is not None and not signals.depth:
+            raise signals.take()  # type: ignore[misc]
+
+
+def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
     """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
 
     Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
@@ -173,7 +266,7 @@ def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[Bus, Any]:
 class _Part(Generic[T]):
     """A procedure on one bus; `news` is set when its tree can go on."""
 
-    def __init__(self, bus: Bus, procedure: Runnable[T], report: Notify | None) -> None:
+    def __init__(self, bus: BaseBus, procedure: Runnable[T], report: Notify | None) -> None:
         self.bus = bus
         self.news = True
         self.holds_turn = False
@@ -273,8 +366,10 @@ def _wait(parts: Sequence[_Part[Any]]) -> None:
     if len(parts) == 1:
         parts[0].wait()
     elif all(part.bus.link.virtual for part in parts):
-        first = min(parts, key=_next_event)
-        first.wait()
+        moment = min(map(_next_event, parts))
+        for part in sorted(parts, key=_next_event):
+            part.bus.receive(moment)
+            part.news = True
     else:
         _poll(parts)
 

@@ -7,6 +7,7 @@ seed gives the same bytes. On the real clock it waits.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from heapq import heappop, heappush
 from math import inf
 from threading import Condition
@@ -18,6 +19,24 @@ from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Line, PerfectLine, Side
 
 BACKLOG = 1 << 20  # deliveries under way; more means that the program writes without reading
+
+
+class VirtualClock:
+    """A clock that moves only while a link on it is read. It belongs to one thread or one event loop."""
+
+    def __init__(self, now: float = 0.0) -> None:
+        self.now = now
+        self.links: list[MemoryLink] = []
+
+
+def share_clock(links: Iterable[MemoryLink]) -> None:
+    """Put these links on one virtual clock, which shows the latest of their times."""
+    found = list(links)
+    clock = VirtualClock(max((link.now() for link in found), default=0.0))
+    for link in found:
+        link.advance(clock.now - link.now())
+        link.clock = clock
+    clock.links = found
 
 
 class MemoryLink:
@@ -55,7 +74,7 @@ class MemoryLink:
         self.paced = pace or bool(getattr(simulator, "paced", False))
         self.name = name
         self.bits_per_byte = bits_per_byte
-        self._now = start
+        self.clock = VirtualClock(start)
         self._under_way: list[tuple[float, int, Side, Data]] = []
         self._arrived: list[Data] = []
         self._sequence = 0
@@ -66,7 +85,7 @@ class MemoryLink:
         self.tune(rate)
 
     def now(self) -> float:
-        return self._now if self.virtual else time.monotonic()
+        return self.clock.now if self.virtual else time.monotonic()
 
     def write(self, data: Data) -> None:
         with self._changed:
@@ -139,16 +158,16 @@ class MemoryLink:
         with self._changed:
             moment = until if self.now() >= self._back_at else min(until, self._back_at)
             if self.virtual:
-                self._now = max(self._now, moment)
+                self._move_clock(max(self.clock.now, moment))
             elif moment > self.now():
                 self._changed.wait(moment - self.now())
 
     def advance(self, seconds: float) -> None:
         """Let virtual time pass without reading; what arrives is kept for the next `read`."""
         with self._changed:
-            end = self._now + seconds
+            end = self.clock.now + seconds
             self._happen_until(end)
-            self._now = end
+            self._move_clock(end)
 
     @property
     def quiet(self) -> bool:
@@ -164,19 +183,27 @@ class MemoryLink:
     # -- events -------------------------------------------------------------------------------------------------
 
     def _read_virtual(self, until: float) -> list[Data]:
-        limit = max(until, self._now)
+        clock = self.clock
+        limit = max(until, clock.now)
         while not self._arrived:
-            self._check(self._now)
-            moment = max(self._next_event(), self._now)
+            self._check(clock.now)
+            moment = max(self._next_event(), clock.now)
             if moment > limit:
                 break
-            self._now = moment
+            self._move_clock(moment)
             self._happen(moment)
-        self._check(self._now)
-        if not self._arrived and self._now < limit < inf:
-            self._now = limit
+        self._check(clock.now)
+        if not self._arrived and clock.now < limit < inf:
+            self._move_clock(limit)
             self._happen(limit)
         return self._take()
+
+    def _move_clock(self, moment: float) -> None:
+        """Let time pass on all links of the clock; what arrives on others is kept for their next `read`."""
+        for link in self.clock.links:
+            if link is not self:
+                link._happen_until(moment)
+        self.clock.now = moment
 
     def _read_real(self, until: float) -> list[Data]:
         while True:

@@ -6,12 +6,14 @@ Work on one bus goes straight to it, for a control loop does so thousands of tim
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from motorbus.bus import asynchronous, blocking
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.concert import Concert
 from motorbus.bus.concert_loop import LoopConcert
 from motorbus.bus.pump import Bus
+from motorbus.core.operation import Runnable
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.safety.blame import raise_blamed
@@ -42,13 +44,20 @@ class Conductor:
     def _run(self, work: Abreast[T]) -> T:
         operations = work.operations
         if len(operations) != 1:
-            return work.combine(self._concert.run(operations))
+            return work.combine(self._run_on(operations))
         ((name, wanted),) = operations.items()
         try:
             told = self._buses[name].run(wanted)
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
+
+    def _run_on(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
+        if not all(isinstance(bus, blocking.Bus) for bus in self._buses.values()):
+            return self._concert.run(operations)
+        buses: dict[str, Any] = {name: self._buses[name] for name in operations}
+        values = blocking.run_on({buses[name]: wanted for name, wanted in operations.items()})
+        return {name: values[bus] for name, bus in buses.items()}
 
 
 class LoopConductor:
@@ -69,10 +78,17 @@ class LoopConductor:
     async def _run(self, work: Abreast[T]) -> T:
         operations = work.operations
         if len(operations) != 1:
-            return work.combine(await self._concert.run(operations))
+            return work.combine(await self._run_on(operations))
         ((name, wanted),) = operations.items()
         try:
             told = await self._buses[name].run(wanted)
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
+
+    async def _run_on(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
+        if not all(isinstance(bus, asynchronous.AsyncBus) for bus in self._buses.values()):
+            return await self._concert.run(operations)
+        buses: dict[str, Any] = {name: self._buses[name] for name in operations}
+        values = await asynchronous.run_on({buses[name]: wanted for name, wanted in operations.items()})
+        return {name: values[bus] for name, bus in buses.items()}

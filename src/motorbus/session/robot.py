@@ -24,6 +24,7 @@ from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion import group
 from motorbus.motion.abreast import Abreast, Led, LedAsync, together
 from motorbus.motion.axis import AsyncAxis, Axis
@@ -213,6 +214,7 @@ class Robot(RobotVerbs, Led):
         plan = Plan.of(machine, axes)
         with ExitStack() as stack:
             buses = {name: stack.enter_context(plan.open(name, report)) for name in plan.buses}
+            _share_clock(buses.values())
             robot = cls(machine, buses, plan.blocking(buses))
             robot.conductor.run(recognise(robot))
             fence(robot)
@@ -328,6 +330,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
             buses: dict[str, AsyncBus] = {}
             for name in self._plan.buses:
                 buses[name] = await stack.enter_async_context(self._plan.open_async(name, self._report))
+            _share_clock(buses.values())
             body = Body(self._plan.machine, buses, self._plan.awaiting(buses))
             conductor = LoopConductor(buses, body.origins)
             await conductor.run(recognise(body))
@@ -397,3 +400,11 @@ class AsyncRobot(RobotVerbs, LedAsync):
                 raise
             except BaseException as interruption:  # cancelled once more: less waiting, and nobody is left out
                 caught = interruption
+
+
+def _share_clock(buses: Iterable[Bus | AsyncBus]) -> None:
+    """Put the simulated buses of this machine on one virtual clock."""
+    links = [bus.link for bus in buses]
+    simulated = [link for link in links if isinstance(link, MemoryLink) and link.virtual]
+    if len(simulated) == len(links):
+        share_clock(simulated)

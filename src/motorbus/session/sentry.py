@@ -13,6 +13,8 @@ from threading import Event, Thread
 from typing import Any, Final
 
 from motorbus.bus.background import Background
+from motorbus.bus.base import BaseBus
+from motorbus.bus.beside import Beside
 from motorbus.core.operation import Operation, Pause, outcome
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
@@ -47,7 +49,7 @@ class Sentry:
         for name, bus in self._body.buses.items():
             post = self._posts[name]
             if bus.link.virtual:
-                post.along = Background(bus, partial(self._watching, name))
+                post.along = _background(bus)(bus, partial(self._watching, name))
                 post.along.along()
             else:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
@@ -111,7 +113,8 @@ class Sentry:
             left = AGAIN
             try:
                 if self._late(bus):
-                    Background(self._body.buses[bus], partial(self._stopping, bus)).carried()
+                    there = self._body.buses[bus]
+                    _background(there)(there, partial(self._stopping, bus)).carried()
                 left = self._left(bus)
             except Exception as error:  # not even the pump works: later once more
                 with suppress(Exception):  # nor may want of memory end this thread
@@ -154,6 +157,10 @@ class Sentry:
                 LOG.warning("%s: it has accepted the stop now", axis.name)
 
 
+def _background(bus: Any) -> Any:
+    return Beside if isinstance(bus, BaseBus) else Background
+
+
 class _Post:
     """What is known of one bus: the number of the `loss` after which it was stopped, those who `failed` to accept that,
     and from when on they are told `again` (s)."""
@@ -163,7 +170,7 @@ class _Post:
         self.failed: frozenset[str] = frozenset()
         self.again = 0.0
         self.woken = Event()
-        self.along: Background[None] | None = None
+        self.along: Background[None] | Beside[None] | None = None
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
         """They were told to stop."""

@@ -15,6 +15,7 @@ from motorbus.families.kst import PowerCycleNeeded, Provisioned, driver
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, bench, node, play
 from tests.families.kst.test_driver_scanning import Deaf
+from tests.support.world import is_listening
 
 SAVE = "605#2210100173617665"
 
@@ -45,7 +46,7 @@ def test_from_the_first_look_to_the_proof(wanted: dict[str, int], pending: str, 
         assert (there.simulator.servos[0].node, there.simulator.servos[0].bit_rate) == (node, rate)
         assert there.of(PowerCycleNeeded) == [PowerCycleNeeded(5, node, rate)]
         assert [event.done for event in there.of(Progress)] == [0, 1, 2, 3, 4]
-        assert (there.bus.rate, there.link.rate, there.bus.turns.listening) == (500_000, 500_000, False)
+        assert (there.bus.rate, there.link.rate, is_listening(there.bus)) == (500_000, 500_000, False)
         there.sent()
         assert there.servo().provision(**wanted) == done._replace(resumed=True)
         assert {frame.partition("#")[2][:2] for frame in there.sent()} == {"40"}, "nothing is written again"
@@ -323,4 +324,4 @@ def test_while_it_is_waited_for_nobody_at_another_rate_is_disturbed() -> None:
         with pytest.raises(OutcomeUnknown):
             there.servo().provision(new_rate=250_000, patience=5.0)
         assert there.sim(6).errors == 0
-        assert (there.bus.rate, there.bus.turns.listening) == (500_000, False)
+        assert (there.bus.rate, is_listening(there.bus)) == (500_000, False)

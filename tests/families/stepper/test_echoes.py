@@ -83,7 +83,7 @@ def test_a_line_that_only_echoes_acknowledges_nothing(piece: int, pace: bool, op
 @pytest.mark.parametrize("piece", [1, 4, 6, 11])
 def test_with_a_controller_behind_it_everything_is_right_at_its_first_try(piece: int, pace: bool) -> None:
     rig = rig_on(Echoing(FULL, piece=piece, pace=pace), opened=True)
-    assert rig.bus.turns.echo.present is True
+    assert rig.bus.echoes
     for name in ORDERS:
         assert ask(rig, name), name
     assert rig.tried_again == 0
@@ -94,7 +94,7 @@ def test_with_a_controller_behind_it_everything_is_right_at_its_first_try(piece:
 def test_an_echo_that_nobody_has_tested_for_is_found_by_what_comes_of_it(piece: int, pace: bool) -> None:
     rig = rig_on(Echoing(FULL, piece=piece, pace=pace), opened=False)
     told = [ask(rig, name) for name in ORDERS]
-    assert rig.bus.turns.echo.present is True
+    assert rig.bus.echoes
     assert all(told[-10:])
 
 
@@ -113,7 +113,7 @@ def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learn
         line.deaf = False
         assert rig.dump()
         assert ask(rig, "stop_motor"), "learned"
-        assert rig.bus.turns.echo.present is (line.mode == FULL)
+        assert rig.bus.echoes is (line.mode == FULL)
 
 
 @pytest.mark.parametrize("pace", [True, False])

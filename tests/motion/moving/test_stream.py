@@ -15,6 +15,7 @@ from motorbus.motion.moving.stream import SETTLE, Fate, Grid, grains, rate_for
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import machine
 from tests.support.noisy_line import NoisyLine
+from tests.support.world import set_rate
 
 
 def train(robot: Robot, bus: str) -> Any:
@@ -62,16 +63,16 @@ def test_axes_are_led_at_100_hz_or_half_of_what_the_wire_carries() -> None:
 def test_a_slow_wire_leads_slower() -> None:
     with machine(arm="1-6") as (made, _), Robot.of(made) as robot:
         arm, bus = train(robot, "arm"), robot.buses["arm"]
-        bus.turns.rate = 9600
+        set_rate(bus, 9600)
         # 26 bytes of goals, 8 + 6 that ask, 6 * 8 that answer, 10 bits each, and half of that rate
         angles = dict.fromkeys(range(1, 7), pi)
         assert rate_for(bus, arm, angles) == pytest.approx(0.5 * 9600 / 10 / 88)
-        bus.turns.rate = 4800  # a goal must not be farther ahead than 0.25 s
+        set_rate(bus, 4800)  # a goal must not be farther ahead than 0.25 s
         assert rate_for(bus, arm, angles) == 4.0
-        bus.turns.rate = 2400
+        set_rate(bus, 2400)
         with pytest.raises(RequestError, match="4 Hz is not possible"):
             rate_for(bus, arm, angles)
-        bus.turns.rate = 1_000_000
+        set_rate(bus, 1_000_000)
 
 
 def test_the_smallest_step_is_what_the_goals_themselves_say() -> None:

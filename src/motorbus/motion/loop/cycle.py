@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, Final
 
+from motorbus.bus import blocking
 from motorbus.bus.face import BusFace
 from motorbus.bus.pump import Bus
 from motorbus.bus.volley import volley
@@ -172,7 +173,11 @@ class Part:
         There is nothing to clean up, so an interruption is raised at once.
         """
         self.await_slot(bus, moment)
-        told = volley(bus, (*orders, *self.reads), LOST, together=self.exactly)
+        wanted = (*orders, *self.reads)
+        if isinstance(bus, blocking.Bus):
+            told = bus.exchange(wanted, LOST)
+        else:
+            told = volley(bus, wanted, LOST, together=self.exactly)
         self.ended = self.link.now() - self.origin
         return told
 
