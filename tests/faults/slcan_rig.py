@@ -13,7 +13,7 @@ from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import CanFrame, Data
 from motorbus.families.kst.simulator import KstBus
 from motorbus.link.memory import MemoryLink
-from motorbus.link.slcan import DEFAULT_BAUD, LINE_BITS, SlcanDecoder, encode
+from motorbus.link.slcan import DEFAULT_BAUD, LINE_BITS, SlcanCodec
 from motorbus.link.usb_adapters import DEVICE_LATENCY
 from motorbus.simulation.slcan import SlcanAdapter
 from tests.support.catalogue.kst import KstRig
@@ -65,7 +65,7 @@ class TextLink(MemoryLink):
     """Frames for the bus, text on the line; with a `baud` (bit/s) of the adapter's serial line, text needs its time."""
 
     def __init__(self, simulator: Adapted, *, baud: int | None = None, **options: Any) -> None:
-        self.reader: Any = SlcanDecoder()
+        self.reader: Any = SlcanCodec()
         self.baud = baud
         super().__init__(simulator, pace=baud is not None, **options)
         self.paced = False  # of the frames nobody says when they were on the wire
@@ -77,7 +77,7 @@ class TextLink(MemoryLink):
 
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
-        super().write(encode(data))
+        super().write(SlcanCodec().encode(data))
 
     def read(self, until: float) -> list[Data]:
         while True:

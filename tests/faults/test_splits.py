@@ -16,7 +16,7 @@ from motorbus.families.feetech import FAMILY as FEETECH
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.stepper import FAMILY as STEPPER
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.link.slcan import SlcanDecoder
+from motorbus.link.slcan import SlcanCodec
 from tests.support.rigs.feetech import Rig, ping, read_word
 from tests.support.single_faults import tried_again
 
@@ -28,7 +28,7 @@ REPLIES: dict[str, tuple[Callable[[], Any], bytes]] = {
     "feetech, noise before": (FEETECH.receiver, b"\xff\x00" + WORD),
     "stepper, 6 bytes": (STEPPER.receiver, bytes.fromhex("FFAA000B0301")),
     "stepper, a notice and a reply": (STEPPER.receiver, bytes.fromhex("EEDDFFAA000B0301")),
-    "slcan, a short frame": (SlcanDecoder, b"t5A51AB\r"),
+    "slcan, a short frame": (SlcanCodec, b"t5A51AB\r"),
 }
 
 

@@ -51,6 +51,41 @@ class Picky(SlcanAdapter):
         return frames
 
 
+class NarrowLink:
+    """A link of bytes with `room` for so many bytes, to nothing, or to an adapter whose frames it keeps."""
+
+    latency = 0.0
+    warnings: tuple[str, ...] = ()
+
+    def __init__(self, room: int, adapter: SlcanAdapter | None = None) -> None:
+        self.room = room
+        self.adapter = adapter
+        self.frames: list[CanFrame] = []
+        self.written = b""
+        self.coming = b""
+
+    def wait(self, until: float) -> bool:
+        return True
+
+    def receive(self) -> bytes:
+        data, self.coming = self.coming, b""
+        return data
+
+    def send(self, data: bytes) -> int:
+        count = min(self.room, len(data))
+        self.room -= count
+        self.written += data[:count]
+        if self.adapter is not None:
+            self.frames += self.adapter.feed(data[:count])
+        return count
+
+    def fileno(self) -> None:
+        return None
+
+    def close(self) -> None:
+        pass
+
+
 class Peer:
     """An adapter on a port; `url` is how a host opens it."""
 

@@ -244,7 +244,7 @@ def test_a_full_member() -> None:
     [
         ("can://slcan/dev/no-such-adapter", PortNotFound, "there is no such port"),
         ("can://slcan/socket://127.0.0.1:1", PortNotFound, "cannot be reached"),
-        ("can://slcan/dev/null", PortNotFound, "can://slcan/dev/null: /dev/null is not a serial port"),
+        ("can://slcan/dev/null", PortNotFound, "/dev/null is not a serial port"),
         ("can://socketcand/127.0.0.1:1/can0", PortNotFound, "cannot be reached"),
         ("can://socketcand/127.0.0.1:x/can0", RequestError, "HOST:PORT/CHANNEL"),
         ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),
@@ -277,11 +277,6 @@ def config(port: str) -> CanOptions:
     return read_options(can, port, 0, {})
 
 
-def caused(error: Exception, cause: Exception) -> Exception:
-    error.__cause__ = cause
-    return error
-
-
 @pytest.mark.parametrize(
     ("port", "error", "kind", "words"),
     [
@@ -302,14 +297,7 @@ def caused(error: Exception, cause: Exception) -> Exception:
             LinkError,
             "that comes with the adapter",
         ),
-        (
-            "can://slcan/dev/x",
-            can.CanInterfaceNotImplementedError("no serial"),
-            LinkError,
-            r"motorbus\[can\]",
-        ),
         ("can://kvaser/0", ValueError("channel must be an integer"), RequestError, "refuses this"),
-        ("can://slcan/dev/x", ValueError("Invalid bitrate"), RequestError, "refuses this"),
         ("can://pcan/1", can.CanInitializationError("in use"), LinkError, "cannot be opened: in use"),
     ],
 )
@@ -318,20 +306,6 @@ def test_the_error_for_each_failure(port: str, error: Exception, kind: type[Exce
     assert type(text) is kind
     with pytest.raises(kind, match=words):
         raise text
-
-
-@pytest.mark.parametrize(
-    ("code", "kind"),
-    [
-        (errno.ENOENT, PortNotFound),
-        (errno.EACCES, LinkError),
-        (errno.EBUSY, PortBusy),
-        (errno.EIO, LinkError),
-    ],
-)
-def test_the_serial_port_of_an_adapter(code: int, kind: type[Exception]) -> None:
-    error = caused(can.CanInitializationError("could not open port"), OSError(code, os.strerror(code)))
-    assert type(open_error(config("can://slcan/dev/ttyACM0"), error)) is kind
 
 
 def test_the_device_of_an_adapter() -> None:

@@ -13,30 +13,9 @@ import pytest
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.can import BUS_OFF, check_bus_off
-from motorbus.link.can_channel import MOST_FRAMES, BusChannel, Port, TextChannel, frame_of, open_bus
-from motorbus.link.slcan import SlcanDecoder, encode
-from tests.links.can_peer import PING
-
-
-class Narrow:
-    """A port with room for so many bytes."""
-
-    def __init__(self, room: int) -> None:
-        self.room = room
-        self.written = b""
-        self.coming = b""
-
-    def receive(self, size: int) -> bytes:
-        data, self.coming = self.coming, b""
-        if not data:
-            raise BlockingIOError
-        return data
-
-    def send(self, data: bytes) -> int:
-        count = min(self.room, len(data))
-        self.room -= count
-        self.written += data[:count]
-        return count
+from motorbus.link.can_channel import MOST_FRAMES, BusChannel, TextChannel, frame_of, open_bus
+from motorbus.link.slcan import SlcanCodec
+from tests.links.can_peer import PING, NarrowLink
 
 
 class Bus:
@@ -65,13 +44,11 @@ class Bus:
         raise OSError("dead already")
 
 
-def text_wire(port: Narrow) -> TextChannel:
-    return TextChannel(
-        "adapter", Port(port.receive, port.send, None), SlcanDecoder(), encode, b"?\r", lambda: None
-    )
+def text_channel(link: NarrowLink) -> TextChannel:
+    return TextChannel("adapter", link, SlcanCodec())  # type: ignore[arg-type]
 
 
-def bus_wire(bus: Bus, descriptor: int | None = None) -> BusChannel:
+def bus_channel(bus: Bus, descriptor: int | None = None) -> BusChannel:
     return BusChannel("adapter", bus, can.Message, descriptor)
 
 
@@ -80,53 +57,49 @@ def message(id: int = 5, **more: Any) -> can.Message:
 
 
 def test_a_line_sent_in_part_is_cancelled() -> None:
-    port = Narrow(room=9)
-    wire = text_wire(port)
+    port = NarrowLink(room=9)
+    channel = text_channel(port)
     for _ in range(2):
         with pytest.raises(LinkError, match="takes no more bytes"):
-            wire.write(PING)
+            channel.write(PING)
     port.room = 100
-    wire.write(CanFrame(1, b""))
+    channel.write(CanFrame(1, b""))
     assert port.written == b"t62584002?\rt0010\r"
 
 
 def test_a_line_not_sent_at_all_needs_no_cancel() -> None:
-    port = Narrow(room=0)
-    wire = text_wire(port)
+    port = NarrowLink(room=0)
+    channel = text_channel(port)
     with pytest.raises(LinkError, match="0 of 22"):
-        wire.write(PING)
+        channel.write(PING)
     port.room = 100
-    wire.write(PING)
-    assert port.written == encode(PING)
+    channel.write(PING)
+    assert port.written == SlcanCodec().encode(PING)
 
 
-def test_a_port_without_descriptor_is_looked_at_again_and_again() -> None:
-    port = Narrow(room=100)
-    wire = text_wire(port)
-    assert wire.fileno() is None
-    port.coming = b"\r" + encode(PING)
-    assert wire.read(float("inf")) == [PING]
-    assert wire.read(0) == []
-    wire.close()
-    with pytest.raises(LinkLost, match="it is closed"):
-        wire.read(0)
+def test_frames_of_one_read() -> None:
+    link = NarrowLink(room=100)
+    channel = text_channel(link)
+    link.coming = b"\r" + SlcanCodec().encode(PING) * 2
+    assert channel.read(float("inf")) == [PING, PING]
+    assert channel.read(0) == []
 
 
 def test_all_that_has_come_is_taken_at_once() -> None:
     bus = Bus(*[message(id) for id in range(MOST_FRAMES + 5)])
-    wire = bus_wire(bus)
-    assert len(wire.read(0)) == MOST_FRAMES
-    assert len(wire.read(0)) == 5
+    channel = bus_channel(bus)
+    assert len(channel.read(0)) == MOST_FRAMES
+    assert len(channel.read(0)) == 5
 
 
 def test_a_descriptor_is_waited_at() -> None:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         bus = Bus(message(1))
-        wire = bus_wire(bus, ours.fileno())
+        channel = bus_channel(bus, ours.fileno())
         theirs.send(b"!")
-        assert wire.fileno() == ours.fileno()
-        assert wire.read(float("inf")) == [CanFrame(1, b"")]
+        assert channel.fileno() == ours.fileno()
+        assert channel.read(float("inf")) == [CanFrame(1, b"")]
 
 
 @pytest.mark.parametrize(
@@ -141,7 +114,7 @@ def test_a_descriptor_is_waited_at() -> None:
 )
 def test_no_room(error: Exception) -> None:
     with pytest.raises(LinkError, match="takes no more frames") as caught:
-        bus_wire(Bus(error=error)).write(PING)
+        bus_channel(Bus(error=error)).write(PING)
     assert not isinstance(caught.value, LinkLost)
 
 
@@ -154,27 +127,27 @@ def test_no_room(error: Exception) -> None:
     ],
 )
 def test_an_adapter_that_is_gone(error: Exception) -> None:
-    wire = bus_wire(Bus(error=error))
-    for use in (lambda: wire.write(PING), lambda: wire.read(0)):
+    channel = bus_channel(Bus(error=error))
+    for use in (lambda: channel.write(PING), lambda: channel.read(0)):
         with pytest.raises(LinkLost, match="adapter is gone"):
             use()
 
 
 def test_it_is_closed_quietly_and_once() -> None:
     bus = Bus()
-    wire = bus_wire(bus)
-    wire.close()
-    wire.close()
+    channel = bus_channel(bus)
+    channel.close()
+    channel.close()
     assert bus.ended == 1
     with pytest.raises(LinkLost):
-        wire.read(0)
+        channel.read(0)
 
 
 def test_dropped_messages() -> None:
     assert frame_of(message(is_fd=True)) is None
     assert frame_of(message(is_rx=False)) is None
-    wire = bus_wire(Bus(message(is_fd=True), message(3), message(is_rx=False)))
-    assert (wire.read(0), wire.counts.dropped) == ([CanFrame(3, b"")], 2)
+    channel = bus_channel(Bus(message(is_fd=True), message(3), message(is_rx=False)))
+    assert (channel.read(0), channel.counts.dropped) == ([CanFrame(3, b"")], 2)
 
 
 def test_a_bus_that_fails_to_open_is_shut_down() -> None:

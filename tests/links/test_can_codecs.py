@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
-from motorbus.link import slcan, socketcand
-from motorbus.link.slcan import LONGEST, REPLIES_KEPT, SlcanDecoder
-from motorbus.link.socketcand import SocketcandDecoder
+from motorbus.link.slcan import LONGEST, REPLIES_KEPT, SlcanCodec
+from motorbus.link.socketcand import SocketcandCodec
 from motorbus.simulation.slcan import SlcanAdapter
 from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.links.can_peer import LONG_PING, PING, remote
@@ -39,8 +38,8 @@ def frames(draw: st.DrawFn) -> CanFrame:
     ],
 )
 def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
-    assert slcan.encode(frame) == line
-    assert SlcanDecoder().feed(line) == [frame]
+    assert SlcanCodec().encode(frame) == line
+    assert SlcanCodec().feed(line) == [frame]
 
 
 @pytest.mark.parametrize(
@@ -53,30 +52,30 @@ def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
     ],
 )
 def test_elements_of_socketcand(frame: CanFrame, element: bytes) -> None:
-    assert socketcand.encode(frame) == element
+    assert SocketcandCodec().encode(frame) == element
 
 
 @given(frame=frames(), cut=st.integers(0, 40))
 def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None:
-    adapter, reader = SlcanAdapter(), SlcanDecoder()
+    adapter, reader = SlcanAdapter(), SlcanCodec()
     adapter.feed(b"S6\rO\r")
     text = adapter.deliver(frame, 1.0)
     assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert adapter.feed(slcan.encode(frame)) == [frame]
+    assert adapter.feed(SlcanCodec().encode(frame)) == [frame]
 
 
 @given(frame=frames(), cut=st.integers(0, 60))
 def test_what_a_socketcand_server_writes_is_read(frame: CanFrame, cut: int) -> None:
-    server, reader = SocketcandAdapter(), SocketcandDecoder()
+    server, reader = SocketcandAdapter(), SocketcandCodec()
     server.feed(b"< open can0 >< rawmode >")
     text = server.deliver(frame, 1.0)
     assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert server.feed(socketcand.encode(frame)) == [frame]
+    assert server.feed(SocketcandCodec().encode(frame)) == [frame]
 
 
 @given(data=st.binary(max_size=80))
 def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
-    for reader, good in ((SlcanDecoder(), b"\r" + SOME), (SocketcandDecoder(), b">< frame 625 1.0 40 >")):
+    for reader, good in ((SlcanCodec(), b"\r" + SOME), (SocketcandCodec(), b">< frame 625 1.0 40 >")):
         reader.feed(data)
         assert reader.feed(good)[-1:], "the next good frame is read"
 
@@ -84,7 +83,7 @@ def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
 @given(place=st.integers(0, 20), byte=st.integers(0, 255))
 def test_one_damaged_character_is_no_frame_or_one_of_its_form(place: int, byte: int) -> None:
     """Only a digit that became another digit is not noticed: slcan has no checksum."""
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     line = bytearray(SOME)
     line[place] = byte
     for frame in reader.feed(bytes(line)):
@@ -108,13 +107,13 @@ def test_one_damaged_character_is_no_frame_or_one_of_its_form(place: int, byte: 
     ],
 )
 def test_a_line_that_is_no_frame_is_counted(line: bytes) -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     assert reader.feed(line + b"\r" + SOME) == [PING]
     assert reader.counts.damaged == 1
 
 
 def test_timestamps_are_known_by_two_in_a_row() -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     stamped = SOME[:-1] + b"1F3A\r"
     assert reader.feed(stamped) == []
     assert reader.feed(stamped * 2) == [PING, PING]
@@ -124,7 +123,7 @@ def test_timestamps_are_known_by_two_in_a_row() -> None:
 
 
 def test_a_length_too_short_by_two_is_no_timestamp() -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     reader.feed(SOME)
     assert reader.feed(b"t62564002600000000000\r") == []
     assert reader.counts.damaged == 1
@@ -151,9 +150,9 @@ def harmed(line: bytes) -> Iterator[tuple[bytes, bool]]:
 )
 def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFrame) -> None:
     """A line has no checksum: this is all that can go unnoticed, and the next line but one is read again."""
-    for line, is_digit in harmed(slcan.encode(frame)):
-        reader = SlcanDecoder()
-        frames = reader.feed(line + slcan.encode(PING) * 2)
+    for line, is_digit in harmed(SlcanCodec().encode(frame)):
+        reader = SlcanCodec()
+        frames = reader.feed(line + SlcanCodec().encode(PING) * 2)
         assert frames[-1] == PING
         others = [one for one in frames if one not in (frame, PING)]
         assert is_digit or not others, (line, others)
@@ -161,7 +160,7 @@ def test_harm_to_one_byte_is_noticed_unless_a_digit_becomes_another(frame: CanFr
 
 
 def test_replies_are_no_frames() -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     assert reader.feed(b"\rz\rZ\rV1013\rNSIMU\rF00\rA\r") == []
     assert (reader.counts.damaged, reader.replies) == (0, [True] * 7)
     reader.feed(b"\a\n\r")
@@ -172,33 +171,33 @@ def test_replies_are_no_frames() -> None:
 
 def test_the_number_of_kept_replies_is_limited() -> None:
     """Every frame that is sent brings one."""
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     reader.feed(b"\r\a" + b"z\r" * 100_000)
     assert reader.replies[:3] == [True, False, True]
     assert len(reader.replies) == REPLIES_KEPT
 
 
 def test_a_refusal_in_the_midst_of_a_line_damages_it() -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     assert reader.feed(b"t6258400\a" + SOME) == [PING]
     assert (reader.counts.damaged, reader.counts.refused) == (1, 1)
 
 
 def test_frames_of_can_fd_are_foreign() -> None:
-    reader = SlcanDecoder()
+    reader = SlcanCodec()
     assert reader.feed(b"d1239" + b"00" * 12 + b"\r") == []
     assert (reader.counts.dropped, reader.counts.damaged) == (1, 0)
 
 
-@pytest.mark.parametrize("reader", [SlcanDecoder(), SocketcandDecoder()])
-def test_text_without_end_is_dropped(reader: SlcanDecoder | SocketcandDecoder) -> None:
+@pytest.mark.parametrize("reader", [SlcanCodec(), SocketcandCodec()])
+def test_text_without_end_is_dropped(reader: SlcanCodec | SocketcandCodec) -> None:
     for _ in range(40):
         reader.feed(b"x" * 100)
     assert reader.counts.damaged >= 40 * 100 // (LONGEST + 100)
 
 
 def test_errors_on_the_bus_of_a_server() -> None:
-    reader = SocketcandDecoder()
+    reader = SocketcandCodec()
     assert reader.feed(b"< error 004 1.5 >") == [CanFrame(0x4 | ERROR_FLAG, bytes(8))]
     assert reader.feed(b"< error unknown command >") == []
     assert (reader.counts.refused, reader.counts.damaged) == (1, 0)
@@ -219,13 +218,13 @@ def test_errors_on_the_bus_of_a_server() -> None:
     ],
 )
 def test_an_element_that_is_no_frame_is_counted(element: bytes) -> None:
-    reader = SocketcandDecoder()
+    reader = SocketcandCodec()
     assert reader.feed(element + b"< frame 625 1.0  >") == [CanFrame(0x625, b"")]
     assert reader.counts.damaged == 1
 
 
 def test_other_elements_are_ignored() -> None:
-    reader = SocketcandDecoder()
+    reader = SocketcandCodec()
     assert reader.feed(b"< hi >< ok > < echo > < > < frame 00000625 1.000000 AB CD >") == [
         CanFrame(0x625, b"\xab\xcd", True)
     ]

@@ -11,7 +11,7 @@ import pytest
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound
 from motorbus.link import serial
 from motorbus.link.base import Link
-from motorbus.link.serial import PolledLink, open_serial
+from motorbus.link.serial import PolledLink, open_stream
 from tests.links.rfc2217 import Server
 
 PING = bytes.fromhex("ff ff 01 02 01 fb")
@@ -31,7 +31,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def remote(server: Server) -> Iterator[PolledLink]:
-    link = open_serial(server.url, rate=1_000_000)
+    link = open_stream(server.url, rate=1_000_000)
     assert isinstance(link, PolledLink)
     yield link
     link.close()
@@ -97,16 +97,16 @@ def test_used_after_close_a_remote_link_is_lost(remote: PolledLink) -> None:
 
 def test_a_remote_port_has_one_owner(remote: PolledLink, server: Server) -> None:
     with pytest.raises(PortBusy, match="this very program"):
-        open_serial(server.url, rate=1_000_000)
+        open_stream(server.url, rate=1_000_000)
 
 
 def test_no_server_is_no_port(server: Server) -> None:
     server.close()
     with pytest.raises(PortNotFound, match="cannot be reached"):
-        open_serial(server.url, rate=1_000_000)
+        open_stream(server.url, rate=1_000_000)
 
 
 def test_a_server_without_rfc2217(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial, "CONNECT_TIME", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as raw, pytest.raises(LinkError, match="socket://"):
-        open_serial(f"rfc2217://127.0.0.1:{raw.getsockname()[1]}", rate=1_000_000)
+        open_stream(f"rfc2217://127.0.0.1:{raw.getsockname()[1]}", rate=1_000_000)

@@ -7,36 +7,14 @@ from typing import Any
 import can
 import pytest
 
-from motorbus.core.operation import CanFrame
 from motorbus.errors import LinkError, LinkLost
-from motorbus.link import slcan
-from motorbus.link.can_channel import Port
+from motorbus.link import slcan, usb_adapters
 from motorbus.link.can_options import read_options
-from motorbus.link.slcan import SlcanChannel, port_latency, rate_command
-from motorbus.link.tcp import LOOPBACK_LATENCY, NETWORK_LATENCY
-from motorbus.link.usb_adapters import TERMINAL_LATENCY
+from motorbus.link.slcan import SlcanChannel, rate_command
 from motorbus.simulation.slcan import SlcanAdapter
-from tests.links.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
+from tests.links.can_peer import PING, PONG, Mute, NarrowLink, Picky, on_terminal, open_can, some
 
 pytestmark = pytest.mark.usefixtures("long_timeouts")
-
-
-class Cramped:
-    """A port that has room for so many bytes, and later for all."""
-
-    def __init__(self, adapter: SlcanAdapter, room: int) -> None:
-        self.frames: list[CanFrame] = []
-        self._adapter = adapter
-        self._room = room
-        self.port = Port(self.receive, self.send, None)
-
-    def receive(self, size: int) -> bytes:
-        raise BlockingIOError
-
-    def send(self, data: bytes) -> int:
-        data, self._room = data[: self._room], 1000
-        self.frames += self._adapter.feed(data)
-        return len(data)
 
 
 @pytest.mark.parametrize("strict", [False, True])
@@ -111,7 +89,7 @@ def test_answers_to_a_program_that_was_killed_are_not_ours() -> None:
 def test_a_fork_that_closes_leaves_the_channel_to_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     adapter = SlcanAdapter()
     adapter.feed(b"S6\rO\r")
-    channel = SlcanChannel("it", Cramped(adapter, 1000).port, lambda: None)
+    channel = SlcanChannel("it", NarrowLink(1000, adapter))  # type: ignore[arg-type]
     channel._is_open = True
     monkeypatch.setattr("os.getpid", lambda: 1)
     channel.close()
@@ -123,14 +101,15 @@ def test_a_line_cut_off_by_closing_is_no_frame(sent: int) -> None:
     """C, which closes the channel, is a hexadecimal digit as well."""
     adapter = SlcanAdapter()
     adapter.feed(b"S6\rO\r")
-    cramped = Cramped(adapter, sent)
-    channel = SlcanChannel("it", cramped.port, lambda: None)
+    narrow = NarrowLink(sent, adapter)
+    channel = SlcanChannel("it", narrow)  # type: ignore[arg-type]
     channel._is_open = True
     with pytest.raises(LinkError, match="no more bytes"):
         channel.write(PING)
+    narrow.room = 1000
     channel.close()
     assert not adapter.open
-    assert cramped.frames == []
+    assert narrow.frames == []
 
 
 @pytest.mark.parametrize(("options", "command"), [({}, b"O"), ({"listen_only": "yes"}, b"L")])
@@ -207,28 +186,20 @@ def test_an_adapter_that_is_unplugged() -> None:
 
 
 @pytest.mark.parametrize(
-    ("channel", "latency"),
-    [
-        ("socket://127.0.0.1:4000", LOOPBACK_LATENCY),
-        ("socket://10.0.0.7:4000", NETWORK_LATENCY),
-        ("/dev/pts/0", TERMINAL_LATENCY),
-    ],
+    ("options", "lines"), [({}, 440 / 115_200), ({"tty_baudrate": "1000000"}, 440 / 1_000_000)]
 )
-def test_how_long_an_adapter_holds_a_frame_back(channel: str, latency: float) -> None:
-    assert port_latency(channel, {}) == (latency, ())
-
-
-def test_a_slow_serial_line_takes_its_time() -> None:
-    quick, slow = (
-        port_latency("/dev/ttyACM0@1000000", {})[0],
-        port_latency("/dev/ttyACM0", {"tty_baudrate": 57_600})[0],
-    )
-    assert quick < 0.01 < slow
+def test_a_serial_line_adds_the_time_of_two_lines(
+    options: dict[str, Any], lines: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(usb_adapters, "PSEUDO_TERMINALS", ("no such prefix",))
+    with on_terminal() as peer:
+        link = open_can(peer, **options)
+        assert link.latency == pytest.approx(usb_adapters.DEVICE_LATENCY + lines)
+        link.close()
 
 
 def test_the_command_for_a_rate() -> None:
-    back_end = can.interface._get_class_for_interface("slcan")
     plain = read_options(can, "can://slcan/dev/x", 0, {})
-    assert rate_command(plain, back_end, 20_000) == "S1"
+    assert rate_command(plain, 20_000) == "S1"
     bits = {"f_clock": 8000000, "brp": 1, "tseg1": 7, "tseg2": 2, "sjw": 1, "nof_samples": 1}
-    assert rate_command(read_options(can, "can://slcan/dev/x", 0, bits), back_end, 800_000) == "s0016"
+    assert rate_command(read_options(can, "can://slcan/dev/x", 0, bits), 800_000) == "s0016"

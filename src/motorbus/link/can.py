@@ -17,13 +17,13 @@ from typing import Any, Final
 
 from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
-from motorbus.link import serial, usb_adapters
-from motorbus.link.can_channel import POLL_TIME, BusChannel, Counts, TextChannel, open_bus
-from motorbus.link.can_options import SHARED, CanOptions, read_options
+from motorbus.link import usb_adapters
+from motorbus.link.can_channel import BusChannel, Counts, TextChannel, open_bus
+from motorbus.link.can_options import SHARED, TEXT_OPTIONS, CanOptions, read_options
 from motorbus.link.can_rates import check_rate, ip_command, kernel_rate
 from motorbus.link.errors import busy
 from motorbus.link.lock import PortLock, opening
-from motorbus.link.serial import NO_DEVICE, check_exists, check_unused
+from motorbus.link.serial import NO_DEVICE
 from motorbus.link.slcan import SlcanChannel, open_slcan, rate_command
 from motorbus.link.socketcand import open_socketcand
 
@@ -115,10 +115,12 @@ class CanLink:
         self.name = port
         self._can = python_can(port)
         self._options = found = read_options(self._can, port, rate, options or {})
-        try:
-            self._back_end: Any = self._can.interface._get_class_for_interface(found.interface)
-        except Exception as error:
-            raise open_error(found, error) from error
+        self._back_end: Any = None
+        if found.interface not in TEXT_OPTIONS:
+            try:
+                self._back_end = self._can.interface._get_class_for_interface(found.interface)
+            except Exception as error:
+                raise open_error(found, error) from error
         self.warnings = found.warnings
         self.latency = _LATENCY.get(found.interface, usb_adapters.DEVICE_LATENCY)
         self.rate = self._checked_rate(default_rate)
@@ -159,12 +161,9 @@ class CanLink:
         options = self._options
         if listen_only:
             self._check_can_listen()
+        if options.interface in TEXT_OPTIONS:
+            return self._open_text(rate, listen_only)
         try:
-            if options.interface == "slcan":
-                return self._open_slcan(rate, listen_only)
-            if options.interface == "socketcand":
-                channel, self.latency = open_socketcand(options, self._back_end)
-                return channel
             settings = dict(options.settings)
             if options.sets_rate and "timing" not in settings:
                 settings["bitrate"] = rate
@@ -180,23 +179,22 @@ class CanLink:
         except Exception as error:  # each back end has its own types
             raise open_error(options, error) from error
 
-    def _open_slcan(self, rate: int, listen_only: bool) -> SlcanChannel:
-        device = self._options.device
-        real = os.path.realpath(device)
-        self.timeless = bool(device) and real.startswith(usb_adapters.PSEUDO_TERMINALS)
-        if device and os.name != "nt":
-            check_exists(self.name, device)
-            check_unused(self.name, real)
-        channel, self.latency, warnings = open_slcan(self._options, self._back_end)
-        self.warnings += warnings
+    def _open_text(self, rate: int, listen_only: bool) -> TextChannel:
+        options = self._options
+        if options.interface == "socketcand":
+            channel = open_socketcand(options)
+            self.latency = channel.latency
+            return channel
+        slcan = open_slcan(options, self.lock.borrow())
         try:
-            channel.configure(
-                rate_command(self._options, self._back_end, rate), rate, listen_only=listen_only
-            )
+            slcan.configure(rate_command(options, rate), rate, listen_only=listen_only)
         except BaseException:
-            channel.close()
+            slcan.close()
             raise
-        return channel
+        self.latency = slcan.latency
+        self.warnings += slcan.warnings
+        self.timeless = os.path.realpath(options.device).startswith(usb_adapters.PSEUDO_TERMINALS)
+        return slcan
 
     def _check_can_listen(self) -> None:
         interface = self._options.interface
@@ -252,7 +250,7 @@ class CanLink:
         except LinkLost:
             if channel is self._channel and not self._changing:
                 raise
-            time.sleep(POLL_TIME)
+            time.sleep(0.001)
             return []  # another thread reopens it for another rate
         if frames and self._options.interface in _KERNEL_ERRORS:
             check_bus_off(self.name, frames)
@@ -300,7 +298,7 @@ class CanLink:
 
     def _set_up(self, rate: int, listen_only: bool) -> None:
         if isinstance(self._channel, SlcanChannel):
-            command = rate_command(self._options, self._back_end, rate)
+            command = rate_command(self._options, rate)
             self._channel.configure(command, rate, listen_only=listen_only)
         else:
             self._channel.close()
@@ -333,21 +331,11 @@ def open_error(options: CanOptions, error: Exception) -> MotorbusError:
     code = getattr(source, "errno", None) or getattr(error, "error_code", None)
     if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
         advice = f"install {_DRIVERS.get(interface, 'the driver that comes with the adapter')}"
-        if interface == "slcan":
-            advice = INSTALL
-        elif interface in _EXTRAS:
+        if interface in _EXTRAS:
             advice = f'pip install "python-can[{_EXTRAS[interface]}]"'
         return LinkError(f"{name}: the driver of {interface} is missing: {error}", advice=advice)
     if isinstance(error, (ValueError, TypeError)):
         return RequestError(f"{name}: python-can's {interface} refuses this: {error}")
-    if interface == "slcan" and options.device:
-        failure = OSError(code, f"as a serial port: {error}")
-        return serial.open_error(name, os.path.realpath(options.device), failure)
-    if interface == "slcan":
-        return PortNotFound(
-            f"{name} cannot be reached: {error}",
-            advice="is the bridge switched on, the simulator running, the port number right?",
-        )
     if code in NO_DEVICE:
         return PortNotFound(f"{name}: there is no {interface} channel {options.channel}: {error}")
     if code == errno.EAFNOSUPPORT:

@@ -1,8 +1,8 @@
 """Frames through an open CAN adapter.
 
-The text protocols slcan and socketcand are read from the descriptor like a serial port: many frames in one system call.
-Every other back end of python-can is asked for one frame at a time; where it has no descriptor, `read` waits inside it
-in short slices, so that another thread can close it.
+The text protocols slcan and socketcand go over a serial or TCP link: many frames in one system call. Every other back
+end of python-can is asked for one frame at a time; where it has no descriptor, `read` waits inside it in short slices,
+so that another thread can close it.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ import time
 import warnings
 from collections.abc import Callable
 from threading import Lock
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, Protocol
 
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import LinkError
 from motorbus.link.errors import full, lost
-from motorbus.link.stream import CHUNK
+from motorbus.link.serial import ByteLink
 from motorbus.link.wait import Readiness
 
-POLL_TIME: Final = 0.001  # s between two reads of a port without descriptor
 SLICE: Final = 0.02  # s of one wait inside python-can
 MOST_FRAMES: Final = 256  # taken from python-can by one read
 _FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
@@ -36,111 +35,65 @@ class Counts:
         self.damaged = self.refused = self.dropped = 0
 
 
-class Decoder(Protocol):
-    """Text of an adapter, cut anywhere -> frames. `feed` returns the frames that it completes, and never raises."""
+class Codec(Protocol):
+    """A text protocol. `cancel` is text that makes an unfinished line invalid."""
 
     counts: Counts
+    cancel: bytes
 
-    def feed(self, data: bytes) -> list[CanFrame]: ...
+    def encode(self, frame: CanFrame) -> bytes:
+        """The text that sends this frame."""
 
-
-class Port(NamedTuple):
-    """A port that does not block. `receive` raises BlockingIOError for no data and returns b"" at the end."""
-
-    receive: Callable[[int], bytes]
-    send: Callable[[bytes], int]
-    descriptor: int | None
+    def feed(self, data: bytes) -> list[CanFrame]:
+        """The frames that these bytes of the adapter complete, cut anywhere. Never raises."""
 
 
 class TextChannel:
-    """A text protocol on a port; `shut` closes the port. Methods as those of a link.
+    """A text protocol over a link of bytes. Methods as those of a link.
 
-    `cancel` is text that makes an unfinished line invalid. It is sent after a line that was sent in part, which must
-    not become a frame later.
+    A line that was sent in part must not become a frame later, so the codec's `cancel` is sent after it.
     """
 
-    def __init__(
-        self,
-        name: str,
-        port: Port,
-        decoder: Decoder,
-        encode: Callable[[CanFrame], bytes],
-        cancel: bytes,
-        shut: Callable[[], None],
-    ) -> None:
+    def __init__(self, name: str, link: ByteLink, codec: Codec) -> None:
         self.name = name
-        self.counts = decoder.counts
-        self._port = port
-        self._feed = decoder.feed
-        self._encode = encode
-        self._cancel = cancel
-        self._shut = shut
+        self.counts = codec.counts
+        self.latency = link.latency
+        self.warnings = link.warnings
+        self._link = link
+        self._codec = codec
         self._unfinished = False
         self._access = Lock()
-        self._closed = False
-        self._wait = _pause if port.descriptor is None else Readiness(port.descriptor).wait
 
     def read(self, until: float) -> list[Data]:
         while True:
-            try:
-                if until > time.monotonic():
-                    self._wait(until)
+            frames: list[CanFrame] = []
+            if self._link.wait(until):
                 with self._access:
-                    self._check()
-                    frames = self._read_port()
-            except LinkError:
-                raise
-            except (OSError, ValueError) as error:  # ValueError: another thread has closed it
-                raise lost(self.name, error) from error
+                    frames = self._decode(self._link.receive())
             if frames or time.monotonic() >= until:
                 return list(frames)
 
-    def _read_port(self) -> list[CanFrame]:
-        try:
-            data = self._port.receive(CHUNK)
-        except BlockingIOError:
-            return []
-        if not data:
-            raise lost(self.name, "the other end hung up")
-        return self._feed(data)
+    def _decode(self, data: bytes) -> list[CanFrame]:
+        return self._codec.feed(data) if data else []
 
     def write(self, frame: CanFrame) -> None:
-        self._send(self._encode(frame))
+        self._send(self._codec.encode(frame))
 
     def _send(self, text: bytes) -> None:
-        self._check()
-        if self._unfinished and self._send_port(self._cancel) == len(self._cancel):
+        cancel = self._codec.cancel
+        if self._unfinished and self._link.send(cancel) == len(cancel):
             self._unfinished = False
-        written = 0 if self._unfinished else self._send_port(text)
+        written = 0 if self._unfinished else self._link.send(text)
         if written != len(text):
             self._unfinished = self._unfinished or written > 0
             raise full(self.name, written, len(text))
 
-    def _send_port(self, text: bytes) -> int:
-        try:
-            return self._port.send(text)
-        except BlockingIOError:
-            return 0
-        except OSError as error:
-            raise lost(self.name, error) from error
-
-    def _check(self) -> None:
-        if self._closed:
-            raise lost(self.name, "it is closed")
-
     def fileno(self) -> int | None:
-        return None if self._closed else self._port.descriptor
+        return self._link.fileno()
 
     def close(self) -> None:
         with self._access:
-            if not self._closed:
-                self._closed = True
-                self._shut()
-
-
-def _pause(until: float) -> bool:
-    time.sleep(max(0.0, min(POLL_TIME, until - time.monotonic())))
-    return True
+            self._link.close()
 
 
 class BusChannel:

@@ -7,6 +7,7 @@ error, and an unsuitable setting of a configuration is dropped with a warning.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import inspect
 import os
@@ -24,6 +25,8 @@ SERIAL_PORTS: Final = ("slcan", "serial", "robotell", "seeedstudio")
 TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
 """The bit timing of python-can: controller clock (Hz), prescaler, two segments, jump width, samples."""
 EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
+TEXT_OPTIONS: Final = {"slcan": {"tty_baudrate", "timing"}, "socketcand": {"host", "port"}}
+"""Options of the interfaces that go over our own links."""
 _LINK_OPTIONS: Final = ("bitrate", "config_context", "listen_only")
 _RESERVED: Final = {"self", "channel", "args", "kwargs", "timing", "bitrate", "timeout", "listen_only"}
 """Constructor parameters that are no options: the link sets them."""
@@ -111,13 +114,14 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
     merged = _load(can, port, given, None if context is None else str(context))
     interface, channel = merged.pop("interface"), merged.pop("channel")
     merged = _with_switches(merged)
-    try:
-        back_end = can.interface._get_class_for_interface(interface)
-    except can.CanInterfaceNotImplementedError:  # its driver is missing: opening it says so
-        back_end = None
-    taken = parameters(back_end) if back_end else set()
-    names = taken - _RESERVED if back_end else None
-    has_timing = back_end is None or "timing" in taken
+    taken = TEXT_OPTIONS.get(interface)
+    if taken is None:
+        with contextlib.suppress(
+            can.CanInterfaceNotImplementedError
+        ):  # its driver is missing: opening it says so
+            taken = parameters(can.interface._get_class_for_interface(interface))
+    names = None if taken is None else taken - _RESERVED
+    has_timing = taken is None or "timing" in taken
     if names is not None:
         _check_names(port, interface, user, {*names, *_LINK_OPTIONS, *(TIMING if has_timing else ())})
     bitrate = merged.get("bitrate")
@@ -133,7 +137,7 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
         rate=rate or bitrate or 0,
         listen_only=bool(listen_only),
         settings={name: value for name, value in merged.items() if names is None or name in names},
-        sets_rate=back_end is None or "bitrate" in taken,
+        sets_rate=taken is None or "bitrate" in taken or interface == "slcan",
         warnings=tuple(
             f"python-can's configuration says {name}={value}, which {interface} does not have: ignored"
             for name, value in merged.items()

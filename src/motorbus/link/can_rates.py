@@ -15,11 +15,19 @@ from motorbus.errors import LinkError
 from motorbus.link.can_options import TIMING, CanOptions
 
 IP_TIME: Final = 2.0  # s; time-out for the program `ip`
-AMBIGUOUS: Final = 750_000
-"""bit/s for which python-can's slcan sends S7, which means 800 kbit/s in the LAWICEL manual."""
+SLCAN_COMMANDS: Final = {
+    10_000: "S0",
+    20_000: "S1",
+    50_000: "S2",
+    100_000: "S3",
+    125_000: "S4",
+    250_000: "S5",
+    500_000: "S6",
+    1_000_000: "S8",
+}
+"""bit/s and commands of an slcan adapter. S7 is 800 kbit/s in the LAWICEL manual and 750 kbit/s in python-can."""
 LAWICEL_CLOCK: Final = 8_000_000  # Hz of BTR0 and BTR1 of an slcan adapter (SJA1000 at 16 MHz)
 _TABLES: Final = {
-    "slcan": "_BITRATES",
     "pcan": "PCAN_BITRATES",
     "kvaser": "BITRATE_OBJS",
     "ixxat": "CHANNEL_BITRATES",
@@ -40,12 +48,13 @@ _TIMING_800K: Final = "f_clock=8000000,brp=1,tseg1=7,tseg2=2,sjw=1,nof_samples=1
 
 def known_rates(interface: str, back_end: Any) -> frozenset[int]:
     """The bit rates in the table of this back end; empty when it takes any number, or has no table."""
+    if interface == "slcan":
+        return frozenset(SLCAN_COMMANDS)
     name = _TABLES.get(interface)
     if name is None or back_end is None:
         return frozenset()
     table: Any = getattr(back_end, name, None) or getattr(sys.modules[back_end.__module__], name, ())
-    rates = frozenset(table[0] if interface == "ixxat" and table else table)
-    return rates - {AMBIGUOUS} if interface == "slcan" else rates
+    return frozenset(table[0] if interface == "ixxat" and table else table)
 
 
 def check_rate(options: CanOptions, back_end: Any, rate: int) -> None:
@@ -74,7 +83,7 @@ def check_rate(options: CanOptions, back_end: Any, rate: int) -> None:
     reason = _REASONS.get(interface, "")
     advice = f"{_TIMING_ADVICE} ({', '.join(TIMING)}), or change the rate of the bus"
     if interface == "slcan":
-        reason = reason if rate in (AMBIGUOUS, 800_000) else ""
+        reason = reason if rate in (750_000, 800_000) else ""
         advice = f"{_TIMING_ADVICE}: {_TIMING_800K} is 800 kbit/s"
     raise LinkError(
         f"{options.name}: {interface} has no bit rate of {rate} bit/s{reason}",

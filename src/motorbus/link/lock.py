@@ -141,6 +141,10 @@ class PortLock:
         """Whether this object holds the lock."""
         return self._descriptor is not None
 
+    def covers(self, path: Path) -> bool:
+        """Whether a link may open the port of this lock file under this lock."""
+        return self.held and path == self.path
+
     def borrow(self) -> PortLock:
         """A lock for a link that opens the port under this lock; its release does nothing."""
         return _BorrowedLock(self.port)
@@ -160,12 +164,15 @@ class _BorrowedLock(PortLock):
     def acquire(self) -> Self:
         return self
 
+    def covers(self, path: Path) -> bool:
+        return path == self.path
+
 
 @contextlib.contextmanager
 def opening(port: str, held: PortLock | None = None) -> Iterator[PortLock]:
     """Lock this port, or borrow `held` if that is its lock; release it when the block raises. Raises PortBusy."""
     lock = PortLock(port)
-    lock = held.borrow() if held is not None and held.held and held.path == lock.path else lock.acquire()
+    lock = held.borrow() if held is not None and held.covers(lock.path) else lock.acquire()
     try:
         yield lock
     except BaseException:

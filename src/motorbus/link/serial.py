@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from motorbus.core.operation import Data
 from motorbus.errors import LinkError, MotorbusError, PortNotFound, RequestError
@@ -26,7 +26,7 @@ from motorbus.link.errors import busy, full, lost, no_permission, not_a_port, no
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.port_users import find_user
 from motorbus.link.stream import CHUNK, StreamLink
-from motorbus.link.tcp import CONNECT_TIME, send_at_once, split_address
+from motorbus.link.tcp import CONNECT_TIME, TcpLink, send_at_once, split_address
 from motorbus.link.usb_adapters import PortInfo
 
 if TYPE_CHECKING:
@@ -84,22 +84,27 @@ class SerialLink(StreamLink):
         self._serial: BaseSerial | None = None
         device = os.path.realpath(port)
         self.paced = not device.startswith(usb_adapters.PSEUDO_TERMINALS)
-        check_exists(port, port)
+        if not os.path.exists(device):
+            raise not_found(port, ports())
+        if not _could_be_a_port(device):
+            raise not_a_port(port, ports())
         with opening(port, lock) as self.lock:
             self._open(device)
         self.latency, self.warnings = usb_adapters.device_latency(device, sysfs)
 
     def _open(self, device: str) -> None:
-        check_unused(self.name, device)
+        user = find_user(device)
+        if user is not None:
+            raise busy(self.name, user)
         self._serial = _open_serial(self.name, device, self.rate)
-        descriptor = self._serial.fileno()
-        os.set_blocking(descriptor, False)
-        self._attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
-        if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
-            _set_exclusive(descriptor, True)
         try:
+            descriptor = self._serial.fileno()
+            os.set_blocking(descriptor, False)
+            self._attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
+            if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
+                _set_exclusive(descriptor, True)
             _check_rate(self.name, descriptor, self.rate)
-        except LinkError:
+        except BaseException:
             self.close()
             raise
 
@@ -153,23 +158,38 @@ class PolledLink:
     def now(self) -> float:
         return time.monotonic()
 
-    def write(self, data: Data) -> None:
-        assert isinstance(data, bytes)
+    def send(self, data: bytes) -> int:
+        """See `StreamLink.send`."""
         with self._using():
             try:
                 self._serial.write(data, timeout=0)
             except (BlockingIOError, TimeoutError):
-                raise full(self.name, 0, len(data)) from None
+                return 0
+        return len(data)
+
+    def write(self, data: Data) -> None:
+        assert isinstance(data, bytes)
+        written = self.send(data)
+        if written != len(data):
+            raise full(self.name, written, len(data))
+
+    def wait(self, until: float) -> bool:
+        """See `StreamLink.wait`. Returns within a millisecond, whether data has arrived or not."""
+        time.sleep(max(0.0, min(POLL_TIME, until - time.monotonic())))
+        return True
+
+    def receive(self) -> bytes:
+        """See `StreamLink.receive`."""
+        buffer = bytearray(CHUNK)
+        with self._using():
+            return bytes(buffer[: self._serial.readinto(buffer, timeout=0)])
 
     def read(self, until: float) -> list[Data]:
-        buffer = bytearray(CHUNK)
-        while True:
-            with self._using():
-                count = self._serial.readinto(buffer, timeout=0)
-            pause = until - time.monotonic()
-            if count or pause <= 0:
-                return [bytes(buffer[:count])] if count else []
-            time.sleep(min(POLL_TIME, pause))
+        while not (data := self.receive()):
+            if time.monotonic() >= until:
+                return []
+            self.wait(until)
+        return [data]
 
     @contextlib.contextmanager
     def _using(self) -> Iterator[None]:
@@ -201,13 +221,21 @@ class PolledLink:
         self.lock.release()
 
 
-def open_serial(
+ByteLink: TypeAlias = SerialLink | PolledLink | TcpLink
+
+
+def open_stream(
     port: str, *, rate: int, lock: PortLock | None = None, connect_time: float | None = None
-) -> SerialLink | PolledLink:
-    """Open a device, a COM port or an rfc2217:// URL. `connect_time` is a time-out in s. Errors as for `SerialLink`."""
+) -> ByteLink:
+    """Open a device, a COM port, or a socket:// or rfc2217:// URL. `connect_time` is a time-out in s.
+
+    Errors as for the classes.
+    """
+    limit = CONNECT_TIME if connect_time is None else connect_time
+    if port.lower().startswith("socket://"):
+        return TcpLink(port, rate=rate, lock=lock, connect_time=limit)
     if "://" in port or os.name == "nt":
-        limit = CONNECT_TIME if connect_time is None else max(connect_time, NEGOTIATION_TIME)
-        return PolledLink(port, rate=rate, lock=lock, connect_time=limit)
+        return PolledLink(port, rate=rate, lock=lock, connect_time=max(limit, NEGOTIATION_TIME))
     return SerialLink(port, rate=rate, lock=lock)
 
 
@@ -216,21 +244,11 @@ def has_fine_clock() -> bool:
     return time.get_clock_info("monotonic").resolution <= CLOCK_RESOLUTION
 
 
-def check_exists(port: str, device: str) -> None:
-    """Raise PortNotFound when the device of this port does not exist, or is not a serial port: a file, /dev/null."""
-    if not os.path.exists(device):
-        raise not_found(port, ports())
+def _could_be_a_port(device: str) -> bool:
+    """Whether it is a character device other than /dev/null and the like."""
     status = os.stat(device)
     is_memory = sys.platform == "linux" and os.major(status.st_rdev) == MEMORY_DEVICES
-    if is_memory or not stat.S_ISCHR(status.st_mode):
-        raise not_a_port(port, ports(), "" if device == port else device)
-
-
-def check_unused(port: str, device: str) -> None:
-    """Raise PortBusy when another program has this device open."""
-    user = find_user(device)
-    if user is not None:
-        raise busy(port, user)
+    return stat.S_ISCHR(status.st_mode) and not is_memory
 
 
 def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNECT_TIME) -> BaseSerial:
@@ -241,7 +259,7 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
         serial.open()
     except OSError as error:
         raise (
-            _remote_error(port, connect_time, error) if "://" in port else open_error(port, target, error)
+            _remote_error(port, connect_time, error) if "://" in port else _open_error(port, target, error)
         ) from error
     except serialx.UnsupportedSetting as error:
         raise unsupported_rate(port, rate, error) from error
@@ -250,8 +268,7 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
     return serial
 
 
-def open_error(port: str, device: str, error: OSError) -> LinkError:
-    """The error for a device that the system did not open."""
+def _open_error(port: str, device: str, error: OSError) -> LinkError:
     if error.errno in NO_DEVICE:
         return not_found(port, ports())
     if error.errno == errno.EBUSY or (os.name == "nt" and isinstance(error, PermissionError)):
@@ -280,7 +297,7 @@ def _set_exclusive(descriptor: int, exclusive: bool) -> None:
     import fcntl
     import termios
 
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, ValueError):
         fcntl.ioctl(descriptor, termios.TIOCEXCL if exclusive else termios.TIOCNXCL)
 
 

@@ -45,30 +45,44 @@ class StreamLink:
     def now(self) -> float:
         return monotonic()
 
-    def write(self, data: Data) -> None:
-        assert isinstance(data, bytes)
+    def send(self, data: bytes) -> int:
+        """Send what fits into the buffer; the number of bytes. Raises LinkLost."""
         try:
-            written = self._send(data)
+            return self._send(data)
         except BlockingIOError:
-            written = 0
+            return 0
         except OSError as error:
             raise lost(self.name, error) from error
+
+    def write(self, data: Data) -> None:
+        assert isinstance(data, bytes)
+        written = self.send(data)
         if written != len(data):
             raise full(self.name, written, len(data))
         self._idle_at = max(self._idle_at, monotonic()) + 10 * written / self.rate
 
-    def read(self, until: float) -> list[Data]:
+    def wait(self, until: float) -> bool:
+        """Wait for data or the end of the stream until this moment (s); False when none came. Raises LinkLost."""
         try:
-            if not self._wait(until):
-                return []
+            return self._wait(until)
+        except (OSError, ValueError) as error:  # another thread has closed it
+            raise lost(self.name, error) from error
+
+    def receive(self) -> bytes:
+        """The bytes that have arrived, without waiting. Raises LinkLost."""
+        try:
             data = self._receive(CHUNK)
         except BlockingIOError:
-            return []
-        except (OSError, ValueError) as error:  # ValueError: another thread has closed it
+            return b""
+        except OSError as error:
             raise lost(self.name, error) from error
         if not data:
             raise lost(self.name, "the other end hung up")
-        return [data]
+        return data
+
+    def read(self, until: float) -> list[Data]:
+        data = self.receive() if self.wait(until) else b""
+        return [data] if data else []
 
     def fileno(self) -> int | None:
         return self._descriptor

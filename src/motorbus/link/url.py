@@ -53,16 +53,9 @@ def open_link(
     rate = rate or default_rate
     if rate <= 0:
         raise RequestError(f"{rate} is not a rate in bit/s", expected="a positive whole number")
-    link: Link
-    if scheme == "socket":
-        from motorbus.link.tcp import CONNECT_TIME, TcpLink
+    from motorbus.link.serial import open_stream
 
-        limit = CONNECT_TIME if connect_time is None else connect_time
-        link = TcpLink(port, rate=rate, lock=lock, connect_time=limit)
-    else:
-        from motorbus.link.serial import open_serial
-
-        link = open_serial(port, rate=rate, lock=lock, connect_time=connect_time)
+    link = open_stream(port, rate=rate, lock=lock, connect_time=connect_time)
     latency: Any = (options or {}).get("latency", link.latency)
     link.latency = latency
     return link
