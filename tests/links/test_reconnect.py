@@ -21,7 +21,6 @@ from motorbus.link.reconnect import (
     LAST_RETRY,
     Identity,
     Reconnecting,
-    check_reachable,
     find_adapter,
     identify,
     reconnecting,
@@ -314,19 +313,6 @@ def test_a_silent_server_costs_little_time() -> None:
     ):
         link.renew(1)
     link.close()
-
-
-def test_an_unreachable_server_is_found_without_a_library() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        for url in (f"rfc2217://127.0.0.1:{port}", f"can://socketcand/127.0.0.1:{port}/can0"):
-            check_reachable(url)
-        check_reachable(f"can://slcan/socket://127.0.0.1:{port}")
-    for url in (f"rfc2217://127.0.0.1:{port}", f"can://slcan/socket://127.0.0.1:{port}"):
-        with pytest.raises(OSError, match="cannot be reached"):
-            check_reachable(url)
-    check_reachable("can://socketcan/can0")
-    check_reachable(f"socket://127.0.0.1:{port}")
 
 
 # -- who has the port ----------------------------------------------------------------------------------------------

@@ -91,6 +91,7 @@ class CanLink:
                     back end's constructor takes
     `shared`        takes part beside a host of this machine, as simulated devices do: SocketCAN is not locked
     `lock`          a lock that the caller already holds
+    `connect_time`  time-out in s for a host of the network
 
     `lock_name` names the adapter for its lock and its emergency stop; "" for a shared channel. `no_wire`: no device
     can be real. Raises RequestError for an unknown interface or option, PortNotFound, PortBusy, or LinkError: for a bit
@@ -111,8 +112,10 @@ class CanLink:
         options: Mapping[str, object] | None = None,
         shared: bool = False,
         lock: PortLock | None = None,
+        connect_time: float | None = None,
     ) -> None:
         self.name = port
+        self._connect_time = connect_time
         self._can = python_can(port)
         self._options = found = read_options(self._can, port, rate, options or {})
         self._back_end: Any = None
@@ -182,10 +185,10 @@ class CanLink:
     def _open_text(self, rate: int, listen_only: bool) -> TextChannel:
         options = self._options
         if options.interface == "socketcand":
-            channel = open_socketcand(options)
+            channel = open_socketcand(options, self._connect_time)
             self.latency = channel.latency
             return channel
-        slcan = open_slcan(options, self.lock.borrow())
+        slcan = open_slcan(options, self.lock.borrow(), self._connect_time)
         try:
             slcan.configure(rate_command(options, rate), rate, listen_only=listen_only)
         except BaseException:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -24,11 +23,9 @@ from motorbus.core.operation import Data
 from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
 from motorbus.link import usb_adapters
 from motorbus.link.base import Link
-from motorbus.link.can_options import SOCKETCAND_PORT
 from motorbus.link.errors import lost
 from motorbus.link.lock import PortLock
 from motorbus.link.serial import list_ports
-from motorbus.link.tcp import split_address
 from motorbus.link.url import open_link
 
 FIRST_RETRY: Final = 0.05  # s after the first failure; then twice as long each time
@@ -300,17 +297,11 @@ def reconnecting(
     name, first_rate = link.name, link.rate
     device: str = opened.device if kind == "frames" else "" if "://" in name else name
     if not device:
-
-        def server(new_rate: int, listen_only: bool, lock: PortLock) -> Link:
-            check_reachable(name)
-            return open_again(name, new_rate, listen_only, lock)
-
-        return Reconnecting(link, server)
+        return Reconnecting(link, partial(open_again, name))
     real = os.path.realpath(device)
     if real.startswith(usb_adapters.PSEUDO_TERMINALS):
-        if os.path.abspath(device) == real:
-            return link
-        return Reconnecting(link, _Terminal(name, device, open_again))
+        is_number = os.path.abspath(device) == real
+        return link if is_number else Reconnecting(link, _Terminal(device, partial(open_again, name)))
     known = identify(real, lister, sysfs)
     port_at: Callable[[str], str] = opened.port_at if kind == "frames" else str
 
@@ -327,14 +318,11 @@ def reconnecting(
 
 
 class _Terminal:
-    """A pseudo-terminal behind a symbolic link, which must have been made again."""
+    """Opens a pseudo-terminal behind a symbolic link again, once the link has been made again."""
 
-    def __init__(
-        self, port: str, device: str, open_again: Callable[[str, int, bool, PortLock], Link]
-    ) -> None:
-        self._port = port
+    def __init__(self, device: str, open_again: Reopen) -> None:
         self._device = device
-        self._open = partial(open_again, port)
+        self._open = open_again
         self._links = _symbolic_links(device)
 
     def __call__(self, rate: int, listen_only: bool, lock: PortLock) -> Link:
@@ -342,7 +330,7 @@ class _Terminal:
         if not os.path.exists(real):
             raise PortNotFound(f"{self._device} leads nowhere")
         if not real.startswith(usb_adapters.PSEUDO_TERMINALS):
-            raise another_adapter(self._port, f"a pseudo-terminal, behind {self._device}", real)
+            raise another_adapter(self._device, f"a pseudo-terminal, behind {self._device}", real)
         links = _symbolic_links(self._device)
         if links == self._links:  # left over from a killed simulator, whose number the next terminal gets
             raise PortNotFound(f"{self._device} has not been made again")
@@ -359,20 +347,3 @@ def _symbolic_links(path: str) -> list[tuple[int, int]]:
         found.append((status.st_ino, status.st_ctime_ns))
         path = os.path.join(os.path.dirname(path), os.readlink(path))
     return found
-
-
-def check_reachable(port: str) -> None:
-    """Raise PortNotFound soon where a server does not answer and opening its port would wait for long.
-
-    A raw socket is not checked: opening it is as fast.
-    """
-    address = port.removeprefix("can://slcan/")
-    if port.startswith("can://socketcand/"):
-        host, colon, number = port.removeprefix("can://socketcand/").partition("/")[0].partition(":")
-        address = f"socket://{host}:{number if colon else SOCKETCAND_PORT}"
-    elif address == port and not port.startswith("rfc2217://"):
-        return
-    try:
-        socket.create_connection(split_address(address), timeout=CONNECT_TIME).close()
-    except OSError as error:
-        raise PortNotFound(f"{port} cannot be reached: {error}") from error

@@ -235,11 +235,11 @@ class SlcanChannel(TextChannel):
             self._link.close()
 
 
-def open_slcan(options: CanOptions, lock: PortLock) -> SlcanChannel:
+def open_slcan(options: CanOptions, lock: PortLock, connect_time: float | None) -> SlcanChannel:
     """Open the port of the adapter, with the channel still closed. Errors as for `open_stream`."""
     port, _, baud = str(options.channel).partition("@")
     rate = int(baud or options.settings.get("tty_baudrate", DEFAULT_BAUD))
-    link = open_stream(port, rate=rate, lock=lock)
+    link = open_stream(port, rate=rate, lock=lock, connect_time=connect_time)
     first_reply = FIRST_REPLY + link.latency
     if "://" in port and link.latency > LOOPBACK_LATENCY:
         first_reply = FIRST_REPLY_NETWORK

@@ -15,7 +15,7 @@ from motorbus.errors import LinkError, RequestError
 from motorbus.link.can_channel import Counts, TextChannel
 from motorbus.link.can_options import CanOptions
 from motorbus.link.lock import PortLock
-from motorbus.link.tcp import TcpLink
+from motorbus.link.tcp import CONNECT_TIME, TcpLink
 
 GREETING: Final = b"< hi >"
 ACCEPTED: Final = b"< ok >"
@@ -82,7 +82,7 @@ def _frame(name: bytes, words: list[bytes]) -> CanFrame:
     return CanFrame(number, bytes.fromhex(digits.decode()), extended)
 
 
-def open_socketcand(options: CanOptions) -> TextChannel:
+def open_socketcand(options: CanOptions, connect_time: float | None) -> TextChannel:
     """Connect to the server and open the channel in raw mode. Raises RequestError, PortNotFound or LinkError."""
     host, port = options.settings.get("host"), options.settings.get("port")
     if not host or not port or options.channel is None:
@@ -90,7 +90,8 @@ def open_socketcand(options: CanOptions) -> TextChannel:
             f"{options.name}: the server is missing", expected="can://socketcand/HOST:PORT/CHANNEL"
         )
     url = f"socket://{host}:{port}"
-    link = TcpLink(url, rate=RATE, lock=PortLock(url).borrow())  # the channel is locked, not the server
+    unlocked = PortLock(url).borrow()  # the lock is that of the channel; a server may have several
+    link = TcpLink(url, rate=RATE, lock=unlocked, connect_time=connect_time or CONNECT_TIME)
     try:
         greeting = _receive(link)
         if greeting != GREETING:

@@ -49,7 +49,14 @@ def open_link(
     if scheme == "can":
         from motorbus.link.can import CanLink
 
-        return CanLink(port, rate=rate, default_rate=default_rate, options=options or {}, lock=lock)
+        return CanLink(
+            port,
+            rate=rate,
+            default_rate=default_rate,
+            options=options,
+            lock=lock,
+            connect_time=connect_time,
+        )
     rate = rate or default_rate
     if rate <= 0:
         raise RequestError(f"{rate} is not a rate in bit/s", expected="a positive whole number")
