@@ -229,9 +229,9 @@ class SlcanChannel(TextChannel):
         """Close the channel, unless this is a forked child, and the port."""
         with self._access:
             if self._is_open and self._pid == os.getpid():
-                self._is_open, self._rate = False, ""
                 with contextlib.suppress(LinkError):
                     self._link.send((self._slcan.cancel if self._unfinished else b"") + b"C\r")
+            self._is_open, self._rate = False, ""
             self._link.close()
 
 
