@@ -13,21 +13,21 @@ import stat
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, TypeAlias
 
-from motorbus.core.operation import Data
-from motorbus.errors import LinkError, MotorbusError, PortNotFound, RequestError
+from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
-from motorbus.link.errors import busy, full, lost, no_permission, not_a_port, not_found, unsupported_rate
+from motorbus.link.errors import busy, lost, no_permission, not_a_port, not_found, unsupported_rate
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.port_users import find_user
 from motorbus.link.stream import CHUNK, StreamLink
 from motorbus.link.tcp import CONNECT_TIME, TcpLink, send_at_once, split_address
 from motorbus.link.usb_adapters import PortInfo
+from motorbus.link.wait import Readiness
 
 if TYPE_CHECKING:
     from serialx import BaseSerial, SerialPortInfo
@@ -100,7 +100,12 @@ class SerialLink(StreamLink):
         try:
             descriptor = self._serial.fileno()
             os.set_blocking(descriptor, False)
-            self._attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
+            self._attach(
+                descriptor,
+                partial(os.read, descriptor),
+                partial(os.write, descriptor),
+                Readiness(descriptor).wait,
+            )
             if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
                 _set_exclusive(descriptor, True)
             _check_rate(self.name, descriptor, self.rate)
@@ -114,32 +119,30 @@ class SerialLink(StreamLink):
             raise lost(self.name, "it is closed")
         _set_rate(self.name, self._serial, rate)
         self.rate = rate
-        _check_rate(self.name, self._descriptor, rate)
+        _check_rate(self.name, self._serial.fileno(), rate)
 
     def close(self) -> None:
         serial, self._serial = self._serial, None
         if serial is not None:
             if self.paced:
-                _set_exclusive(self._descriptor, False)
+                _set_exclusive(serial.fileno(), False)
             self._detach()
             with contextlib.suppress(OSError):
                 serial.close()
         self.lock.release()
 
 
-class PolledLink:
-    """A port without a descriptor: a COM port of Windows, or an RFC 2217 server. `read` polls it every ms.
+class PolledLink(StreamLink):
+    """A port without a descriptor, polled every ms: a COM port of Windows, or an RFC 2217 server.
 
     `connect_time` is a time-out in s for a server. Other arguments and errors as for `SerialLink`.
     """
 
-    virtual = False
-    simulated = False
-    warnings: tuple[str, ...] = ()
-
     def __init__(
         self, port: str, *, rate: int, lock: PortLock | None = None, connect_time: float = CONNECT_TIME
     ) -> None:
+        import serialx
+
         remote = "://" in port
         if remote:
             split_address(port)
@@ -147,76 +150,60 @@ class PolledLink:
         self.rate = rate
         self.paced = not remote and has_fine_clock()  # what is behind a server is unknown
         self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
+        self._failure = serialx.SerialException
         self._access = Lock()
-        self._closed = False
+        self._arrived = b""
         with opening(port, lock) as self.lock:
             self._serial = _open_serial(port, port, rate, connect_time)
         connection = getattr(self._serial, "_socket", None)
         if connection is not None:
             send_at_once(connection)
+        self._attach(None, self._take, self._put, self._poll)
 
-    def now(self) -> float:
-        return time.monotonic()
+    def _poll(self, until: float) -> bool:
+        while not self._arrived:
+            self._fill()
+            pause = until - time.monotonic()
+            if self._arrived or pause <= 0.0:
+                break
+            time.sleep(min(POLL_TIME, pause))
+        return bool(self._arrived)
 
-    def send(self, data: bytes) -> int:
-        """See `StreamLink.send`."""
-        with self._using():
+    def _fill(self) -> None:
+        buffer = bytearray(CHUNK)
+        with self._access:
+            try:
+                self._arrived += buffer[: self._serial.readinto(buffer, timeout=0)]
+            except self._failure as error:
+                raise OSError(str(error)) from error
+
+    def _take(self, size: int) -> bytes:
+        if not self._arrived:
+            self._fill()
+        with self._access:
+            data, self._arrived = self._arrived, b""
+        if not data:
+            raise BlockingIOError
+        return data
+
+    def _put(self, data: bytes) -> int:
+        with self._access:
             try:
                 self._serial.write(data, timeout=0)
-            except (BlockingIOError, TimeoutError):
+            except TimeoutError:
                 return 0
+            except self._failure as error:
+                raise OSError(str(error)) from error
         return len(data)
 
-    def write(self, data: Data) -> None:
-        assert isinstance(data, bytes)
-        written = self.send(data)
-        if written != len(data):
-            raise full(self.name, written, len(data))
-
-    def wait(self, until: float) -> bool:
-        """See `StreamLink.wait`. Returns within a millisecond, whether data has arrived or not."""
-        time.sleep(max(0.0, min(POLL_TIME, until - time.monotonic())))
-        return True
-
-    def receive(self) -> bytes:
-        """See `StreamLink.receive`."""
-        buffer = bytearray(CHUNK)
-        with self._using():
-            return bytes(buffer[: self._serial.readinto(buffer, timeout=0)])
-
-    def read(self, until: float) -> list[Data]:
-        while not (data := self.receive()):
-            if time.monotonic() >= until:
-                return []
-            self.wait(until)
-        return [data]
-
-    @contextlib.contextmanager
-    def _using(self) -> Iterator[None]:
-        """Access to the port for one thread. Raises LinkLost for any failure of it."""
-        import serialx
-
-        with self._access:
-            if self._closed:
-                raise lost(self.name, "it is closed")
-            try:
-                yield
-            except MotorbusError:
-                raise
-            except (OSError, serialx.SerialException) as error:
-                raise lost(self.name, error) from error
-
     def tune(self, rate: int, listen_only: bool = False) -> None:
-        with self._using():
+        with self._access:
             _set_rate(self.name, self._serial, rate)
-            self.rate = rate
-
-    def fileno(self) -> int | None:
-        return None
+        self.rate = rate
 
     def close(self) -> None:
         with self._access, contextlib.suppress(OSError):
-            self._closed = True
+            self._detach()
             self._serial.close()
         self.lock.release()
 

@@ -1,4 +1,4 @@
-"""What serial ports and TCP connections share: bytes through a descriptor that does not block."""
+"""What serial ports and TCP connections share: bytes through a port that does not block."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from typing import Any
 from motorbus.core.operation import Data
 from motorbus.link.errors import full, lost
 from motorbus.link.lock import PortLock
-from motorbus.link.wait import Readiness
 
 CHUNK = 4096
 
 
 class StreamLink:
-    """A link of bytes over a descriptor. `lock` is the lock of the port, released at `close`."""
+    """A link of bytes. `lock` is the lock of the port, released at `close`."""
 
     name: str
     rate: int
@@ -26,20 +25,26 @@ class StreamLink:
     virtual = False
     simulated = False
     warnings: tuple[str, ...] = ()
-    _descriptor = -1
+    _descriptor: int | None = None
     _idle_at = 0.0
     """Moment (s) at which the last byte has left, at this rate."""
 
-    def _attach(self, descriptor: int, receive: Callable[[int], bytes], send: Callable[[bytes], int]) -> None:
-        """Use this descriptor, through these two functions."""
+    def _attach(
+        self,
+        descriptor: int | None,
+        receive: Callable[[int], bytes],
+        send: Callable[[bytes], int],
+        wait: Callable[[float], bool],
+    ) -> None:
+        """Use these functions of an open port, and its descriptor where it has one."""
         self._descriptor = descriptor
         self._receive = receive
         self._send = send
-        self._wait: Callable[[float], bool] = Readiness(descriptor).wait
+        self._wait = wait
 
     def _detach(self) -> None:
         """Use no descriptor: its number may soon belong to another file."""
-        self._descriptor = -1
+        self._descriptor = None
         self._receive = self._send = self._wait = _closed
 
     def now(self) -> float:
