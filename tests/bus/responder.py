@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from motorbus.bus.aio import AsyncBus
 from motorbus.bus.pump import Bus
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import Answer, Data, Due, Effect, Exchange, Operation, afterwards
+from motorbus.core.operation import Answer, Data, Due, Effect, Exchange
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
@@ -84,34 +83,13 @@ def position(node: int) -> Exchange[int]:
     return Exchange(wire.read(node, 56, 2), (Due(node, node, 8),), first_byte, repeatable=True)
 
 
-def positions(*nodes: int) -> Exchange[Answer]:
-    return Exchange(wire.sync_read(56, 2, nodes), tuple(Due(n, n, 8) for n in nodes), repeatable=True)
-
-
 def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Exchange[Answer]:
     return Exchange(
         wire.write(node, address, bytes([value])), (Due(node, node, 6),), effect=effect, repeatable=True
     )
 
 
-def guarded(node: int, value: int) -> Operation[None]:
-    """Unlock, write, lock: whatever happens in between, the lock is closed at the end."""
-
-    def change() -> Operation[None]:
-        yield from write(node, LOCK, 0, Effect.PERSISTENT)
-        yield from write(node, 20, value, Effect.PERSISTENT)
-        yield from position(node)
-
-    return afterwards(change(), lambda: write(node, LOCK, 1, Effect.PERSISTENT))
-
-
 def memory_bus(line: Line | None = None, **options: Any) -> tuple[Bus, Responder]:
     responder = Responder()
     link = MemoryLink(responder, line=line, **options)
     return Bus(link, FAMILY, interlock=admit_all), responder
-
-
-def async_bus(line: Line | None = None, **options: Any) -> tuple[AsyncBus, Responder]:
-    responder = Responder()
-    link = MemoryLink(responder, line=line, **options)
-    return AsyncBus(link, FAMILY, interlock=admit_all), responder

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import socket
-import stat
-import subprocess
-import sys
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +12,11 @@ import pytest
 
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop_socket import request_estop
-from motorbus.core.operation import Effect, Operation, Pause
-from motorbus.errors import Interrupted, LinkError, LinkLost, PortNotFound
+from motorbus.core.operation import Effect
+from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
-from tests.bus.responder import Responder, async_bus, memory_bus, position, write
+from tests.bus.responder import Responder, memory_bus, position, write
 from tests.bus.script import admit_all
 
 TORQUE = 40
@@ -63,78 +58,6 @@ def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:
     assert 1 in torque_offs(responder)
 
 
-def test_a_signal_handler_may_ask_for_a_stop() -> None:
-    bus, responder = memory_bus(virtual=False)
-    known(bus, 1)
-    bus.trigger_estop()  # no thread yet: nothing to stop
-    bus.run(write(1, TORQUE, 1, Effect.TORQUE))
-    bus.trigger_estop()
-    limit = time.monotonic() + 20
-    while not (bus.stopper.outcome and bus.stopper.outcome.acknowledged) and time.monotonic() < limit:
-        time.sleep(0.001)
-    assert torque_offs(responder)[:2] == [254, 1]
-    bus.close()
-
-
-def test_a_stop_in_the_middle_of_an_operation_ends_it_and_lets_it_clean_up() -> None:
-    bus, responder = memory_bus(virtual=False)
-    known(bus, 1)
-    begun = threading.Event()
-
-    def endless() -> Operation[None]:
-        try:
-            while True:
-                yield from write(1, 42, 7, Effect.MOTION)
-                begun.set()
-                yield from Pause(0.001)
-        finally:
-            yield from write(1, 55, 1, Effect.PERSISTENT)
-
-    errors: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            bus.run(endless())
-        except Interrupted as error:
-            errors.append(error)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    assert begun.wait(10)
-    outcome = bus.estop()
-    thread.join(10)
-    assert not thread.is_alive()
-    assert outcome.acknowledged == (1,)
-    assert len(errors) == 1
-    after = [p.parameters[0] for p in responder.heard]
-    assert 42 not in after[after.index(TORQUE) :], "no motion after the stop"
-    assert after[-1] == 55, "the clean-up follows the stop"
-    bus.close()
-
-
-def test_a_hung_event_loop_does_not_hold_the_stop() -> None:
-    stopped = threading.Event()
-
-    async def main() -> None:
-        bus, responder = async_bus(virtual=False)
-        async with bus:
-            await bus.run(position(1))
-            await bus.run(write(1, TORQUE, 1, Effect.TORQUE))
-
-            def stop() -> None:
-                assert bus.estop().acknowledged == (1,)
-                stopped.set()
-
-            threading.Thread(target=stop).start()
-            limit = time.monotonic() + 20
-            while not stopped.is_set() and time.monotonic() < limit:
-                sum(range(1000))  # the loop does not come round
-            assert stopped.is_set()
-            assert torque_offs(responder)[:2] == [254, 1]
-
-    asyncio.run(main())
-
-
 def test_the_stop_thread_sleeps_from_the_first_torque_command_on_and_ends_with_the_bus() -> None:
     bus, _ = memory_bus(virtual=False)
 
@@ -155,28 +78,6 @@ def served(path: Path) -> tuple[Bus, Responder]:
     known(bus, 1)
     bus.run(write(1, TORQUE, 1, Effect.TORQUE))
     return bus, responder
-
-
-def test_another_process_can_stop_the_bus(tmp_path: Path) -> None:
-    path = tmp_path / "stop"
-    bus, responder = served(path)
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    script = "import sys; from pathlib import Path; from motorbus.bus.stop_socket import request_estop; "
-    script += "print(request_estop(Path(sys.argv[1])).acknowledged)"
-    source = str(Path(sys.modules["motorbus"].__file__ or "").parent.parent)
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(path)],
-        env={"PYTHONPATH": source},
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert done.stdout.strip() == "(1,)", done.stderr
-    assert torque_offs(responder)[-2:] == [254, 1]
-    with pytest.raises(Interrupted):
-        bus.run(write(1, TORQUE, 1, Effect.TORQUE))
-    bus.close()
-    assert not path.exists()
 
 
 @pytest.mark.parametrize("garbage", [b"", b"\n", b"hello\n", b"\xff" * 4096])

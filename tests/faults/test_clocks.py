@@ -1,8 +1,7 @@
 """Row L15: the wall clock is set, or the computer sleeps for a night. Nothing expires too early, or too late.
 
 The clock on the wall is asked for what people read: a stamp in a file. All waiting goes by the clock of the link, which
-nobody can set. After a freeze a lease is lost, what moved is stopped first, and nothing moves again by itself. A
-process that is stopped and continued by the system is in `tests/session/test_attended_frozen.py`.
+nobody can set. After a freeze a lease is lost, what moved is stopped first, and nothing moves again by itself.
 """
 
 from __future__ import annotations
