@@ -560,7 +560,7 @@ class Engine:
             node = self.sync.of(due.node)
             if index not in attempt.replies:
                 self.sync.mark_owed(attempt.request.lane, due, now + self.quiet_time)
-            elif not node.silences:
+            else:
                 node.quiet_until = now + self.quiet_time
             self.statistics.of(due.node).errors[attempt.failure()] += 1
         return heard

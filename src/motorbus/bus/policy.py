@@ -76,7 +76,7 @@ def _resync(
     if group and state.silences and engine.time < state.probe_at:
         return Attempt(request, None), 0
     for tries in range(1, RETRIES + 2):
-        if engine.time < state.quiet_until:
+        while engine.time < state.quiet_until:  # another request may have moved it meanwhile
             yield Wait(state.quiet_until)
         if node not in engine.sync.out_of_sync:  # another request has probed it meanwhile
             return None, tries - 1

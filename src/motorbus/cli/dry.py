@@ -83,7 +83,7 @@ class DryBus:
         self.link = bus.link
         self.frames: list[bytes] = []
         self._bus = bus
-        self.admit = (
+        self.interlock = (
             bus.interlock.rehearsing() if isinstance(bus.interlock, Gate) else bus.interlock or Gate()
         )
         self._written: set[int] = set()
@@ -168,7 +168,7 @@ class DryBus:
         for question in self._bus.required_reads(exchange):
             self._bus.run(question)
         with self._bus.lock:
-            self.admit(exchange)
+            self.interlock(exchange)
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
             self._written.add(_EVERYONE)

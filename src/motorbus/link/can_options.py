@@ -113,6 +113,11 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
     given = {**user, **address, **({"interface": interface} if interface else {})}
     merged = _load(can, port, given, None if context is None else str(context))
     interface, channel = merged.pop("interface"), merged.pop("channel")
+    if interface in SERIAL_PORTS and not channel:
+        raise RequestError(
+            f"{port}: the serial port of the adapter is missing",
+            expected=f"can://{interface}/dev/ttyACM0, or channel in python-can's configuration",
+        )
     merged = _with_switches(merged)
     taken = TEXT_OPTIONS.get(interface)
     if taken is None:

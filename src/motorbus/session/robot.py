@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.base import BaseBus
 from motorbus.bus.pump import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
@@ -404,7 +405,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
 
 def _share_clock(buses: Iterable[Bus | AsyncBus]) -> None:
     """Put the simulated buses of this machine on one virtual clock."""
-    links = [bus.link for bus in buses]
+    links = [bus.link for bus in buses if isinstance(bus, BaseBus)]
     simulated = [link for link in links if isinstance(link, MemoryLink) and link.virtual]
     if len(simulated) == len(links):
         share_clock(simulated)
