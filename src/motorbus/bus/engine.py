@@ -257,6 +257,8 @@ class Engine:
         if job.done or not isinstance(job.step, Send):
             return None
         step, request = job.step, job.step.request
+        if now < self._earliest(step):  # another request to this node has failed since the probe was chosen
+            return None
         unprobed = step.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
         doubtful = [] if unprobed else self.sync.doubtful(request)
         if any(node not in step.excluded for node in doubtful):
@@ -273,6 +275,13 @@ class Engine:
             return None
         self.begin(Attempt(request, job, step.excluded, is_probe=step.is_probe), now)
         return request.request
+
+    def _earliest(self, step: Send | Wait) -> float:
+        """The moment (s) before which this step does nothing."""
+        if isinstance(step, Wait):
+            return step.until
+        dues = step.request.replies
+        return self.sync.of(dues[0].node).quiet_until if step.is_probe and dues and dues is not ANY else -inf
 
     def check(self, job: RequestJob) -> None:
         """Raise the error for which this request must not leave now."""
@@ -660,7 +669,8 @@ class Engine:
         """The next moment (s) at which `next_frame` or `expire` has something to do; inf when there is none."""
         moments = [attempt.deadline for attempt in self.in_flight.values()]
         steps = [job.step for job in self.queue if isinstance(job, RequestJob)]
-        moments += [step.until for step in steps if isinstance(step, Wait) and step.until > self.time]
+        waits = [self._earliest(step) for step in steps if step is not None]
+        moments += [moment for moment in waits if moment > self.time]
         if self.queue and self.paced and self.free_at > self.time:
             moments.append(self.free_at)
         return min(moments, default=inf)
