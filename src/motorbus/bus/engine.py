@@ -32,7 +32,6 @@ from motorbus.core.operation import (
     Answer,
     Data,
     Due,
-    Effect,
     Event,
     Exchange,
     Noise,
@@ -47,8 +46,8 @@ T = TypeVar("T")
 
 MARGIN: Final = {Timeout.SCAN: 0.002, Timeout.REPLY: 0.02, Timeout.STORE: 0.02}
 """s that the host may be late; short for a scan, where silence is the usual answer."""
-KEPT_BY_STOP: Final = (Effect.PERSISTENT, Effect.IDENTITY)
-"""Effects of requests that a stop lets follow it, so that a guarded change can close its lock."""
+STOP_DELAY: Final = 0.003
+"""s that a stop waits for the turn beyond the air time of what is in flight."""
 UNCOUNTED: Final = 64
 """Prepared requests with replies that are not yet in the statistics."""
 
@@ -682,15 +681,19 @@ class Engine:
         self.ready = False
 
     def stop_delay(self, now: float) -> float:
-        """s that a stop waits for what is on the wire; from any thread."""
-        return max((self._remaining(one, now) for one in tuple(self.in_flight.values())), default=0.0)
+        """s that a stop waits for the turn: as long as a reply may be on the wire; from any thread."""
+        flying = tuple(self.in_flight.values())
+        return max((self._remaining(one, now) for one in flying), default=0.0) + STOP_DELAY
 
     def latch(self, now: float, by: str) -> None:
-        """Emergency stop: end what waits, let a reply in flight pass, refuse motion until `reset`."""
+        """Emergency stop: end motion that waits and what is in flight, refuse motion until `reset`.
+
+        Reads and the end of a guarded change wait and follow the stop.
+        """
         self.announce_stop(by)
         error = failures.latched(self.latched_by)
         for job in list(self.queue):
-            if not (isinstance(job, RequestJob) and job.request.effect in KEPT_BY_STOP):
+            if isinstance(job, RequestJob) and job.request.effect in GATED:
                 self.cancel(job, error)
         for attempt in self.in_flight.values():
             attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
