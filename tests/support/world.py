@@ -83,8 +83,10 @@ def is_idle(bus: AnyBus) -> bool:
 
 
 def is_queued(bus: AnyBus) -> bool:
-    """Requests wait to be sent."""
-    return bool(bus.engine.queue) if hasattr(bus, "engine") else bus.turns.waiting
+    """Requests wait to be sent that move something or switch torque; on the old engine, any."""
+    if hasattr(bus, "engine"):
+        return any(job.request.effect >= Effect.TORQUE for job in bus.engine.queue)
+    return bus.turns.waiting
 
 
 def is_listening(bus: AnyBus) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping, Sequence
 from math import inf
+from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.base import IDLE, BaseBus
@@ -101,9 +102,16 @@ class _Part(Generic[T]):
     ) -> None:
         self.bus = bus
         self.news = news
+        self._loop = asyncio.get_running_loop()
+        self._thread = get_ident()
         self.tree: TaskTree[T] = TaskTree(
-            bus.engine, procedure, now=bus.now, report=bus.listener(report), settled=news.set
+            bus.engine, procedure, now=bus.now, report=bus.listener(report), settled=self._settled
         )
+
+    def _settled(self) -> None:
+        self.news.set()
+        if get_ident() != self._thread:  # the stop thread: wake the loop
+            self._loop.call_soon_threadsafe(self.news.set)
 
     def outcome(self) -> Any:
         """The value or the MotorbusError; raises any other error."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
@@ -60,6 +61,8 @@ class BaseBus:
         )
         self.engine.diagnosis = getattr(link, "trouble", str)
         self.turn = Turn()
+        self.settled = Condition()
+        """Notified when something ends that a sleeping thread waits for."""
         self.stopper = EmergencyStop(self, stop_socket)
         self.interlock = interlock
         self._reconnects = isinstance(link, Renewable)

@@ -31,7 +31,8 @@ class Beside(Generic[T]):
     def hurry(self) -> None:
         """End its sleep; from any thread."""
         if self._tree is not None:
-            self._tree.end_sleeps()
+            with self._bus.turn:
+                self._tree.end_sleeps()
 
     def drop(self) -> None:
         """Step it no more."""

@@ -269,6 +269,7 @@ class _Part(Generic[T]):
     def __init__(self, bus: BaseBus, procedure: Runnable[T], report: Notify | None) -> None:
         self.bus = bus
         self.news = True
+        self.sleeps = False
         self.holds_turn = False
         self.tree: TaskTree[T] = TaskTree(
             bus.engine, procedure, now=bus.link.now, report=bus.listener(report), settled=self._settled
@@ -276,6 +277,9 @@ class _Part(Generic[T]):
 
     def _settled(self) -> None:
         self.news = True
+        if self.sleeps:
+            with self.bus.settled:
+                self.bus.settled.notify_all()
 
     def outcome(self) -> Any:
         """The value or the MotorbusError; raises any other error."""
@@ -317,10 +321,22 @@ class _Part(Generic[T]):
         bus, moment = self.bus, self.tree.next_moment()
         if self.only_sleeps and not bus.link.virtual:
             self.release_turn()
-            time.sleep(max(0.0, min(moment - bus.link.now(), IDLE)))
+            self._sleep(min(moment - bus.link.now(), IDLE))
         else:
             bus.receive(moment)
         self.news = True
+
+    def _sleep(self, seconds: float) -> None:
+        """Sleep, at most until a stop ends the sleeps of the tree."""
+        if self.holds_turn or seconds <= 0:
+            time.sleep(max(0.0, seconds))
+            return
+        with self.bus.settled:
+            self.news, self.sleeps = False, True
+            try:
+                self.bus.settled.wait_for(lambda: self.news, seconds)
+            finally:
+                self.sleeps = False
 
 
 def _run_parts(parts: Sequence[_Part[Any]]) -> None:

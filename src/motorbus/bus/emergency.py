@@ -129,7 +129,9 @@ class EmergencyStop:
         if bus.turn.acquire(Rank.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
-        to_all = [request for request in stop.exchanges if not request.replies]  # none of them disturbs a reply
+        to_all = [
+            request for request in stop.exchanges if not request.replies
+        ]  # none of them disturbs a reply
         for request in to_all or stop.exchanges:
             with contextlib.suppress(LinkError):
                 bus.link.write(request.request)

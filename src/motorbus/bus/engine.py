@@ -84,6 +84,8 @@ class Engine:
         self.in_flight: dict[int, Attempt] = {}
         self.queue: list[Job] = []
         self.listeners: list[Callable[[Notice], None]] = []
+        self.end_sleeps: list[Callable[[BaseException], None]] = []
+        """Called with the error when an emergency stop is latched: procedures that sleep end."""
         self.exclusive: object = None
         self.latched = self.stopping = False
         self.latched_by = ""
@@ -695,6 +697,8 @@ class Engine:
         for job in list(self.queue):
             if isinstance(job, RequestJob) and job.request.effect in GATED:
                 self.cancel(job, error)
+        for end in tuple(self.end_sleeps):
+            end(error)
         for attempt in self.in_flight.values():
             attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
             if attempt.job is not None:

@@ -93,6 +93,7 @@ class TaskTree(Generic[T]):
         self.extension = 0.0
         self.timers: list[Timer] = []
         self.root = Task(procedure)
+        engine.end_sleeps.append(self.end_sleeps)
 
     # -- forward -----------------------------------------------------------------------------------------------
 
@@ -169,6 +170,8 @@ class TaskTree(Generic[T]):
 
     def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
         task.value, task.error, task.finished = value, error, True
+        if task is self.root and self.end_sleeps in self.engine.end_sleeps:
+            self.engine.end_sleeps.remove(self.end_sleeps)
         if task.claims:
             self.engine.release(task.owner)
 
@@ -281,13 +284,15 @@ class TaskTree(Generic[T]):
             self.extension = 0.0
             self.deadline = min(self.deadline, self.now() + SECOND_TIMEOUT)
 
-    def end_sleeps(self) -> None:
-        """Let every sleep end at once; from any thread."""
+    def end_sleeps(self, error: BaseException | None = None) -> None:
+        """Let every sleep end at once, with this error if there is one."""
         for timer in tuple(self.timers):
-            timer.until = self.now()
+            self._end(timer, self.now(), error)
 
     def drop(self) -> None:
         """Forget the procedure where it stands: its generators are not resumed, what they wait for is cancelled."""
+        if self.end_sleeps in self.engine.end_sleeps:
+            self.engine.end_sleeps.remove(self.end_sleeps)
         for task in self._waiting(self.root):
             if task.job is not None:
                 self.engine.cancel(task.job)
