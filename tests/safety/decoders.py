@@ -82,6 +82,11 @@ class FeetechWitness(Witness):
 
     def ordered(self, data: Data) -> Iterator[tuple[int, float]]:
         assert isinstance(data, bytes)
+        while data:  # several frames may leave in one write
+            yield from self._ordered_by(data[: 4 + data[3]])
+            data = data[4 + data[3] :]
+
+    def _ordered_by(self, data: bytes) -> Iterator[tuple[int, float]]:
         assert data[:2] == b"\xff\xff"
         node, instruction, rest = data[2], data[4], data[5:-1]
         if instruction == READ:

@@ -635,7 +635,8 @@ class Engine:
         if not record.low <= took < record.high:
             record.bucket, record.low, record.high = bucket_of(took)
         record.latency[record.bucket] += 1
-        record.data, record.at, record.source, record.orders = data, at, prepared, self.positions.orders
+        record.data, record.at, record.source, record.kept = data, at, prepared, None
+        record.orders = self.positions.orders
         if not record.counted:
             record.counted = True
             self.count_later(record)

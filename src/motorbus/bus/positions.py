@@ -59,7 +59,7 @@ class LastPositions(Mapping[int, Reading]):
 
     def _reading(self, node: int) -> tuple[Exchange[Any], Answer, int]:
         if (prepared := self.prepared.get(node)) is not None:
-            return prepared.exchange, prepared.answer(), prepared.orders
+            return prepared.source.exchange, prepared.answer(), prepared.orders
         return self._readings[node]
 
     def heard(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:

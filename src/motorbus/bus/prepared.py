@@ -79,7 +79,7 @@ class Prepared:
 
     def answer(self) -> Answer:
         """The last reply, split into the replies of the nodes."""
-        if self.kept is None or self.kept.at != self.at:
+        if self.kept is None:
             self.kept = Answer(split(self.source.exchange, self.data), (), self.at)
         return self.kept
 

@@ -12,6 +12,7 @@ from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob
 from motorbus.bus.positions import GATED
 from motorbus.core.operation import (
     Alone,
+    Closed,
     Exchange,
     Journal,
     Listen,
@@ -37,6 +38,8 @@ LONG_SLEEP: Final = 0.5
 """s; a sleep of a clean-up from here on waits for a device to come to rest, and extends the timeout."""
 LONGEST_EXTENSION: Final = 30.0
 """s by which such sleeps extend it."""
+CLEANUP_STEPS: Final = 100
+"""Steps of a clean-up that fail, one after the other, when a procedure is dropped."""
 READS: Final = 2
 """Rounds of the reads that the interlock requires; the second where the first was doubtful."""
 
@@ -290,7 +293,7 @@ class TaskTree(Generic[T]):
             self._end(timer, self.now(), error)
 
     def drop(self) -> None:
-        """Forget the procedure where it stands: its generators are not resumed, what they wait for is cancelled."""
+        """End the procedure where it stands; nothing that its clean-up asks for is carried out."""
         if self.end_sleeps in self.engine.end_sleeps:
             self.engine.end_sleeps.remove(self.end_sleeps)
         for task in self._waiting(self.root):
@@ -300,6 +303,8 @@ class TaskTree(Generic[T]):
                 self._end(task.job)
             if task.claims:
                 self.engine.release(task.owner)
+            task.finished = True
+            _close(task.generator)
 
     def _cancel(self, task: Task) -> None:
         if task.finished or task.cancelled:
@@ -335,6 +340,15 @@ def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, request: E
             yield from outcome(read)
         reads = required(request)
     return (yield from request)
+
+
+def _close(generator: Operation[Any]) -> None:
+    """Close a generator, also one that yields steps of its clean-up: each of them fails."""
+    for _ in range(CLEANUP_STEPS):
+        try:
+            generator.throw(Closed())
+        except BaseException:
+            return
 
 
 def _add_note(error: BaseException, other: BaseException | None) -> None:
