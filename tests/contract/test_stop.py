@@ -20,9 +20,9 @@ from tests.support.processes import motorbus as shell
 
 TORQUE_OFF: Final = bytes.fromhex("FF FF FE 04 03 28 00 D2")
 """WRITE torque_enable 0 to all servos: the first frame of a stop."""
-LATER: Final = 100
-"""Requests of a busy caller that may leave between a stop is asked for and its first frame: a few ms of switching
-threads. A caller sends thousands in the meantime where a stop waits in line."""
+LATER: Final = 1_000
+"""Requests of a busy caller that may leave between the call of a stop and its first frame: tens of ms of switching
+threads on a busy computer. A caller sends requests without end where a stop waits behind them."""
 
 
 @pytest.fixture(scope="module")
