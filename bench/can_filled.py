@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from bench.rounds import Failed
 from motorbus import kst
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Operation, Together
 from motorbus.diagnose.budget import Budget, Transfer, budget
 from motorbus.families.kst.simulator import KstBus

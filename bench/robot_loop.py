@@ -5,8 +5,7 @@
 The other end is the responder in C, on which bytes take as long as at that baud rate. At 80 % of the highest rate
 that the budget names there is to be no overrun in a minute, and asked for that highest rate itself the loop is to
 achieve 88 % of what the wire carries. Both are measured with goals that are followed and with goals that are sent as
-they are, by a loop that is a cycle ahead, and by one that tells what a cycle brought before the next one leaves. What
-is to be achieved is asked of the former, for that is what it is there for. Each axis counts how often it was read, so
+they are. Each axis counts how often it was read, so
 a reading that is lost, doubled or stale is found. All of it runs with real-time priority where that is permitted, as a
 control loop would; whether it was is said with the result.
 """
@@ -43,12 +42,10 @@ STEP = math.tau / COUNTS
 WHY = (
     "Part of what is missing even a loop of bare system calls lacks, as in row 6. The rest a loop that misses spends "
     "between an answer and the next write, after a wait, with cold caches: "
-    "one that is ahead takes the answer apart and sees whether everybody may still be ordered; any other tells what "
-    "it brought first, the program that leads sets its goals, and the gate judges them.\n"
+    "it tells what the answer brought, the program that leads sets its goals, and the gate judges them.\n"
 )
 """Why it misses where it does; what system calls alone achieve on the same line is in row 6."""
-AHEAD = " ahead"
-KINDS = ("followed", "direct", f"followed{AHEAD}", f"direct{AHEAD}")
+KINDS = ("followed", "direct")
 COLUMNS = (
     "",
     "asked for, Hz",
@@ -122,7 +119,7 @@ def measured(port: str, kind: str, rate: float, seconds: float) -> dict[str, Any
 def _led(robot: Any, kind: str, rate: float, seconds: float) -> dict[str, Any]:
     goals = course(int(rate * seconds) + 1)
     positions: list[Any] = []
-    with robot.loop(rate, direct=kind.startswith("direct"), ahead=kind.endswith(AHEAD)) as loop:
+    with robot.loop(rate, direct=kind == "direct") as loop:
         base = dict(next(loop).position)
         loop.goal.update(base)
         next(loop)  # torque on, in a cycle of its own
@@ -257,16 +254,13 @@ def samples(seconds: float, progress: Callable[[str], None], times: int = 1) -> 
 
 
 def verdict(found: Iterable[Sample]) -> str:
-    """Whether both were reached by the loops that are ahead, in words, and what the others came to."""
+    """Whether both were reached, in words."""
     every = list(found)
-    asked = [one for one in every if one.kind.endswith(AHEAD)]
-    overruns, cycles, least = _worst(asked)
-    others = _worst([one for one in every if one not in asked])
+    overruns, cycles, least = _worst(every)
     return (
-        f"A cycle ahead: overruns and skipped slots at {SHARE:.0%} of the budget's highest rate: {overruns} in "
+        f"Overruns and skipped slots at {SHARE:.0%} of the budget's highest rate: {overruns} in "
         f"{cycles} cycles. None: {_word(not overruns)}.\n"
         f"Achieved of what the wire carries: {least:.1%}. At least {ACHIEVED:.0%}: {_word(least >= ACHIEVED)}.\n"
-        f"Not ahead: {others[0]} in {others[1]} cycles, and {others[2]:.1%}.\n"
         f"Real-time priority: {_priority(every)}.\n" + ("" if not overruns and least >= ACHIEVED else WHY)
     ).rstrip()
 
@@ -326,9 +320,9 @@ def main() -> int:
     with urgent():
         system = [bare(rate, min(given.seconds, FLAT_OUT)) for rate in (0.0, SHARE * wire)]
     print("\n".join(told(one, wire) for one in system))
-    share = min(one.achieved for one in found if one.asked >= wire and one.kind.endswith(AHEAD))
+    share = min(one.achieved for one in found if one.asked >= wire)
     share /= system[0].achieved
-    print(f"Of what bare system calls achieve flat out, a cycle ahead: {share:.1%}.")
+    print(f"Of what bare system calls achieve flat out: {share:.1%}.")
     print(f"{verdict(found)}\nLoad of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores.")
     return 0
 

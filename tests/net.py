@@ -15,7 +15,6 @@ NET: Final = (
     "tests/contract",
     "tests/docs",
     "tests/faults/test_kst_single_faults.py",
-    "tests/faults/test_machines.py",
     "tests/faults/test_single_faults.py",
     "tests/faults/test_stepper_single_faults.py",
     "tests/golden",

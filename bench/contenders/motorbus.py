@@ -12,7 +12,7 @@ from bench import memory
 from bench.loop import main
 from bench.workloads import BLOCK, COUNTS, FIELDS, SIZES, Fields, Workload, parts
 from motorbus import feetech
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Data
 from motorbus.motion.safety import Gate
 
@@ -62,7 +62,7 @@ def _in_memory(workload: Workload) -> Bus:
     """A bus as `motorbus.open` would leave it, after the test of the echo."""
     bus = Bus(MemoryLink(workload), feetech.FAMILY, interlock=Gate())
     test = feetech.FAMILY.echo_test()
-    bus.turns.expect_echo(test)
+    bus.expect_echo(test)
     bus.run(test)
     return bus
 

@@ -25,7 +25,7 @@ from bench.late.device import (
     tally,
 )
 from motorbus import feetech, kst, stepper
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.core.operation import CanFrame, Data, Runnable
 from motorbus.errors import MotorbusError
@@ -108,7 +108,7 @@ def _opened(bus: Bus) -> Bus:
     """The test of the echo, where the family has one."""
     test = bus.family.echo_test()
     if test is not None:
-        bus.turns.expect_echo(test)
+        bus.expect_echo(test)
         with suppress(MotorbusError):
             bus.run(test)
     return bus

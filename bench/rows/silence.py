@@ -131,7 +131,7 @@ def ours(port: str, count: int) -> Said:
     """By the public call, and the error that it raises."""
     import motorbus
     from motorbus import feetech
-    from motorbus.bus.pace import MARGIN
+    from motorbus.bus.engine import MARGIN
     from motorbus.core.operation import Due, Exchange
 
     told = motorbus.NoReply("nobody was asked yet")

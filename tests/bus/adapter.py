@@ -1,4 +1,4 @@
-"""Binds the vocabulary of the engine tests (submit, deliver, advance, cancel, stop, sent, result) to two engines.
+"""Binds the vocabulary of the engine tests (submit, deliver, advance, cancel, stop, sent, result) to the engine.
 
 The one file of the engine tests that names classes of the bus. Time is virtual; nothing here waits.
 """
@@ -8,10 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from motorbus.bus import blocking
-from motorbus.bus.crank import crank
-from motorbus.bus.pump import Bus
-from motorbus.bus.run import Run
+from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import TaskTree
 from motorbus.core.goal import Goal
@@ -23,6 +20,7 @@ from motorbus.errors import LinkLost
 from motorbus.families import feetech, kst
 from motorbus.families.kst.wire import download_due, upload_due
 from motorbus.link.memory import MemoryLink
+from tests.bus.script import Check
 
 Cancelled = KeyboardInterrupt
 PENDING = object()
@@ -124,16 +122,10 @@ class Wire:
 class Engine:
     """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none).
 
-    `implementation` is the engine under test.
+    `settled` is set when a call can go on.
     """
 
-    implementation: ClassVar[type[Engine]]
-    link: MemoryLink
-    bus: Any
-    calls: dict[str, Any]
-
-    def __new__(cls, *_: Any, **__: Any) -> Engine:
-        return object.__new__(Engine.implementation)
+    settled = False
 
     def __init__(
         self,
@@ -149,7 +141,7 @@ class Engine:
         self.family = FAMILIES[family]
         self.link = MemoryLink(self.wire, rate=self.family.link.rate)
         self.link.listen_only = listen_only
-        self.calls = {}
+        self.calls: dict[str, Any] = {}
         self.bus = self.open(check, latency)
         self.wire.echoes = echo
         if answer is not None:
@@ -161,8 +153,11 @@ class Engine:
         self.wire.answer = lambda frame: []
         self.sent()
 
-    def open(self, check: Callable[[Any], None] | None, latency: float) -> Any:
-        raise NotImplementedError
+    def open(self, check: Callable[[Any], None] | None, latency: float) -> Bus:
+        bus = Bus(self.link, self.family, interlock=None if check is None else Check(check))
+        bus.latency = latency
+        self.engine = bus.engine
+        return bus
 
     @property
     def now(self) -> float:
@@ -175,124 +170,6 @@ class Engine:
     @property
     def deadline(self) -> float:
         """Seconds until the engine acts by itself."""
-        raise NotImplementedError
-
-    def submit(self, name: str, work: Any) -> None:
-        raise NotImplementedError
-
-    def run(self, work: Any) -> Any:
-        """Carry it out as a blocking caller does."""
-        return self.bus.run(work)
-
-    def cancel(self, name: str) -> None:
-        raise NotImplementedError
-
-    def deliver(self, *data: Data, after: float = 0.0005) -> None:
-        """These arrive after so many seconds, each by itself."""
-        self.wire.coming += [(self.now + after, one) for one in data]
-        self.advance(after)
-
-    def advance(self, seconds: float = 0.0) -> None:
-        """Let time pass, and do all that is to be done meanwhile."""
-        raise NotImplementedError
-
-    def sent(self) -> list[Any]:
-        """Everything sent since the last look."""
-        sent, self.wire.sent = [data for _, data in self.wire.sent], []
-        return sent
-
-    def result(self, name: str) -> Any:
-        """The value of a call or its error, PENDING while it has not ended."""
-        raise NotImplementedError
-
-    def estop(self) -> StopOutcome:
-        outcome: StopOutcome = self.bus.estop()
-        self.advance()
-        return outcome
-
-    def unplug(self) -> None:
-        self.link.unplug()
-        self.advance()
-
-    def plug(self) -> None:
-        self.link.plug()
-        self.advance()
-
-    def counts(self, node: int) -> Any:
-        return self.bus.statistics.nodes[node]
-
-
-class OldEngine(Engine):
-    """The engine that `motorbus.open` uses."""
-
-    bus: Bus
-
-    def open(self, check: Callable[[Any], None] | None, latency: float) -> Bus:
-        bus = Bus(self.link, self.family, interlock=check)
-        bus.latency = latency
-        return bus
-
-    @property
-    def deadline(self) -> float:
-        return self.bus.turns.due() - self.now
-
-    def submit(self, name: str, work: Any) -> None:
-        self.calls[name] = Run(self.bus.turns, work, now=self.link.now)
-        self.advance()
-
-    def cancel(self, name: str) -> None:
-        self.calls[name].interrupt(Cancelled())
-        self.advance()
-
-    def advance(self, seconds: float = 0.0) -> None:
-        end, same = self.now + seconds, 0
-        while same < 2:
-            before = self.now, len(self.wire.sent), self.bus.turns.settled
-            for call in self.calls.values():
-                call.advance()
-            crank(self.link, self.bus.turns, end)
-            self.link.advance(0.0)
-            same = same + 1 if before == (self.now, len(self.wire.sent), self.bus.turns.settled) else 0
-        assert self.now >= end - 1e-9
-
-    def result(self, name: str) -> Any:
-        call = self.calls[name]
-        if not call.advance():
-            return PENDING
-        return call.root.value if call.told() is None else call.told()
-
-
-class Check:
-    """An interlock of one function."""
-
-    def __init__(self, check: Callable[[Any], None]) -> None:
-        self._check = check
-
-    def check(self, request: Exchange[Any], now: float) -> None:
-        self._check(request)
-
-    def required_reads(self, request: Exchange[Any]) -> Sequence[Any]:
-        return ()
-
-    def stopped(self, nodes: Sequence[int]) -> None:
-        pass
-
-
-class NewEngine(Engine):
-    """The engine that replaces it."""
-
-    settled = False
-
-    bus: blocking.Bus
-
-    def open(self, check: Callable[[Any], None] | None, latency: float) -> blocking.Bus:
-        bus = blocking.Bus(self.link, self.family, interlock=None if check is None else Check(check))
-        bus.latency = latency
-        self.engine = bus.engine
-        return bus
-
-    @property
-    def deadline(self) -> float:
         return self.engine.next_deadline() - self.now
 
     def submit(self, name: str, work: Any) -> None:
@@ -302,15 +179,25 @@ class NewEngine(Engine):
     def _settle(self) -> None:
         self.settled = True
 
+    def run(self, work: Any) -> Any:
+        """Carry it out as a blocking caller does."""
+        return self.bus.run(work)
+
     def cancel(self, name: str) -> None:
         self.calls[name].cancel(Cancelled())
         self.advance()
+
+    def deliver(self, *data: Data, after: float = 0.0005) -> None:
+        """These arrive after so many seconds, each by itself."""
+        self.wire.coming += [(self.now + after, one) for one in data]
+        self.advance(after)
 
     def _state(self) -> tuple[Any, ...]:
         finished = [call.root.finished for call in self.calls.values()]
         return self.now, len(self.wire.sent), len(self.engine.queue), len(self.engine.in_flight), finished
 
     def advance(self, seconds: float = 0.0) -> None:
+        """Let time pass, and do all that is to be done meanwhile."""
         end, same = self.now + seconds, 0
         while same < 3:
             before, self.settled = self._state(), False
@@ -337,11 +224,33 @@ class NewEngine(Engine):
         else:
             self.engine.reconnected(self.now, self.engine.latency)
 
+    def sent(self) -> list[Any]:
+        """Everything sent since the last look."""
+        sent, self.wire.sent = [data for _, data in self.wire.sent], []
+        return sent
+
     def result(self, name: str) -> Any:
+        """The value of a call or its error, PENDING while it has not ended."""
         call = self.calls[name]
         if not call.advance():
             return PENDING
         return call.root.value if call.error() is None else call.error()
+
+    def estop(self) -> StopOutcome:
+        outcome: StopOutcome = self.bus.estop()
+        self.advance()
+        return outcome
+
+    def unplug(self) -> None:
+        self.link.unplug()
+        self.advance()
+
+    def plug(self) -> None:
+        self.link.plug()
+        self.advance()
+
+    def counts(self, node: int) -> Any:
+        return self.bus.statistics.nodes[node]
 
 
 __all__ = ["PENDING", "Cancelled", "Effect", "Engine", "LinkLost", "Priority", "Timeout", "request"]

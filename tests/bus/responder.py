@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import Answer, Data, Due, Effect, Exchange
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
-from tests.bus.script import admit_all
+from tests.bus.script import ADMIT_ALL
 
 LOCK = 55
 DELAY = 0.0001
@@ -92,4 +92,4 @@ def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> 
 def memory_bus(line: Line | None = None, **options: Any) -> tuple[Bus, Responder]:
     responder = Responder()
     link = MemoryLink(responder, line=line, **options)
-    return Bus(link, FAMILY, interlock=admit_all), responder
+    return Bus(link, FAMILY, interlock=ADMIT_ALL), responder

@@ -58,8 +58,6 @@ from tests.bus.frames import (
     write_frame,
 )
 
-pytestmark = pytest.mark.usefixtures("implementation")
-
 
 @pytest.fixture
 def engine() -> Engine:

@@ -45,8 +45,6 @@ from tests.bus.frames import (
 )
 from tests.conftest import Rounds
 
-pytestmark = pytest.mark.usefixtures("implementation")
-
 NODES = st.integers(1, 3)
 PRIORITIES = st.sampled_from([Priority.CONTROL, Priority.POLL, Priority.CONFIGURATION])
 TIMES = st.sampled_from([0.0002, 0.002, 0.01, 0.025, 0.06, 0.3])

@@ -23,8 +23,6 @@ from motorbus.errors import LinkError, NoReply, RequestError
 from tests.bus.adapter import Cancelled, Effect, Engine
 from tests.bus.frames import Servos, can_move, can_read, read, write, write_frame
 
-pytestmark = pytest.mark.usefixtures("implementation")
-
 LOCK = 55
 
 

@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import request_estop
 from motorbus.core.operation import Effect
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
 from tests.bus.responder import Responder, memory_bus, position, write
-from tests.bus.script import admit_all
+from tests.bus.script import ADMIT_ALL
 
 TORQUE = 40
 
@@ -74,7 +74,7 @@ def test_the_stop_thread_sleeps_from_the_first_torque_command_on_and_ends_with_t
 
 def served(path: Path) -> tuple[Bus, Responder]:
     responder = Responder()
-    bus = Bus(MemoryLink(responder, virtual=False), FAMILY, interlock=admit_all, stop_socket=path)
+    bus = Bus(MemoryLink(responder, virtual=False), FAMILY, interlock=ADMIT_ALL, stop_socket=path)
     known(bus, 1)
     bus.run(write(1, TORQUE, 1, Effect.TORQUE))
     return bus, responder

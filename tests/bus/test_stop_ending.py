@@ -9,9 +9,9 @@ ENDING = """
 import atexit, motorbus
 sim = motorbus.simulate("feetech", ids="1", clock="real")
 bus = motorbus.open(sim.url)
-atexit.register(lambda: print(bus.stopper.outcome.rounds))
+atexit.register(lambda: print(bus.stop_count(1) // 2))
 motorbus.feetech.Servo(bus, 1).enable_torque()
-sim[1].unplug()  # so that all five rounds are needed
+sim[1].unplug()  # so that all five rounds are needed, each with a frame for all and one for node 1
 bus.trigger_estop()
 """
 

@@ -8,13 +8,13 @@ from threading import Thread
 import pytest
 
 import motorbus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import request_estop
 from motorbus.errors import LinkError, PortNotFound
 from motorbus.families.feetech import FAMILY, Servo
 from motorbus.link.memory import MemoryLink
 from tests.bus.responder import Responder, position
-from tests.bus.script import admit_all
+from tests.bus.script import ADMIT_ALL
 
 
 def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,7 +28,7 @@ def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch
         with monkeypatch.context() as patched:
             patched.setattr(Thread, "start", refused)
             assert bus.estop().acknowledged == (1, 2)
-            assert bus.turns.latched
+            assert bus.latched
             assert [sim[node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
             bus.reset()
             with pytest.raises(LinkError, match="no more threads"):  # nobody could stop what begins now
@@ -41,7 +41,7 @@ def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch
 
 def test_a_port_that_is_called_otherwise_by_now_is_stopped_under_that_name(tmp_path: Path) -> None:
     old, new = tmp_path / "old.sock", tmp_path / "new.sock"
-    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=admit_all, stop_socket=old)
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=ADMIT_ALL, stop_socket=old)
     bus.run(position(1))
     bus.stopper.move(new)
     assert request_estop(new).acknowledged == (1,)
@@ -58,7 +58,7 @@ def test_a_port_that_is_called_otherwise_by_now_is_stopped_under_that_name(tmp_p
 
 
 def test_a_bus_that_no_other_program_reaches_has_nothing_to_move() -> None:
-    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=admit_all)
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=ADMIT_ALL)
     bus.stopper.move(Path("/nowhere"))
     assert bus.stopper.socket_path is None
     bus.close()

@@ -57,13 +57,13 @@ with motorbus.open(sys.argv[1]) as bus:
 """
 OPENING = """
 import sys, motorbus
-from motorbus.bus.stop import Stopper
-start = Stopper.start
+from motorbus.bus.stop import EmergencyStop
+start = EmergencyStop.start
 def late(self):
     print("locked", flush=True)
     sys.stdin.readline()
     start(self)
-Stopper.start = late
+EmergencyStop.start = late
 with motorbus.open(sys.argv[1]) as bus:
     sys.stdin.read()
 """

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from motorbus import families
-from motorbus.bus import verdict
+from motorbus.bus import failures
 from motorbus.cli import faces, wording
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.simulation.named import Simulation
@@ -104,7 +104,7 @@ def test_the_bus_of_a_command_that_is_named_is_the_one_at_hand(said: str, meant:
 
 
 def test_after_an_emergency_stop_a_shell_is_told_to_begin_again() -> None:
-    error = verdict.latched("in this process")
+    error = failures.latched("in this process")
     wording.in_words_of_the_shell(error, families.load("stepper"))
     assert error.advice == "when it is safe, give the command again, for the stop has ended this one"
 

@@ -46,9 +46,6 @@ def test_reads_of_one_bus(running: Simulator, rounds: Rounds) -> None:
     check(bombarded("read", rounds(60, 1), running.address))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="issue 25: a signal is raised when the exchange has ended, not within it"
-)
 def test_a_request_that_was_sent_is_answered_when_the_interrupt_is_raised(
     running: Simulator, rounds: Rounds
 ) -> None:

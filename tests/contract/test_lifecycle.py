@@ -17,7 +17,6 @@ from motorbus import feetech
 from tests.support.processes import LIMIT, python, simulator
 
 
-@pytest.mark.xfail(strict=True, reason="issue 25: one virtual clock belongs to one thread")
 def test_a_simulated_bus_refuses_a_second_thread() -> None:
     errors: list[Exception] = []
 
@@ -77,7 +76,6 @@ with motorbus.open(sys.argv[1]) as bus:
 """
 
 
-@pytest.mark.xfail(strict=True, reason="issue 25: SIGTERM is deferred to the end of the request and raised")
 def test_sigterm_lets_a_program_clean_up(tmp_path: Path) -> None:
     with (
         simulator(tmp_path / "bus", "feetech", "--ids", "1") as simulated,

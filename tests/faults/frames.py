@@ -1,4 +1,4 @@
-"""What can happen to one CAN frame between a host and its servos: lost, there twice, late, or behind the one after it.
+"""What can happen to one CAN frame between a host and its servos: lost, there twice, or late. A link keeps the order.
 
 A byte of it cannot change: what the check of a frame does not let pass is sent again or lost as a whole.
 """
@@ -33,14 +33,14 @@ def every_fault(counts: dict[Side, int]) -> Iterator[FrameFault]:
     """Each fault of each frame, so many to each side."""
     for to, count in counts.items():
         for number in range(count):
-            yield from (FrameFault(to, number, kind) for kind in ("lost", "doubled", "swapped"))
+            yield from (FrameFault(to, number, kind) for kind in ("lost", "doubled"))
             yield from (FrameFault(to, number, "late", seconds) for seconds in LATE)
 
 
 class FrameLine:
     """Carries frames, in order but for one; `counts` how many to each side, `fired` its fault once that has happened.
 
-    What is `late` holds up what follows it, as a queue does. What is `swapped` waits for the next frame to its side.
+    What is `late` holds up what follows it, as a queue does.
     """
 
     def __init__(self, fault: FrameFault | None = None) -> None:
@@ -48,7 +48,6 @@ class FrameLine:
         self.fired: list[FrameFault] = []
         self.counts = {Side.HOST: 0, Side.DEVICE: 0}
         self._last = {Side.HOST: 0.0, Side.DEVICE: 0.0}
-        self._held: CanFrame | None = None
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         assert isinstance(data, CanFrame)
@@ -66,8 +65,5 @@ class FrameLine:
     def _struck(self, fault: FrameFault, data: CanFrame, at: float) -> tuple[list[CanFrame], float]:
         if self.counts[fault.to] == fault.number:
             self.fired.append(fault)
-            if fault.kind == "swapped":
-                self._held = data
-            return [data] * {"lost": 0, "swapped": 0, "late": 1, "doubled": 2}[fault.kind], at + fault.seconds
-        held, self._held = self._held, None
-        return [data] if held is None else [data, held], at
+            return [data] * {"lost": 0, "late": 1, "doubled": 2}[fault.kind], at + fault.seconds
+        return [data], at

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.bus.pump import Bus
-from motorbus.bus.turns import RETRIES
+from motorbus.bus.blocking import Bus
+from motorbus.bus.policy import RETRIES
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import FAMILY, Servo, wire

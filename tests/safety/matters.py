@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf, isfinite, nan, pi
-from threading import Thread
 from typing import Any
 
 import motorbus
@@ -39,7 +38,7 @@ class Matters(Courses):
         robot["a3"].enable_torque()
 
     def kinds(self) -> list[Callable[[], Call]]:
-        more = (self.late, self.fault, self.unheld, self.held, self.wheel, self.raw, self.threads)
+        more = (self.late, self.fault, self.unheld, self.held, self.wheel, self.raw)
         return [*super().kinds(), *[*more, self.late] * 3, self.wheel_later, self.bare]
 
     def draw(self) -> Call:
@@ -259,31 +258,6 @@ class Matters(Courses):
             {("arm", node): nan},
             barred=[("arm", node)],
         )
-
-    # -- two callers ---------------------------------------------------------------------------------------------------
-
-    def threads(self) -> Call:
-        """Two threads at once on one bus, each with a device of its own."""
-        name = self.chance.choice(("arm", "can"))
-        wants = {spot: self.goal(spot) for spot in BOUNDS if spot[0] == name}
-
-        def both() -> list[object]:
-            told: dict[Spot, object] = {}
-
-            def one(spot: Spot, goal: object) -> None:
-                try:
-                    told[spot] = self.device(spot).write(goal_position=goal)
-                except (MotorbusError, TypeError) as error:
-                    told[spot] = error
-
-            callers = [Thread(target=one, args=pair, daemon=True) for pair in wants.items()]
-            for caller in callers:
-                caller.start()
-            for caller in callers:
-                caller.join(LONG)
-            return [told[spot] for spot in wants]
-
-        return Call("threads", both, wants, each=True)
 
 
 def _pair(spot: Spot) -> list[int]:

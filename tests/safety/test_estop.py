@@ -22,7 +22,7 @@ from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.kst.driver.feedback import position_exchange
 from motorbus.families.stepper import wire as stepper
 from tests.support.noisy_line import NoisyLine
-from tests.support.world import Bus, Pending, is_queued, queue, turn
+from tests.support.world import Bus, has_queued_motion, queue, turn
 
 QUEUED = 3_000
 NODES = {"feetech": (1, 2, 3), "kst": (0x25, 0x26), "stepper": (1,)}
@@ -38,7 +38,7 @@ AGAIN = 0.052
 
 
 @contextmanager
-def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Pending]]]:
+def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Any]]]:
     """A bus whose devices are known, with thousands of questions and orders in its queue, and one on the wire."""
     ids = "+".join(map(str, NODES[family]))
     with motorbus.simulate(family, ids=ids) as sim:
@@ -76,7 +76,7 @@ def order(bus: Bus, node: int) -> Exchange[Any]:
     return Exchange(request, (), lane=node, effect=Effect.MOTION, goals=(goal,))
 
 
-def queued(bus: Any, nodes: tuple[int, ...]) -> list[Pending]:
+def queued(bus: Any, nodes: tuple[int, ...]) -> list[Any]:
     """Have thousands wait, of which every third would move something; those are given."""
     orders = []
     for number in range(QUEUED):
@@ -113,7 +113,7 @@ def test_the_first_byte_of_a_stop_leaves_in_time_whatever_waits(family: str, see
         assert all(is_stop(family, data) for _, data in sent), "nothing else leaves any more"
         assert sent[0][0] - asked <= MOST[family]
         assert bus.latched
-        assert not is_queued(bus)
+        assert not has_queued_motion(bus)
         assert outcome.rounds <= 5
         assert [one for one in orders if not one.done] == []
         assert sum(isinstance(one.error, MotorbusError) for one in orders) > QUEUED / 4, "they were not sent"

@@ -30,7 +30,6 @@ ORDERS = (
     "sync_write_positions",
     "broadcast",
     "two",
-    "threads",
     "raw",
 )
 ACTIONS = ("action", "action by another", "action_all", "action_all of those named")

@@ -23,7 +23,7 @@ from tests.conftest import Rounds
 from tests.safety.points import asks, known, sent
 from tests.safety.test_estop import is_stop, queued
 from tests.support.machines import listened, machine, said
-from tests.support.world import is_queued
+from tests.support.world import has_queued_motion
 
 
 def test_01_nothing_moves_on_connect(rounds: Rounds) -> None:
@@ -193,7 +193,7 @@ def test_06_an_emergency_stop_goes_before_all_that_waits_on_every_bus_and_latche
         assert not any(map(asks, (first["arm"], first["stage"])))
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
         for bus in robot.buses.values():
-            assert (bus.latched, is_queued(bus)) == (True, False)
+            assert (bus.latched, has_queued_motion(bus)) == (True, False)
         with pytest.raises(MotorbusError):
             robot.move({"a1": 0.1})
         robot.reset()

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 import motorbus
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal
 from motorbus.errors import Refused
 from motorbus.motion.machine import Machine
@@ -21,7 +21,7 @@ from tests.support.machines import listened, machine, said
 CHANGE = {"node": 2, "new": 3}
 
 
-def noted(bus: BusFace, event: Journal) -> None:
+def noted(bus: BaseBus, event: Journal) -> None:
     """It stands in the journal of this bus."""
     assert bus.journal is not None
     bus.journal(event)

@@ -16,7 +16,7 @@ from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities
 from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.session.sentry import AGAIN, Sentry
+from motorbus.session.sentry import AGAIN
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 
@@ -185,38 +185,6 @@ def test_a_slow_bus_delays_no_other_where_time_is_real() -> None:
             device.set_velocity(1.0)
             moved.set()
             assert (again if held.is_set() else held).wait(60), "nobody has stopped it"
-
-
-@pytest.mark.parametrize(
-    ("error", "options"), [(KeyboardInterrupt, {}), (MemoryError, {}), (MemoryError, REAL)]
-)
-def test_who_watches_outlives_what_falls_into_him(
-    error: type[BaseException], options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where time is virtual whoever pumps is told; in a thread of its own nobody can be."""
-    late, struck = Sentry._late, Event()
-
-    def once(sentry: Sentry, bus: str) -> bool:
-        found = late(sentry, bus)
-        if found and not struck.is_set():
-            struck.set()
-            raise error
-        return found
-
-    monkeypatch.setattr(Sentry, "_late", once)
-    with turned(options=options) as (robot, sims, _):
-        if options:
-            assert struck.wait(60)
-        else:
-            with pytest.raises(error):
-                passes(robot, 1.0)
-        for _ in range(1000):
-            passes(robot, 0.05)
-            if not turning(sims):
-                break
-        assert not turning(sims)
-        assert robot._sentry is not None
-        assert not robot._sentry.busy("arm")
 
 
 @pytest.mark.parametrize("options", [{}, REAL])

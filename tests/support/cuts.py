@@ -69,7 +69,6 @@ class Doomed(MemoryLink):
         else:
             self.left += len(data)
             super().write(data)
-        self._watch()
 
     def _pass(self, data: bytes) -> None:
         """Half of a packet reaches the devices before anything else happens."""
@@ -77,7 +76,8 @@ class Doomed(MemoryLink):
             super().write(data)
             self.advance(0.0)
 
-    def _watch(self) -> None:
+    def _happen(self, moment: float) -> None:
+        super()._happen(moment)
         self.commits.update(commit.moment for commit in self.world.servo.memory.commits)
 
     def read(self, until: float) -> list[Data]:
@@ -91,7 +91,6 @@ class Doomed(MemoryLink):
             self.cut = NEVER
             self._alive()
             return found
-        self._watch()
         return super().read(until)
 
     def strike(self) -> None:

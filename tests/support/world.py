@@ -6,24 +6,19 @@ This file alone knows the engine (`motorbus.bus`). Every other helper and every 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol, cast
 
-from motorbus.bus import verdict
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.crank import crank
+from motorbus.bus.base import BaseBus
+from motorbus.bus.blocking import Bus
 from motorbus.bus.engine import Engine
-from motorbus.bus.face import BusFace
 from motorbus.bus.jobs import RequestJob
-from motorbus.bus.pump import Bus
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.bus.ticket import Flight
 from motorbus.bus.trace import Subscription, TraceRecord
-from motorbus.bus.turns import Turns
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
 from motorbus.core.operation import Alone, Data, Effect, Exchange, Notice, Operation, Runnable, Step, Together
@@ -43,7 +38,6 @@ BIT_TIMES = 33
 """Exchanges after which a CAN bus knows that its link takes bit time."""
 
 Notify = Callable[[object], None]
-AnyBus = BusFace
 
 
 def make_bus(
@@ -63,80 +57,53 @@ def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) 
     return AsyncBus(link, family, interlock=Gate(), report=report)
 
 
-def exclude_echo(bus: AnyBus) -> None:
+def exclude_echo(bus: BaseBus) -> None:
     """Tell the bus that its line has no echo, as the echo test of `motorbus.open` finds out."""
-    _engine(bus).echo.excluded()
+    bus.engine.echo.excluded()
 
 
-def _engine(bus: Any) -> Any:
-    """The engine of a bus, old or new."""
-    return bus.engine if hasattr(bus, "engine") else bus.turns
+def is_idle(bus: BaseBus) -> bool:
+    """Nothing is queued or in flight, and no thread holds the bus."""
+    return bus.engine.idle and not bus.turn.held
 
 
-def is_idle(bus: AnyBus) -> bool:
-    """Nothing is queued or awaited, and no caller holds the bus or its lock."""
-    if hasattr(bus, "engine"):
-        new: Any = bus
-        return bool(new.engine.idle and not new.turn.held)
-    owned: bool = cast("Any", bus.turns.lock)._is_owned()
-    return bus.turns.idle and not owned
+def has_queued_motion(bus: BaseBus) -> bool:
+    """Requests wait to be sent that move something or switch torque."""
+    jobs = [job for job in bus.engine.queue if isinstance(job, RequestJob)]
+    return any(job.request.effect >= Effect.TORQUE for job in jobs)
 
 
-def is_queued(bus: AnyBus) -> bool:
-    """Requests wait to be sent that move something or switch torque; on the old engine, any."""
-    if hasattr(bus, "engine"):
-        return any(job.request.effect >= Effect.TORQUE for job in bus.engine.queue)
-    return bus.turns.waiting
-
-
-def is_listening(bus: AnyBus) -> bool:
+def is_listening(bus: BaseBus) -> bool:
     """The bus sends nothing."""
-    return bool(_engine(bus).listening)
+    return bus.engine.listening
 
 
-def is_stopping(bus: AnyBus) -> bool:
+def is_stopping(bus: BaseBus) -> bool:
     """An emergency stop is being sent."""
-    return bool(_engine(bus).stopping)
+    return bus.engine.stopping
 
 
-def set_rate(bus: AnyBus, rate: int) -> None:
+def set_rate(bus: BaseBus, rate: int) -> None:
     """Let the bus compute with this bit rate."""
-    _engine(bus).rate = rate
+    bus.engine.rate = rate
 
 
-def receiver_of(bus: AnyBus) -> object:
+def receiver_of(bus: BaseBus) -> object:
     """The receiver of the family that cuts the incoming bytes into frames."""
-    return _engine(bus).receiver
+    return bus.engine.receiver
 
 
-class Pending(Protocol):
-    """A request that was queued."""
-
-    @property
-    def done(self) -> bool: ...
-    @property
-    def error(self) -> BaseException | None: ...
-
-
-def queue(bus: AnyBus, exchange: Exchange[Any]) -> Pending:
+def queue(bus: BaseBus, exchange: Exchange[Any]) -> RequestJob:
     """Queue a request without waiting for its reply."""
-    if hasattr(bus, "engine"):
-        job = RequestJob(exchange)
-        bus.engine.submit(job, bus.link.now())
-        return job
-    flight = Flight(exchange)
-    bus.turns.submit(flight, bus.link.now())
-    return flight
+    job = RequestJob(exchange)
+    bus.engine.submit(job, bus.link.now())
+    return job
 
 
-def turn(bus: AnyBus, seconds: float) -> None:
+def turn(bus: BaseBus, seconds: float) -> None:
     """Send what may be sent, and receive for at most so long."""
-    if hasattr(bus, "engine"):
-        new: Any = bus
-        new.send()
-        new.receive(bus.link.now() + seconds)
-        return
-    crank(bus.link, bus.turns, bus.link.now() + seconds)
+    bus.send()
+    bus.receive(bus.link.now() + seconds)
 
 
 class Tries:
@@ -146,27 +113,16 @@ class Tries:
     """s from the request to its reply."""
 
     def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
-        self.is_new = os.environ.get("MOTORBUS_ENGINE") == "new"
-        self.turns: Any = Engine(family, rate=rate) if self.is_new else Turns(family, rate=rate)
+        self.engine = Engine(family, rate=rate)
         if not echo:
-            self.turns.echo.excluded()
+            self.engine.echo.excluded()
 
     def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
-        if self.is_new:
-            return self._answered(exchange, data)
-        flight = Flight(exchange)
-        if self.turns.short(flight, 0.0) is not None:
-            self.turns.feed(data, self.SOON)
-            self.turns.expire(flight.deadline)
-        value = flight.value if flight.done and flight.error is None else None
-        return value, verdict.fault(flight)
-
-    def _answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
         attempt = Attempt(exchange, None)
-        self.turns.begin(attempt, 0.0)
-        self.turns.feed(data, self.SOON)
-        self.turns.expire(attempt.deadline)
+        self.engine.begin(attempt, 0.0)
+        self.engine.feed(data, self.SOON)
+        self.engine.expire(attempt.deadline)
         return None if attempt.fault else attempt.answer(self.SOON), attempt.failure()
 
 

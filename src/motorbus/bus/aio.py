@@ -1,76 +1,82 @@
-"""The async pump: carries out operations on an event loop. Policy is in `turns`, as for the blocking pump.
-
-Over a link with virtual time whoever awaits turns the crank; elsewhere `watch` learns when there is something to do.
-"""
+"""The bus on an asyncio event loop: procedures of all tasks share one engine."""
 
 from __future__ import annotations
 
 import asyncio
-import os
-from functools import cached_property
+import contextlib
+import signal
+from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, Self, TypeVar
+from threading import get_ident
+from typing import Any, Final, Generic, Self, TypeVar
 
-from motorbus.bus.crank import crank
-from motorbus.bus.face import BusFace
-from motorbus.bus.glide import glide, let_go
-from motorbus.bus.interruption import closed, foremost
-from motorbus.bus.run import Notify, Run
-from motorbus.bus.watch import Watch, ringer
-from motorbus.core.operation import UNLIKE, Closed, Exchange, Runnable
+from motorbus.bus.base import IDLE, BaseBus
+from motorbus.bus.interrupts import DEFAULTS, SIGNALS
+from motorbus.bus.tasks import Notify, TaskTree
+from motorbus.core.operation import Runnable
+from motorbus.errors import MotorbusError
+from motorbus.link.memory import MemoryLink
 
 T = TypeVar("T")
 
+LONGEST: Final = 3600.0
+"""s; the longest time that a task waits before it looks again."""
+LOOK: Final = 0.001
+"""s between two looks at a link without descriptor."""
 
-class AsyncBus(BusFace):
-    """An open bus on the running event loop. Any number of tasks may call `run`; use it in an `async with`."""
 
-    @cached_property
-    def watch(self) -> Watch:
-        return Watch(self.link, self.turns)
+class AsyncBus(BaseBus):
+    """An open bus on the running event loop. Any number of its tasks may call `run`."""
 
-    async def run(self, operation: Runnable[T], report: Notify | None = None) -> T:
-        """Carry out an operation as `Bus.run` does. A cancelled task first cleans up, then raises CancelledError."""
-        if isinstance(operation, Exchange) and (value := await glide(self, operation)) is not UNLIKE:
-            return value
-        news = asyncio.Event()
-        run = Run(self.turns, operation, now=self.link.now, report=self.listener(report), wake=ringer(news))
-        try:
-            try:
-                while not run.advance():
-                    await self._turn(news)
-            except BaseException as interruption:
-                await self._clean_up(run, news, interruption)
-        except BaseException as interruption:  # a second one fell between the first and what deals with it
-            await self._clean_up(run, news, interruption)
-        return run.result()
+    _loop: asyncio.AbstractEventLoop | None = None
+    _descriptor: int | None = None
+    _timer: asyncio.TimerHandle | None = None
 
-    async def _clean_up(self, run: Run[Any], news: asyncio.Event, caught: BaseException) -> None:
-        """Let what was interrupted come to its end; one more interrupt meanwhile makes it hurry."""
-        at_once = False
-        while True:
-            try:
-                if not (at_once := at_once or closed(caught, run.around)):
-                    let_go(self.turns.lock)
-                run.interrupt(Closed() if isinstance(caught, GeneratorExit) else caught)
-                while not run.advance():
-                    await self._turn(news) if not at_once else crank(self.link, self.turns, inf)
-                break
-            except BaseException as interruption:
-                caught = interruption
-        if at_once:
-            raise foremost(caught, run.told())
+    async def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
+        """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
+        part = _Part(self, procedure, report, asyncio.Event())
+        await _run_parts([part])
+        return part.tree.result()
 
-    async def _turn(self, news: asyncio.Event) -> None:
+    def watch(self) -> None:
+        """Have `_look` called when data has come, or at the next deadline."""
         if self.link.virtual:
-            crank(self.link, self.turns, inf)
-            await asyncio.sleep(0)
             return
-        await self.watch.turn(news)
+        loop = asyncio.get_running_loop()
+        descriptor = self.link.fileno()
+        if loop is not self._loop or descriptor != self._descriptor:
+            self._unwatch()
+            self._loop, self._descriptor = loop, descriptor
+            if descriptor is not None and descriptor >= 0:
+                loop.add_reader(descriptor, self._look)
+        seconds = self.engine.next_deadline() - self.now()
+        if self.engine.gone is not None:
+            seconds = min(seconds, IDLE)
+        elif descriptor is None and not (self.engine.idle and not self.engine.listeners):
+            seconds = min(seconds, LOOK)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if seconds < inf:
+            self._timer = loop.call_later(max(0.0, seconds), self._look)
+
+    def _look(self) -> None:
+        with self.turn:
+            self.receive(-inf)
+            self.send()
+            self.watch()
+
+    def _unwatch(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._loop is not None and self._descriptor is not None and not self._loop.is_closed():
+            self._loop.remove_reader(self._descriptor)
+        self._loop = self._descriptor = None
 
     async def close(self) -> None:
-        """Give the port back. Nothing is sent to the devices: they go on doing what they were told."""
-        self.watch.close()
+        """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
+        self._unwatch()
         self._hang_up()
 
     async def __aenter__(self) -> Self:
@@ -80,7 +86,144 @@ class AsyncBus(BusFace):
         await self.close()
 
 
-if os.environ.get("MOTORBUS_ENGINE") == "new":  # until every part runs on it
-    from motorbus.bus import asynchronous
+async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus, Any]:
+    """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
 
-    AsyncBus = asynchronous.AsyncBus  # type: ignore[assignment, misc]
+    Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
+    """
+    news = asyncio.Event()
+    parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
+    await _run_parts(parts)
+    return {part.bus: part.outcome() for part in parts}
+
+
+class _Part(Generic[T]):
+    """A procedure on one bus; `news` is set when a tree can go on."""
+
+    def __init__(
+        self, bus: AsyncBus, procedure: Runnable[T], report: Notify | None, news: asyncio.Event
+    ) -> None:
+        bus.check_thread()
+        self.bus = bus
+        self.news = news
+        self._loop = asyncio.get_running_loop()
+        self._thread = get_ident()
+        self.tree: TaskTree[T] = TaskTree(
+            bus.engine, procedure, now=bus.now, report=bus.listener(report), settled=self._settled
+        )
+
+    def _settled(self) -> None:
+        self.news.set()
+        if get_ident() != self._thread:  # the stop thread: wake the loop
+            self._loop.call_soon_threadsafe(self.news.set)
+
+    def outcome(self) -> Any:
+        """The value or the MotorbusError; raises any other error."""
+        error = self.tree.error()
+        if error is None or isinstance(error, MotorbusError):
+            return self.tree.root.value if error is None else error
+        raise error
+
+    def advance(self) -> bool:
+        """Step the tree and send, until it waits for something; True when it has ended."""
+        with self.bus.turn:
+            while not self.tree.advance():
+                self.news.clear()
+                self.bus.send()
+                if not self.news.is_set():
+                    self.bus.watch()
+                    return False
+        return True
+
+    def receive(self, until: float) -> None:
+        with self.bus.turn:
+            self.bus.receive(until)
+
+    def next_event(self) -> float:
+        """When something happens on this simulated bus, in s of its clock."""
+        link = self.bus.link
+        due = link.due() if isinstance(link, MemoryLink) else inf
+        moment = min(self.tree.next_moment(), self.bus.engine.next_deadline(), due)
+        return max(moment, link.now())
+
+    def cancel(self, error: BaseException) -> None:
+        if not self.tree.root.finished:
+            with self.bus.turn:
+                self.tree.cancel(error)
+
+    def drop(self) -> None:
+        with self.bus.turn:
+            self.tree.drop()
+
+
+async def _run_parts(parts: Sequence[_Part[Any]]) -> None:
+    """Run all trees to their end. A cancellation, or an error that is none of ours, cancels them; they clean up."""
+    try:
+        while True:
+            try:
+                going = [part for part in parts if not part.advance()]
+                if not going:
+                    return
+                for part in parts:
+                    error = part.tree.root.error
+                    if part.tree.cancellation is None and not isinstance(error, MotorbusError | None):
+                        part.tree.cancellation = error
+                        raise error
+                await _wait(going)
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                for part in parts:
+                    part.cancel(error)
+    except GeneratorExit:  # the coroutine was closed: nothing is sent any more
+        for part in parts:
+            part.drop()
+        raise
+
+
+async def _wait(parts: Sequence[_Part[Any]]) -> None:
+    """Wait until one of these can go on."""
+    if all(part.bus.link.virtual for part in parts):
+        moment = min(part.next_event() for part in parts)
+        for part in sorted(parts, key=_Part.next_event):
+            part.receive(moment if moment < inf else part.bus.now() + IDLE)
+        await asyncio.sleep(0)
+        return
+    news = parts[0].news
+    seconds = min(max(0.0, part.tree.next_moment() - part.bus.now()) for part in parts)
+    timer = asyncio.get_running_loop().call_later(min(seconds, LONGEST), news.set)
+    try:
+        await news.wait()
+    finally:
+        timer.cancel()
+
+
+class TaskSignals:
+    """On an event loop SIGTERM and SIGHUP cancel the task that makes this; `end` raises SystemExit for them.
+
+    Ctrl-C is left to the event loop. Needs the main thread, and default handlers.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._task = asyncio.current_task()
+        self._code = 0
+        self._added: list[int] = []
+        for number in SIGNALS:
+            if number != signal.SIGINT and signal.getsignal(number) in DEFAULTS:
+                with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+                    self._loop.add_signal_handler(number, self._cancel, number)
+                    self._added.append(number)
+
+    def _cancel(self, number: int) -> None:
+        self._code = self._code or 128 + number
+        if self._task is not None:
+            self._task.cancel()
+
+    def end(self) -> None:
+        """Give the default handlers back. Raises SystemExit if a signal came."""
+        for number in self._added:
+            self._loop.remove_signal_handler(number)
+        self._added.clear()
+        if self._code:
+            raise SystemExit(self._code)

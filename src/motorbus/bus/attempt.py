@@ -19,12 +19,12 @@ class Attempt:
 
     `job` is None for an attempt whose caller no longer waits. `excluded` are nodes of a group that this attempt does
     not wait for, or whose reply was damaged. `fault` is why the attempt failed, "" while it has not. `air` is its time
-    on the wire, `beside` the number of attempts on other lanes that its deadline allows for.
+    on the wire, `competitors` the number of attempts on other lanes that its deadline allows for.
     """
 
     __slots__ = (
         "air",
-        "beside",
+        "competitors",
         "complete",
         "deadline",
         "echo_excluded",
@@ -54,7 +54,7 @@ class Attempt:
         self.sent_at = 0.0
         self.deadline = inf
         self.air = 0.0
-        self.beside = 0
+        self.competitors = 0
         self.replies: dict[int, Reply] = {}
         self.noise: list[tuple[str, bytes]] = []
         self.fault = ""
@@ -94,7 +94,7 @@ class Attempt:
         """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""
         if self.complete:
             self.surplus = True
-        elif self.replies:
+        elif self.replies and self.request.replies is not ANY:
             self.exclude(self.replies[max(self.replies)])
         self.noise.append((fault, data[:64]))
         del self.noise[:-NOISE_KEPT]

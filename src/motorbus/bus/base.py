@@ -9,12 +9,12 @@ from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
-from motorbus.bus.emergency import EmergencyStop
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.jobs import RateJob
 from motorbus.bus.positions import Reading
 from motorbus.bus.statistics import Statistics
+from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import Feed, TraceRecord
@@ -23,6 +23,7 @@ from motorbus.core.family import Family, Readdressed
 from motorbus.core.operation import Exchange, Journal, Notice, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
+from motorbus.link.memory import MemoryLink
 
 IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
@@ -67,8 +68,8 @@ class BaseBus:
         self.interlock = interlock
         self._reconnects = isinstance(link, Renewable)
         self._on_reconnect: list[Callable[[], None]] = []
-        self.beside: list[TaskTree[Any]] = []
-        """Procedures that are stepped whenever the bus is used; see `Beside`."""
+        self.background: list[TaskTree[Any]] = []
+        """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
         if stop_socket is not None:
             self.stopper.start()
 
@@ -86,14 +87,24 @@ class BaseBus:
         """s on the clock of the link."""
         return self.link.now()
 
+    @property
+    def waits_for_stop(self) -> bool:
+        """An emergency stop in another thread needs the turn, and nothing is in flight."""
+        return self.engine.stopping and not self.engine.in_flight and not self.link.virtual
+
+    def check_thread(self) -> None:
+        """Raise RequestError for a second thread on a simulated bus in virtual time; an emergency stop may."""
+        if isinstance(self.link, MemoryLink) and self.link.virtual:
+            self.link.clock.check_thread()
+
     # -- the link ----------------------------------------------------------------------------------------------
 
     def send(self) -> None:
         """Write all that may be sent now. The caller holds the turn; a lost link fails all requests."""
         engine, link = self.engine, self.link
-        for tree in tuple(self.beside):
-            if tree.advance() and tree in self.beside:
-                self.beside.remove(tree)
+        for tree in tuple(self.background):
+            if tree.advance() and tree in self.background:
+                self.background.remove(tree)
         if engine.gone is not None and not self._reconnect():
             return
         try:
@@ -115,7 +126,7 @@ class BaseBus:
         Only what was due before this look is overdue after it: the reply may be in the buffer of a host that was late.
         """
         engine, link = self.engine, self.link
-        until = min([until, *(tree.next_moment() for tree in self.beside)])
+        until = min([until, *(tree.next_moment() for tree in self.background)])
         if engine.gone is not None:
             self._wait_without_link(until)
             return
@@ -259,7 +270,7 @@ class BaseBus:
     def attach(self, gate: Any) -> None:
         """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
         positions = self.engine.positions
-        gate.watch(positions, self.link.now, positions.stop_count, positions.accepted_count, None)
+        gate.watch(positions, self.link.now, positions.stop_count, positions.accepted_count)
         self.interlock = gate
         self.on_reconnect(gate.forget)
 

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus
-from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN
+from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED
@@ -31,6 +31,8 @@ LOOK: Final = 0.001
 class Bus(BaseBus):
     """An open bus. Any number of threads may call `run`; the holder of `turn` alone has requests in flight."""
 
+    _defers_signals = False
+
     def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
         """Run a procedure and return its value; `report` gets its events.
 
@@ -45,6 +47,8 @@ class Bus(BaseBus):
     def transact(self, request: Exchange[Any]) -> Any:
         """Carry out one request."""
         engine, link, turn = self.engine, self.link, self.turn
+        if link.virtual:
+            self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
         stops = engine.positions.stops_for(request) if request.effect in GATED else None
         signals.depth += 1
@@ -96,7 +100,7 @@ class Bus(BaseBus):
         finally:
             signals.depth -= 1
             if signals.pending is not None and not signals.depth:
-                raise signals.take()  # type: ignore[misc]
+                signals.raise_pending()
 
     def _carry_out(self, request: Exchange[Any], stops: int | None) -> Any:
         """One request by the general path. The caller holds the turn."""
@@ -123,7 +127,12 @@ class Bus(BaseBus):
     def _finish(self, job: RequestJob) -> Any:
         while not job.done:
             self.send()
-            if not job.done:
+            if job.done:
+                break
+            if self.waits_for_stop:
+                self.turn.release()
+                self.turn.acquire(job.priority)
+            else:
                 self.receive(inf)
         return job.result()
 
@@ -211,9 +220,18 @@ class Bus(BaseBus):
                 return value
         return self._continue(prepared, chunks)
 
+    def defer_signals(self) -> None:
+        """Raise signals at the end of a request only, until this bus is closed; see `motorbus.bus.interrupts`."""
+        if not self._defers_signals:
+            self._defers_signals = True
+            INTERRUPTS.install()
+
     def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
         self._hang_up()
+        if self._defers_signals:
+            self._defers_signals = False
+            INTERRUPTS.uninstall()
 
     def __enter__(self) -> Self:
         return self
@@ -234,16 +252,10 @@ def _check_requests(requests: Sequence[Any]) -> None:
 
 def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None) -> T:
     """Run a procedure in this thread, also on a bus of an event loop; see `Bus.run`."""
-    signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-    signals.depth += 1
-    try:
+    with interrupts():
         part = _Part(bus, procedure, report)
         _run_parts([part])
         return part.tree.result()
-    finally:
-        signals.depth -= 1
-        if signals.pending is not None and not signals.depth:
-            raise signals.take()  # type: ignore[misc]
 
 
 def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
@@ -251,22 +263,17 @@ def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
 
     Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
     """
-    signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-    signals.depth += 1
-    try:
+    with interrupts():
         parts = [_Part(bus, procedure, None) for bus, procedure in procedures.items()]
         _run_parts(parts)
         return {part.bus: part.outcome() for part in parts}
-    finally:
-        signals.depth -= 1
-        if signals.pending is not None and not signals.depth:
-            raise signals.take()  # type: ignore[misc]
 
 
 class _Part(Generic[T]):
     """A procedure on one bus; `news` is set when its tree can go on."""
 
     def __init__(self, bus: BaseBus, procedure: Runnable[T], report: Notify | None) -> None:
+        bus.check_thread()
         self.bus = bus
         self.news = True
         self.sleeps = False
@@ -296,7 +303,8 @@ class _Part(Generic[T]):
     def release_turn(self) -> None:
         """Let other threads use the bus, unless a request is in flight or the bus is used exclusively."""
         engine = self.bus.engine
-        if self.holds_turn and engine.idle and engine.exclusive is None:
+        free = engine.idle and engine.exclusive is None and not engine.listeners
+        if self.holds_turn and (free or self.bus.waits_for_stop):
             self.holds_turn = False
             self.bus.turn.release()
 
@@ -319,7 +327,9 @@ class _Part(Generic[T]):
     def wait(self) -> None:
         """Wait until something comes, a deadline, or a moment that the tree waits for."""
         bus, moment = self.bus, self.tree.next_moment()
-        if self.only_sleeps and not bus.link.virtual:
+        if bus.waits_for_stop:
+            self.release_turn()
+        elif self.only_sleeps and not bus.link.virtual:
             self.release_turn()
             self._sleep(min(moment - bus.link.now(), IDLE))
         else:
@@ -341,7 +351,7 @@ class _Part(Generic[T]):
 
 def _run_parts(parts: Sequence[_Part[Any]]) -> None:
     """Run all trees to their end. An interrupt, or an error that is none of ours, cancels them; they clean up."""
-    signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+    signals = interrupts()
     try:
         while True:
             try:
@@ -350,8 +360,7 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                     return
                 _raise_interrupt(parts)
                 signals.waiting = all(part.bus.engine.idle for part in going)
-                if (error := signals.take()) is not None:
-                    raise error
+                signals.raise_pending()
                 _wait(going)
             except BaseException as error:
                 for part in parts:
@@ -402,6 +411,7 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
     """One wait on the descriptors of all links, then take what has come."""
     waiter, seconds = poll(), IDLE
     for part in parts:
+        part.release_turn()
         descriptor = part.bus.link.fileno()
         if descriptor is None:
             seconds = min(seconds, LOOK)
@@ -411,5 +421,6 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
         seconds = min(seconds, max(0.0, moment - part.bus.link.now()))
     waiter.poll(1000 * seconds)
     for part in parts:
-        part.bus.receive(-inf)
+        if part.holds_turn:
+            part.bus.receive(-inf)
         part.news = True

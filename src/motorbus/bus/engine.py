@@ -32,6 +32,7 @@ from motorbus.core.operation import (
     Answer,
     Data,
     Due,
+    Effect,
     Event,
     Exchange,
     Noise,
@@ -46,6 +47,8 @@ T = TypeVar("T")
 
 MARGIN: Final = {Timeout.SCAN: 0.002, Timeout.REPLY: 0.02, Timeout.STORE: 0.02}
 """s that the host may be late; short for a scan, where silence is the usual answer."""
+DIRECT: Final = 0.001
+"""s; a link of less latency has no adapter that holds data back."""
 STOP_DELAY: Final = 0.003
 """s that a stop waits for the turn beyond the air time of what is in flight."""
 UNCOUNTED: Final = 64
@@ -89,7 +92,7 @@ class Engine:
         self.exclusive: object = None
         self.latched = self.stopping = False
         self.latched_by = ""
-        self.losses = 0
+        self.losses = self.latches = 0
         self.gone: LinkLost | None = None
         self.loss: LinkLost | None = None
         """The last one; `gone` is None again when the port is back."""
@@ -133,7 +136,13 @@ class Engine:
         return self.family.air_time(request, self._rate)
 
     def reply_timeout(self, request: Exchange[Any]) -> float:
-        """s from the end of the air time to the deadline."""
+        """s from the end of the air time to the deadline.
+
+        A scan waits for what adapters hold back; where there is none, only as long as a device needs.
+        """
+        if request.timeout is Timeout.SCAN and self._latency < DIRECT:
+            plain: Exchange[Answer] = Exchange(request.request, request.replies)
+            return min(self.family.turnaround(plain), self.family.turnaround(request)) + self._latency
         return self.family.turnaround(request) + self._latency + MARGIN[request.timeout]
 
     @property
@@ -274,7 +283,9 @@ class Engine:
         except MotorbusError as error:
             job.settle(error=error)
             return None
-        self.begin(Attempt(request, job, step.excluded, is_probe=step.is_probe), now)
+        attempt = Attempt(request, job, step.excluded, is_probe=step.is_probe)
+        attempt.echo_excluded = step.after_echo and self.echo.present is False
+        self.begin(attempt, now)
         return request.request
 
     def _earliest(self, step: Send | Wait) -> float:
@@ -295,6 +306,8 @@ class Engine:
             raise failures.latched(self.latched_by)
         if moves(request):
             if job.stops is not None and self.positions.stops_for(request) != job.stops:
+                raise failures.stopped()
+            if job.latches is not None and job.latches != self.latches:
                 raise failures.stopped()
             if self.losses != job.losses:
                 raise failures.outlived(request)
@@ -317,7 +330,6 @@ class Engine:
                 self._take(event, now)
         start, air = max(now, self.free_at), self.air_time(request)
         attempt.sent_at = now
-        attempt.echo_excluded = attempt.echo_excluded and self.echo.present is False
         if request.replies != ():
             self.sync.mark_sent(request, now)
             attempt.deadline = start + air + self.reply_timeout(request)
@@ -355,12 +367,12 @@ class Engine:
         if self.window == 1:
             return
         attempt.air = air
-        attempt.beside = len(self.in_flight)
+        attempt.competitors = len(self.in_flight)
         for other in self.in_flight.values():
             attempt.deadline += other.air
-            if other.beside < self.window - 1 and other.job is not None:
+            if other.competitors < self.window - 1 and other.job is not None:
                 other.deadline += air
-                other.beside += 1
+                other.competitors += 1
 
     def _stop_waiting(self, stop: Exchange[Any]) -> None:
         """A stop is queued: requests that would move its nodes end, also one in flight that may be repeated."""
@@ -680,6 +692,7 @@ class Engine:
     def announce_stop(self, by: str) -> None:
         """Refuse motion and torque from now on; from any thread. `by` of the first stop counts until `reset`."""
         self.latched_by = self.latched_by if self.latched else by
+        self.latches += 1
         self.latched = self.stopping = True
         self.ready = False
 
@@ -691,7 +704,7 @@ class Engine:
     def latch(self, now: float, by: str) -> None:
         """Emergency stop: end motion that waits and what is in flight, refuse motion until `reset`.
 
-        Reads and the end of a guarded change wait and follow the stop.
+        Reads that wait, reads in flight on a full-duplex line, and the end of a guarded change follow the stop.
         """
         self.announce_stop(by)
         error = failures.latched(self.latched_by)
@@ -702,9 +715,14 @@ class Engine:
             end(error)
         for attempt in self.in_flight.values():
             attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
-            if attempt.job is not None:
-                job, attempt.job = attempt.job, None
-                job.settle(error=error)
+            caller, attempt.job = attempt.job, None
+            if caller is None:
+                continue
+            if self.window > 1 and caller.request.repeatable and caller.request.effect is Effect.NONE:
+                caller.policy, caller.step = carry_out(self, caller.request), None
+                insort(self.queue, caller)
+            else:
+                caller.settle(error=error)
 
     def _remaining(self, attempt: Attempt, now: float) -> float:
         """s that a stop waits for what is on the line: a reply, or on a full-duplex line the rest of a request."""

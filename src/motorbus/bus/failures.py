@@ -130,11 +130,11 @@ def listen_only(request: Exchange[Any]) -> RequestError:
     )
 
 
-def outlived(request: Exchange[Any]) -> LinkLost:
+def outlived(request: Exchange[Any] | None = None) -> LinkLost:
     """The error for a motion request of a procedure that began before the port was lost."""
     return LinkLost(
         "the port was lost after this procedure began, so it moves nothing any more",
-        sent=request.request,
+        sent=b"" if request is None else request.request,
         cause="devices may have restarted or moved meanwhile",
         advice="start it again if it is still wanted; nothing was sent",
     )

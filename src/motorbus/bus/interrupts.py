@@ -1,20 +1,24 @@
 """Signals that end a program are raised at the boundary of a request, never within one.
 
-SIGINT, SIGTERM and SIGHUP get a handler of ours at `open`, in the main thread, where Python's default handler is
-installed. The first signal is raised when the request in flight has ended; a procedure that is in a guarded change is
-cancelled and cleans up first. A second signal shortens that clean-up; a third one goes to the default handler.
+SIGINT, SIGTERM and SIGHUP get a handler of ours when a bus is opened in the main thread, where Python's default
+handler is installed. The first signal is raised when the request in flight has ended; a procedure that is in a guarded
+change is cancelled and cleans up first. A second signal shortens that clean-up; a third one goes to the default
+handler, unless the first came only just now.
 """
 
 from __future__ import annotations
 
 import signal
 from threading import current_thread, get_ident, main_thread
+from time import monotonic
 from types import FrameType
 from typing import Any, Final
 
 SIGNALS: Final = tuple(
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
+DEFERRED: Final = 0.25
+"""s for which any number of signals is deferred."""
 DEFAULTS: Final = (signal.SIG_DFL, signal.default_int_handler)
 
 
@@ -22,7 +26,9 @@ class Interrupts:
     """Deferred signals of the main thread.
 
     `depth` > 0 while a bus is in use; a signal is then kept in `pending`, unless the bus is `waiting` idle, which the
-    signal ends.
+    signal ends. As a context manager it defers the signals of a block. `count` is the number of signals that have come
+    one after the other. `cleanups` is the number of `with` blocks that stop motors at their end: once a signal has been
+    raised in one of them, the next is kept for that end.
     """
 
     def __init__(self) -> None:
@@ -30,8 +36,10 @@ class Interrupts:
         self.pending: BaseException | None = None
         self.count = 0
         self.waiting = False
-        self._installed: list[int] = []
+        self.cleanups = 0
+        self._replaced: dict[int, Any] = {}
         self._opened = 0
+        self._first_at = 0.0
 
     def install(self) -> None:
         """Take over the default handlers, until `uninstall` was called as often."""
@@ -39,9 +47,9 @@ class Interrupts:
             return
         self._opened += 1
         for number in SIGNALS if self._opened == 1 else ():
-            if signal.getsignal(number) in DEFAULTS:
+            if (handler := signal.getsignal(number)) in DEFAULTS:
+                self._replaced[number] = handler
                 signal.signal(number, self._handle)
-                self._installed.append(number)
 
     def uninstall(self) -> None:
         """Give the default handlers back when the last bus is closed."""
@@ -49,31 +57,46 @@ class Interrupts:
             return
         self._opened -= 1
         if self._opened == 0:
-            for number in self._installed:
+            for number, handler in self._replaced.items():
                 if signal.getsignal(number) == self._handle:
-                    signal.signal(number, _default(number))
-            self._installed.clear()
+                    signal.signal(number, handler)
+            self._replaced.clear()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        self.count = self.count + 1 if self.depth else 1
-        if self.count > 2:
-            signal.signal(number, _default(number))
+        self.count = self.count + 1 if self.depth or self.cleanups else 1
+        if self.count == 1:
+            self._first_at = monotonic()
+        enough = self.count > 2 and monotonic() > self._first_at + DEFERRED
+        default = self._replaced.get(number, signal.default_int_handler)
+        is_python = default is signal.default_int_handler
+        if enough and not is_python:
+            signal.signal(number, default)
             signal.raise_signal(number)
-            return
-        error = KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
-        if not self.depth or self.waiting:
+        error = KeyboardInterrupt() if is_python else SystemExit(128 + number)
+        if self.waiting or enough or (not self.depth and self.count == 1):
             self.waiting = False
             raise error
         self.pending = error
 
-    def take(self) -> BaseException | None:
-        """The signal that waits to be raised."""
-        pending, self.pending = self.pending, None
-        return pending
+    def raise_pending(self) -> None:
+        """Raise the signal that waits, if there is one."""
+        if self.pending is None:
+            return
+        error, self.pending = self.pending, None
+        if not self.depth:
+            self.count = 1 if self.cleanups else 0
+        raise error
 
+    def __enter__(self) -> Interrupts:
+        self.depth += 1
+        return self
 
-def _default(number: int) -> Any:
-    return signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        self.depth -= 1
+        if not self.depth:
+            self.raise_pending()
+            if kind is None:
+                self.count = 0
 
 
 INTERRUPTS: Final = Interrupts()

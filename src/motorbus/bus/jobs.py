@@ -11,12 +11,14 @@ from motorbus.core.operation import Answer, Exchange, Rank, Tune
 class Send(NamedTuple):
     """Step of a policy: send this request; the engine gives the finished attempt.
 
-    `excluded` are nodes of a group that are not waited for.
+    `excluded` are nodes of a group that are not waited for. `after_echo`: the last attempt failed by an echo, so this
+    one takes a reply that equals a request if a probe has excluded an echo since.
     """
 
     request: Exchange[Any]
     excluded: tuple[int, ...] = ()
     is_probe: bool = False
+    after_echo: bool = False
 
 
 class Wait(NamedTuple):
@@ -67,8 +69,8 @@ class Job:
 class RequestJob(Job):
     """A request, over all its attempts.
 
-    `step` is what its policy waits for. `stops` is how many stops of its nodes had been sent when it was called; None
-    where none can come between.
+    `step` is what its policy waits for. `stops` is how many stops of its nodes had been sent when it was called,
+    `latches` how many emergency stops when its procedure began; None where none can come between.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class RequestJob(Job):
         self.policy: Policy | None = None
         self.step: Send | Wait | None = None
         self.stops: int | None = None
+        self.latches: int | None = None
 
 
 class RateJob(Job):

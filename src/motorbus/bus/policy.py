@@ -23,7 +23,7 @@ class Context(Protocol):
     sync: SyncTable
     statistics: Statistics
     time: float
-    latched: bool
+    stopping: bool
     diagnosis: Callable[[], str]
 
     @property
@@ -46,7 +46,7 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
                 if len(request.replies) == 1:  # type: ignore[arg-type]  # never ANY here
                     raise _error(engine, request, failed, tries, sent)
                 excluded += (node,)
-        attempt: Attempt | None = yield Send(engine.alternate(request), excluded)
+        attempt: Attempt | None = yield Send(engine.alternate(request), excluded, after_echo=fault == "echo")
         if attempt is None:  # a node has come out of sync before this could be sent
             continue
         sent = True
@@ -54,7 +54,7 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
         if not fault:
             return attempt.answer(min(engine.time, attempt.deadline))
         tries += 1
-        if not _may_repeat(request, fault) or tries > RETRIES or engine.latched:
+        if not _may_repeat(request, fault) or tries > RETRIES or engine.stopping:
             raise _error(engine, request, attempt, tries, sent)
         engine.statistics.retried(request.replies)
 

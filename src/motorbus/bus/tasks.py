@@ -91,7 +91,10 @@ class TaskTree(Generic[T]):
         self.report = report
         self.settled = settled
         self.losses = engine.losses
+        self.latches = engine.latches
         self.cancellation: BaseException | None = None
+        self.interruption: BaseException | None = None
+        """Raised by one of several children, and no Exception: it cancels the others."""
         self.deadline = inf
         self.extension = 0.0
         self.timers: list[Timer] = []
@@ -113,7 +116,8 @@ class TaskTree(Generic[T]):
                 if task.job is not None:
                     self.engine.cancel(task.job)
         while self._step_tree(self.root):
-            pass
+            if self.interruption is not None and self.cancellation is None:
+                self.cancel(self.interruption)
         return self.root.finished
 
     def next_moment(self) -> float:
@@ -173,6 +177,8 @@ class TaskTree(Generic[T]):
 
     def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
         task.value, task.error, task.finished = value, error, True
+        if error is not None and not isinstance(error, Exception) and task is not self.root:
+            self.interruption = error
         if task is self.root and self.end_sleeps in self.engine.end_sleeps:
             self.engine.end_sleeps.remove(self.end_sleeps)
         if task.claims:
@@ -241,11 +247,12 @@ class TaskTree(Generic[T]):
             child.checked = True
             task.children, task.joins_one = [child], True
             return
-        task.job = RequestJob(request, task.owner, self.settled, self.losses)
+        task.job = job = RequestJob(request, task.owner, self.settled, self.losses)
+        job.latches = self.latches
         if self.now() >= self.deadline:
-            task.job.settle(error=failures.abandoned())
+            job.settle(error=failures.abandoned())
         else:
-            self.engine.submit(task.job, self.now())
+            self.engine.submit(job, self.now())
 
     def _report(self, task: Task, event: object) -> None:
         """The report has been handed over before the next step; what it raises is raised in the task."""

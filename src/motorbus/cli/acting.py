@@ -12,7 +12,7 @@ from motorbus.cli.identity import carried_out
 from motorbus.cli.target import face, takes
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
 
 

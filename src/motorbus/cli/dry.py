@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Explanation
     from motorbus.core.operation import Data, Runnable
@@ -168,7 +168,7 @@ class DryBus:
         for question in self._bus.required_reads(exchange):
             self._bus.run(question)
         with self._bus.lock:
-            self.interlock(exchange)
+            self.interlock.check(exchange, self._bus.now())
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
             self._written.add(_EVERYONE)

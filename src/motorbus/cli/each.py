@@ -16,7 +16,7 @@ from motorbus.errors import LinkError, MotorbusError, PortBusy
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
 
     Look = Callable[[Sequence[dict[str, Any]], Mapping[str, str], Output], list[MotorbusError]]

@@ -21,7 +21,7 @@ from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, Req
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.bus.stop_socket import StopOutcome
     from motorbus.core.family import Family
     from motorbus.link.errors import Owner

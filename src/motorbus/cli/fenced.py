@@ -16,11 +16,11 @@ from motorbus.errors import RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from motorbus.bus.face import BusFace
+    from motorbus.bus.base import BaseBus
     from motorbus.cli.output import Output
 
 
-def fenced(bus: BusFace, address: str, output: Output) -> None:
+def fenced(bus: BaseBus, address: str, output: Output) -> None:
     """Set the bounds of the axes that the machine file has on this bus, and put those of them at fault whose guarded
     change was cut off; nothing is sent.
 
@@ -45,7 +45,7 @@ def fenced(bus: BusFace, address: str, output: Output) -> None:
     distrust_on(bus)
 
 
-def pace(bus: BusFace, nodes: Iterable[int]) -> float | None:
+def pace(bus: BaseBus, nodes: Iterable[int]) -> float | None:
     """The greatest speed (rad/s) that the file allows to all of these; None where it bounds none of them."""
     guards = getattr(bus.interlock, "guards", {})
     speeds = [guards[node].bounds.speed for node in nodes if node in guards]

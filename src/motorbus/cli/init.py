@@ -25,7 +25,7 @@ from motorbus.motion.machine.model import NAME
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.cli.target import Target
     from motorbus.core.family import Found, Identity

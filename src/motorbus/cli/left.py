@@ -14,7 +14,7 @@ from motorbus.session.robot import Robot
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.motion.axis import Axis
     from motorbus.motion.leaving import Leaving

@@ -35,16 +35,13 @@ An overrun is a cycle that was not over when the next one was due; a slot of
 the grid that went by as a whole is skipped. Neither is ever made up for. Late
 is a cycle by the time from its slot to its first byte. Without --rate the loop
 is as quick as 80% of what the slowest bus allows; `motorbus budget` says what
-that is. With --ahead, on one serial bus, the wire does not wait for the
-program that leads: for a loop near the limit of its wire. Ends with exit code
-6 when readings were lost.
+that is. Ends with exit code 6 when readings were lost.
 
 Examples:
 
     motorbus loop-stats
     motorbus loop-stats arm --rate 200 --seconds 10
     motorbus loop-stats shoulder elbow --rate 100 --hold
-    motorbus loop-stats arm --rate 200 --ahead
     motorbus loop-stats arm --rate 200 --json""",
 )
 USUAL: Final = 0.8
@@ -57,7 +54,6 @@ def loop_stats(
     rate: float | None = None,
     seconds: str = "5",
     hold: Flag = False,
-    ahead: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
     **options: str,
@@ -74,8 +70,6 @@ def loop_stats(
         For how long, in s or as 500ms; Enter or Ctrl-C end it earlier.
     hold
         Give torque, and send each axis its own position as a goal in every cycle.
-    ahead
-        Be one cycle ahead: the next one is on the wire while one is told.
     options
         Any option of the buses, as a flag.
     """
@@ -94,19 +88,19 @@ def loop_stats(
             return Exit.OK
         budget = hand.robot.budget(rate or 0.0, axes)
         chosen = rate or (USUAL * budget.highest_rate if budget.buses else 1.0)
-        took, without, found = _run(hand, axes, chosen, span, hold=hold, ahead=ahead)
+        took, without, found = _run(hand, axes, chosen, span, hold=hold)
     _tell(took, without, found, budget, output)
     return Exit.OK
 
 
 def _run(
-    hand: InHand, axes: list[str], rate: float, span: float, *, hold: bool, ahead: bool
+    hand: InHand, axes: list[str], rate: float, span: float, *, hold: bool
 ) -> tuple[float, tuple[str, ...], Statistics]:
     """How long the loop went on from its first cycle to its last (s), whom it left out, and what became of it."""
     with (
         hand.working("looping"),
         asked_to_end() as ended,
-        hand.robot.loop(rate, axes, ahead=ahead) as loop,
+        hand.robot.loop(rate, axes) as loop,
     ):
         first = last = None
         for state in loop:

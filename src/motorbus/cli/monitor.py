@@ -20,7 +20,7 @@ from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, Request
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.core.family import State
     from motorbus.core.operation import Operation
     from motorbus.motion.machine import AxisSpec

@@ -31,7 +31,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.core.family import Family
 

@@ -13,7 +13,7 @@ from motorbus.cli.target import face, gathered, nobody, opened, rate_word, targe
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
 
 _COLLIDED: Final = "several devices answered at once, as they do to a broadcast, or the line is noisy"
 

@@ -20,7 +20,7 @@ from motorbus.journal import Change
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Family
     from motorbus.journal import BusJournal

@@ -13,7 +13,7 @@ from motorbus.motion.safety.standstill import Rest, watched
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.core.operation import Operation
 

@@ -25,7 +25,7 @@ from motorbus.errors import MotorbusError, RequestError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.motion.clamping import Clamped
     from motorbus.motion.machine import Machine

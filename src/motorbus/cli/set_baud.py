@@ -15,7 +15,7 @@ from motorbus.core import units
 from motorbus.errors import LinkError, MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
 
 app = App(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 from motorbus.errors import MotionError, MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.core.operation import Operation, Runnable
 

@@ -23,7 +23,7 @@ from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.cli.output import Output
     from motorbus.core.entry import Table

@@ -17,7 +17,7 @@ from motorbus.bus.trace import Subscription, TraceRecord
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from motorbus.bus.face import BusFace
+    from motorbus.bus.base import BaseBus
 
 LOG = logging.getLogger("motorbus.cli")
 PATIENCE: Final = 1.0
@@ -25,7 +25,7 @@ PATIENCE: Final = 1.0
 
 
 @contextmanager
-def traced(bus: BusFace) -> Iterator[None]:
+def traced(bus: BaseBus) -> Iterator[None]:
     """With -vv, log all that is sent and delivered on this bus meanwhile."""
     if not LOG.isEnabledFor(logging.DEBUG):
         yield

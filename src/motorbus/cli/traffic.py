@@ -14,7 +14,7 @@ from motorbus.errors import NoReply, RequestError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.bus.trace import TraceRecord
     from motorbus.cli.output import Output
     from motorbus.core.family import Explanation

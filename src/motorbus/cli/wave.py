@@ -23,7 +23,7 @@ from motorbus.errors import MotorbusError, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
     from motorbus.core.family import Found, Positions, Train
     from motorbus.core.operation import Exchange, Operation

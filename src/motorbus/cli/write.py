@@ -20,7 +20,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.quantity import Typed
     from motorbus.core.entry import Entry, Value
     from motorbus.core.family import Family

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.family import Train
 from motorbus.motion.budget import BusBudget, counted
 from motorbus.session import open, parse_address, prepare

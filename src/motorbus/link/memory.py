@@ -10,23 +10,36 @@ import time
 from collections.abc import Iterable
 from heapq import heappop, heappush
 from math import inf
-from threading import Condition
+from threading import Condition, get_ident
 
 from motorbus.core.can_bits import bits
 from motorbus.core.family import Simulator
 from motorbus.core.operation import CanFrame, Data
-from motorbus.errors import LinkError, LinkLost
+from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, PerfectLine, Side
 
 BACKLOG = 1 << 20  # deliveries under way; more means that the program writes without reading
 
 
 class VirtualClock:
-    """A clock that moves only while a link on it is read. It belongs to one thread or one event loop."""
+    """A clock that moves only while a link on it is read. It belongs to the thread that uses a link on it first."""
 
     def __init__(self, now: float = 0.0) -> None:
         self.now = now
         self.links: list[MemoryLink] = []
+        self._thread: int | None = None
+
+    def check_thread(self) -> None:
+        """Raise RequestError in any thread but the first that called this."""
+        me = get_ident()
+        if self._thread is None:
+            self._thread = me
+        elif self._thread != me:
+            raise RequestError(
+                "a simulated bus in virtual time is used by a second thread",
+                cause="its time passes only while one thread waits",
+                advice='simulate with clock="real", or use the bus in one thread',
+            )
 
 
 def share_clock(links: Iterable[MemoryLink]) -> None:

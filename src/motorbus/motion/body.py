@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.entry import shown
 from motorbus.errors import RequestError
 from motorbus.motion.capabilities import AxisVerbs
@@ -25,7 +25,7 @@ class Body:
     def __init__(
         self,
         machine: Machine,
-        buses: Mapping[str, BusFace],
+        buses: Mapping[str, BaseBus],
         axes: Mapping[str, Any],
         origins: Mapping[str, float] | None = None,
     ) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any, Final
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.family import Family, Train
 from motorbus.core.operation import ANY, Exchange, Operation
 from motorbus.errors import RequestError
@@ -124,7 +124,7 @@ def some_angles(axes: Iterable[AxisVerbs]) -> Operation[dict[int, float]]:
 
 
 def bus_budget(
-    bus: BusFace, train: Train, names: Sequence[str], angles: Mapping[int, float], turnaround: float = 0.0
+    bus: BaseBus, train: Train, names: Sequence[str], angles: Mapping[int, float], turnaround: float = 0.0
 ) -> BusBudget:
     """What a cycle of this train costs on its bus, with goals at these `angles` (rad, by id)."""
     return counted(bus.family, bus.rate, (*train.goals(angles), *train.positions), names, turnaround)

@@ -12,7 +12,7 @@ from copy import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from motorbus.bus import verdict
+from motorbus.bus import failures
 from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.operation import (
     Alone,
@@ -122,7 +122,7 @@ class Command:
     def lost(self) -> MotorbusError | None:
         """The error for an axis that somebody else has told something since; None when there is none."""
         if self._bus is not None and self._bus.loss_count != self._losses:
-            return verdict.outlived()
+            return failures.outlived()
         stopping = self._stopped_by_now()
         if stopping == self._stopping:
             for axis, orders in self._counts:

@@ -6,14 +6,11 @@ Work on one bus goes straight to it, for a control loop does so thousands of tim
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from motorbus.bus import asynchronous, blocking
+from motorbus.bus import aio, blocking
 from motorbus.bus.aio import AsyncBus
-from motorbus.bus.concert import Concert
-from motorbus.bus.concert_loop import LoopConcert
-from motorbus.bus.pump import Bus
-from motorbus.core.operation import Runnable
+from motorbus.bus.blocking import Bus
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.safety.blame import raise_blamed
@@ -22,11 +19,10 @@ T = TypeVar("T")
 
 
 class Conductor:
-    """Blocking. `origins` are what the clock of each bus showed when the robot's was at 0 (s)."""
+    """Blocking."""
 
-    def __init__(self, buses: Mapping[str, Bus], origins: Mapping[str, float]) -> None:
+    def __init__(self, buses: Mapping[str, Bus]) -> None:
         self._buses = buses
-        self._concert = Concert(buses, origins)
 
     def run(self, work: Abreast[T]) -> T:
         """Carry out everything, then combine.
@@ -42,30 +38,23 @@ class Conductor:
             raise
 
     def _run(self, work: Abreast[T]) -> T:
-        operations = work.operations
-        if len(operations) != 1:
-            return work.combine(self._run_on(operations))
-        ((name, wanted),) = operations.items()
+        procedures = work.operations
+        if len(procedures) != 1:
+            values = blocking.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})
+            return work.combine({name: values[self._buses[name]] for name in procedures})
+        ((name, wanted),) = procedures.items()
         try:
             told = self._buses[name].run(wanted)
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
 
-    def _run_on(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
-        if not all(isinstance(bus, blocking.Bus) for bus in self._buses.values()):
-            return self._concert.run(operations)
-        buses: dict[str, Any] = {name: self._buses[name] for name in operations}
-        values = blocking.run_on({buses[name]: wanted for name, wanted in operations.items()})
-        return {name: values[bus] for name, bus in buses.items()}
-
 
 class LoopConductor:
     """On an event loop."""
 
-    def __init__(self, buses: Mapping[str, AsyncBus], origins: Mapping[str, float]) -> None:
+    def __init__(self, buses: Mapping[str, AsyncBus]) -> None:
         self._buses = buses
-        self._concert = LoopConcert(buses, origins)
 
     async def run(self, work: Abreast[T]) -> T:
         """As `Conductor.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
@@ -76,19 +65,13 @@ class LoopConductor:
             raise
 
     async def _run(self, work: Abreast[T]) -> T:
-        operations = work.operations
-        if len(operations) != 1:
-            return work.combine(await self._run_on(operations))
-        ((name, wanted),) = operations.items()
+        procedures = work.operations
+        if len(procedures) != 1:
+            values = await aio.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})
+            return work.combine({name: values[self._buses[name]] for name in procedures})
+        ((name, wanted),) = procedures.items()
         try:
             told = await self._buses[name].run(wanted)
         except MotorbusError as error:
             told = error
         return work.combine({name: told})
-
-    async def _run_on(self, operations: Mapping[str, Runnable[Any]]) -> dict[str, Any]:
-        if not all(isinstance(bus, asynchronous.AsyncBus) for bus in self._buses.values()):
-            return await self._concert.run(operations)
-        buses: dict[str, Any] = {name: self._buses[name] for name in operations}
-        values = await asynchronous.run_on({buses[name]: wanted for name, wanted in operations.items()})
-        return {name: values[bus] for name, bus in buses.items()}

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus import families
-from motorbus.bus.face import BusFace
-from motorbus.bus.pump import Bus
+from motorbus.bus.base import BaseBus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError
 from motorbus.journal import BusJournal
@@ -35,7 +35,7 @@ logging.getLogger("motorbus").addHandler(
 )  # silent until somebody asks; here, for nothing below logs
 
 Notify = Callable[[object], None]
-AnyBus = TypeVar("AnyBus", bound=BusFace)
+AnyBus = TypeVar("AnyBus", bound=BaseBus)
 
 
 def open(address: str, *, report: Notify | None = None, **options: object) -> Bus:
@@ -53,6 +53,7 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
     except BaseException:
         bus.link.close()
         raise
+    bus.defer_signals()
     return bus
 
 
@@ -123,7 +124,7 @@ def _link(opening: Opening) -> Link:
     return reconnecting(link, **said) if opening.reconnect else link
 
 
-def _look_for(bus: BusFace, opening: Opening) -> None:
+def _look_for(bus: BaseBus, opening: Opening) -> None:
     """A port that comes back under another name is to be reached by an emergency stop under that one."""
     if not opening.reconnect:
         bus.reconnects = False
@@ -138,13 +139,13 @@ def _stop_socket(opening: Opening, link: Link) -> Path | None:
     return socket_path(name) if name else None
 
 
-def _warn(bus: BusFace, journal: BusJournal | None) -> None:
+def _warn(bus: BaseBus, journal: BusJournal | None) -> None:
     warning = journal.warning() if journal is not None else ""
     if warning:
         bus.warnings += (warning,)
 
 
-def echo_test(bus: BusFace) -> Exchange[Any] | None:
+def echo_test(bus: BaseBus) -> Exchange[Any] | None:
     """What shows an echo, to be sent next; None where the family needs none. The warnings of the bus are told."""
     for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)
@@ -154,7 +155,7 @@ def echo_test(bus: BusFace) -> Exchange[Any] | None:
     return test
 
 
-def _settled(bus: BusFace, run: Callable[[], object]) -> None:
+def _settled(bus: BaseBus, run: Callable[[], object]) -> None:
     try:
         run()
     except MotorbusError as silence:
@@ -162,7 +163,7 @@ def _settled(bus: BusFace, run: Callable[[], object]) -> None:
     tell_echo(bus)
 
 
-def tell_echo(bus: BusFace) -> None:
+def tell_echo(bus: BaseBus) -> None:
     """After the test: say that the adapter echoes, if it does."""
     if bus.echoes:
         LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

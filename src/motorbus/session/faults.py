@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.operation import READABLE
 from motorbus.errors import MotorbusError, Refused, RequestError
 from motorbus.journal import Change
@@ -50,7 +50,7 @@ def distrust(body: Body) -> None:
         distrust_on(bus)
 
 
-def distrust_on(bus: BusFace) -> None:
+def distrust_on(bus: BaseBus) -> None:
     """The same for the devices of a bus over which there are guards: by the old id and by the new one of the change,
     whether an axis has that or not. Nothing is sent."""
     gate, change = bus.interlock, _doubtful(bus)
@@ -70,7 +70,7 @@ def _in_doubt(body: Body, axis: Any) -> str:
     return _told(change, axis.spec.device)
 
 
-def _doubtful(bus: BusFace) -> Change | None:
+def _doubtful(bus: BaseBus) -> Change | None:
     """The change that was cut off on this bus, where nobody knows what it has left."""
     try:
         change = unfinished(bus)

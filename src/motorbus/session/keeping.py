@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.journal import BusJournal, Change, told_by
 from motorbus.link.base import Link
 from motorbus.link.lock import journal_path
@@ -17,7 +17,7 @@ _simulated: WeakKeyDictionary[Simulation, BusJournal] = WeakKeyDictionary()
 """The journals of simulated buses of this process, which end with them."""
 
 
-def unfinished(bus: BusFace) -> Change | None:
+def unfinished(bus: BaseBus) -> Change | None:
     """The guarded change that was cut off on this bus, if there is one; `recover` of its device ends it.
 
     Raises RequestError when the journal was written by a later version.

@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 
 from motorbus import families
 from motorbus.bus.aio import AsyncBus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.entry import shown
 from motorbus.core.family import Family
 from motorbus.errors import LinkError, MotorbusError, RequestError

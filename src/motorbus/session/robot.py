@@ -9,7 +9,8 @@
 
 Loading reads, and writes nothing to any device. When it is closed, however that comes, each axis that was moved from
 here does what the file says: `hold`, `torque_off`, `park` or `leave`. That is so at the normal end, on an exception, on
-Ctrl-C, and in the main thread on SIGTERM and SIGHUP, unless the program has a handler of its own (see `signals`).
+Ctrl-C, and in the main thread on SIGTERM and SIGHUP, unless the program has a handler of its own: see
+`motorbus.bus.interrupts`.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from os import PathLike
 from types import TracebackType
 from typing import Any, Final, Self
 
-from motorbus.bus.aio import AsyncBus
+from motorbus.bus.aio import AsyncBus, TaskSignals
 from motorbus.bus.base import BaseBus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
+from motorbus.bus.interrupts import Interrupts, interrupts
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion import group
-from motorbus.motion.abreast import Abreast, Led, LedAsync, together
+from motorbus.motion.abreast import Led, LedAsync, together
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.budget import budget
@@ -45,7 +47,6 @@ from motorbus.session.attended import Leased, awaiting_attended, blocking_attend
 from motorbus.session.buses import LOG
 from motorbus.session.faults import clear, distrust, faults
 from motorbus.session.plan import Plan, loaded
-from motorbus.session.signals import Cancelling, Kept, Signals, cut, interrupted, uncut
 from motorbus.session.stopping import estop, latch, reset, trigger
 
 Notify = Callable[[object], None]
@@ -124,7 +125,7 @@ class RobotVerbs(Leased):
         clear(self, names)
 
     def estop(self) -> dict[str, StopOutcome]:
-        """Emergency stop on every bus at the same time; see `motorbus.bus.face.BusFace.estop`. From any thread.
+        """Emergency stop on every bus at the same time; see `motorbus.bus.base.BaseBus.estop`. From any thread.
 
         Never waits for a movement, and tells for each bus, by its name, what it achieved: a bus that is gone
         acknowledges nothing. Motion and torque are refused afterwards until `reset`, also when the machine is closed
@@ -156,7 +157,6 @@ class RobotVerbs(Leased):
         finally:
             self._shown(leaving, others)
 
-    @cut
     def _shown(self, leaving: Leaving, others: BaseException | None) -> None:
         if self.when_left is not None:
             self.when_left(leaving, others)
@@ -186,12 +186,10 @@ class Robot(RobotVerbs, Led):
 
     def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
         super().__init__(machine, buses, axes)
-        self.conductor = Conductor(buses, self.origins)
+        self.conductor = Conductor(buses)
         self._ports = tuple(buses.values())
         self._exits = ExitStack()
-        self._leaving: Leaving | None = None
-        self._kept = Kept()
-        self._signals = Signals(interrupted, python=True)
+        self._signals: Interrupts | None = None
 
     @classmethod
     def load(
@@ -228,7 +226,6 @@ class Robot(RobotVerbs, Led):
         axis: Axis = super().axis(name)
         return axis
 
-    @uncut
     def close(self) -> None:
         """Leave the machine as its file says, and give the ports back. Calling it again does nothing.
 
@@ -238,10 +235,10 @@ class Robot(RobotVerbs, Led):
 
     def __enter__(self) -> Self:
         self._refuse_shut()
-        self._signals.take()
+        self._signals = interrupts()
+        self._signals.cleanups += 1
         return self
 
-    @uncut
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -249,50 +246,42 @@ class Robot(RobotVerbs, Led):
 
     def _end(self, others: BaseException | None) -> None:
         if self._shut:
-            self._signals.give_back()  # it may have been closed from another thread
             return
-        first: BaseException | None = None
-        try:
-            self._lay_down()
-            first = self._leave(None)
-            if self._leaving is not None:
-                self._ended(self._leaving, others or first)
-        finally:
+        with interrupts():
+            first: BaseException | None = None
             try:
-                first = self._leave(first)  # nothing is left, unless a Ctrl-C fell between two of these lines
-                self._exits.close()
+                self._lay_down()
+                leaving = Leaving(self)
+                first = self._leave(leaving)
+                self._ended(leaving, others or first)
             finally:
-                for bus in self._ports:
-                    bus.close()
-                self._shut = CLOSED
-                self._retire()
-                self._signals.give_back()
-                self._kept.end(first)
+                try:
+                    self._exits.close()
+                finally:
+                    for bus in self._ports:
+                        bus.close()
+                    self._shut = CLOSED
+                    self._retire()
+                    if self._signals is not None:
+                        self._signals.cleanups -= 1
+            if first is not None:
+                raise first
 
-    def _leave(self, first: BaseException | None) -> BaseException | None:
-        """Carry out all of it; the first interruption that came up to its end."""
-        caught: BaseException | None = None
+    def _leave(self, leaving: Leaving) -> BaseException | None:
+        """Carry out all of it; the first signal that came meanwhile. Each signal shortens what is left."""
+        first: BaseException | None = None
         while True:
             try:
-                leaving = self._leaving = self._leaving or Leaving(self)
-                if caught is not None:
-                    first = first or caught
-                    leaving.hurry()
-                    caught = None
-                self._kept.release()
+                interrupts().raise_pending()
                 work = leaving.work()
                 if work is None:
                     return first
-                self._carry_out(work)
+                self.conductor.run(work)
             except MotorbusError as error:
                 leaving.failed(error)
-            except BaseException as interruption:  # a second Ctrl-C: less waiting, and nobody is left out
-                caught = interruption
-
-    @cut
-    def _carry_out(self, work: Abreast[Any]) -> None:
-        self._kept.release()  # who fell between the one above and here shortens this, too
-        self.conductor.run(work)
+            except BaseException as signal:
+                first = first or signal
+                leaving.hurry()
 
 
 class AsyncRobot(RobotVerbs, LedAsync):
@@ -306,7 +295,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
 
     def __init__(self, plan: Plan, report: Notify | None = None) -> None:
         super().__init__(plan.machine, {}, {})
-        self.conductor = LoopConductor({}, {})
+        self.conductor = LoopConductor({})
         self._plan = plan
         self._report = report
         self._ending = False
@@ -333,7 +322,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
                 buses[name] = await stack.enter_async_context(self._plan.open_async(name, self._report))
             _share_clock(buses.values())
             body = Body(self._plan.machine, buses, self._plan.awaiting(buses))
-            conductor = LoopConductor(buses, body.origins)
+            conductor = LoopConductor(buses)
             await conductor.run(recognise(body))
             fence(body)
             distrust(body)
@@ -344,9 +333,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
             self._exits = stack.pop_all()
         self._shut = ""
         self.lease = self._lease
-        self._cancelling = Cancelling()
-        self._signals = Signals(self._cancelling)
-        self._signals.take()
+        self._signals = TaskSignals()
         return self
 
     def __getitem__(self, name: str) -> AsyncAxis:
@@ -378,8 +365,7 @@ class AsyncRobot(RobotVerbs, LedAsync):
         finally:
             self._ending, self._shut = False, NOT_OPEN
             self._retire()
-            self._signals.give_back()
-            self._cancelling.check()
+            self._signals.end()
 
     async def _leave(self, leaving: Leaving) -> BaseException | None:
         """Carry out all of it; the first cancellation that came meanwhile."""

@@ -12,9 +12,7 @@ from functools import partial
 from threading import Event, Thread
 from typing import Any, Final
 
-from motorbus.bus.background import Background
-from motorbus.bus.base import BaseBus
-from motorbus.bus.beside import Beside
+from motorbus.bus.background import BackgroundTask
 from motorbus.core.operation import Operation, Pause, outcome
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
@@ -49,7 +47,7 @@ class Sentry:
         for name, bus in self._body.buses.items():
             post = self._posts[name]
             if bus.link.virtual:
-                post.along = _background(bus)(bus, partial(self._watching, name))
+                post.along = BackgroundTask(bus, partial(self._watching, name))
                 post.along.along()
             else:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
@@ -114,7 +112,7 @@ class Sentry:
             try:
                 if self._late(bus):
                     there = self._body.buses[bus]
-                    _background(there)(there, partial(self._stopping, bus)).carried()
+                    BackgroundTask(there, partial(self._stopping, bus)).carried()
                 left = self._left(bus)
             except Exception as error:  # not even the pump works: later once more
                 with suppress(Exception):  # nor may want of memory end this thread
@@ -157,10 +155,6 @@ class Sentry:
                 LOG.warning("%s: it has accepted the stop now", axis.name)
 
 
-def _background(bus: Any) -> Any:
-    return Beside if isinstance(bus, BaseBus) else Background
-
-
 class _Post:
     """What is known of one bus: the number of the `loss` after which it was stopped, those who `failed` to accept that,
     and from when on they are told `again` (s)."""
@@ -170,7 +164,7 @@ class _Post:
         self.failed: frozenset[str] = frozenset()
         self.again = 0.0
         self.woken = Event()
-        self.along: Background[None] | Beside[None] | None = None
+        self.along: BackgroundTask[None] | None = None
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
         """They were told to stop."""

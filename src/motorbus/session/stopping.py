@@ -1,6 +1,7 @@
-"""The emergency stop of a whole machine: every bus in a thread of its own, so that none waits for another.
+"""The emergency stop of a machine: every real bus in a thread of its own, so that none waits for another.
 
-It does not go through whoever carries out movements: what is to be stopped may be what that waits for.
+It does not use the conductor, which may be waiting for what is to be stopped. Buses in virtual time are stopped one
+after the other by the caller, for their clock belongs to one thread.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ def estop(body: Body) -> dict[str, StopOutcome]:
 
     threads = {
         name: Thread(target=one, args=(name,), name=f"motorbus estop {name}", daemon=True)
-        for name in body.buses
+        for name, bus in body.buses.items()
+        if not bus.link.virtual
     }
-    left = [name for name, thread in threads.items() if not _started(thread)]
+    left = [name for name in body.buses if name not in threads or not _started(threads[name])]
     for name in left:  # one after the other, while the others are at it
         one(name)
     for name, thread in threads.items():

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import motorbus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation

@@ -9,7 +9,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import INTENT, Alone, Data, Journal
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Node, prepare

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Pause
 from motorbus.errors import RequestError
 from motorbus.families.feetech import (
@@ -262,6 +262,7 @@ def test_a_bus_of_all_maps_is_read_and_moved_as_one() -> None:
         assert set(voltages.values) == {1, 2, 3}
         assert set(voltages.errors) == {4}
         bus.run(sync_write({servo: {"torque_enable": 0} for servo in servos}))
+        later(bus, 0.001)
         assert [sim[node].memory["torque_enable"] for node in (1, 2, 3)] == [0, 0, 0]
 
 

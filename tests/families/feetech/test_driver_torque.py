@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import Robot
-from motorbus.bus.known import Known, named
+from motorbus.bus.positions import LastPositions, addressed
 from motorbus.core.operation import Effect, Operation, Pause, Rank, Together
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech import Feetech
@@ -42,12 +42,12 @@ def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
 
 
 def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
-    silent, known = prepared(2, at_8=0), Known(Feetech(), 1_000_000)
+    silent, known = prepared(2, at_8=0), LastPositions(Feetech(), 1_000_000)
     (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).exchanges
-    assert named(let_go) == {2}
+    assert addressed(let_go) == {2}
     (together,) = all_limp(as_nodes([2, 3]))
-    known.order(together, 1_000_000)
-    assert [known.stops(node) for node in (1, 2, 3)] == [0, 1, 1]
+    known.sent(together)
+    assert [known.stop_count(node) for node in (1, 2, 3)] == [0, 1, 1]
     assert not known  # whether there is anybody the answers tell
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.families.feetech.simulator import Servo as SimulatedServo
 from motorbus.simulation.named import Simulation
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.core.operation import (
     ANY,

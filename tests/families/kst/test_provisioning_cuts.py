@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Data
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.kst import FAMILY, PowerCycleNeeded, Provisioned, Servo

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Data, Runnable
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.simulator import Controller as SimulatedController

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Operation, Pause, Progress
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, MotorbusError

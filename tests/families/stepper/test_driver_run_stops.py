@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from threading import Thread
 
 import pytest
 
@@ -11,7 +10,6 @@ from motorbus.core.operation import Operation
 from motorbus.errors import Interrupted, OutcomeUnknown, RequestError
 from motorbus.families.stepper import driver
 from motorbus.families.stepper.driver import Estimated, Outcome
-from motorbus.families.stepper.execution import Phase
 from tests.families.stepper.runs import READ_1, START_1, STOPS, TURN, Running, later, made
 
 
@@ -25,22 +23,6 @@ def test_a_stop_by_another_operation_is_no_end_of_its_own(stop_mode: int, notice
         ran = there.beside(later(when, lambda: driver.stop(there.device)), timeout=60.0)
         assert (ran.outcome, ran.seconds) == (Outcome.STOPPED, None)
         assert there.owed is False
-
-
-def test_a_stop_from_another_thread() -> None:
-    with Running(made(replace(TURN, distance=160_000))) as there:
-        promises: list[object] = []
-
-        def stop(event: object) -> None:
-            if isinstance(event, Estimated) and event.at > 5.0 and not promises:
-                thread = Thread(target=lambda: promises.append(there.device.stop()))
-                thread.start()
-                thread.join(10.0)
-
-        there.bus.report = stop
-        ran = there.go()
-        assert (ran.outcome, len(promises)) == (Outcome.STOPPED, 1)
-        assert there.simulated.state.phase is not Phase.MOVE
 
 
 def test_a_stop_before_it_has_left_withdraws_it() -> None:

@@ -165,13 +165,13 @@ def test_what_has_no_geometry_has_no_goal_and_is_not_started() -> None:
         assert (there.starts, there.owed) == (0, False)
 
 
-def test_the_gate_is_asked_and_what_it_refuses_is_not_owed() -> None:
+def test_the_gate_is_asked_and_what_it_refuses_is_not_owed(monkeypatch: pytest.MonkeyPatch) -> None:
     with Running() as there:
 
-        def refuse(exchange: object) -> None:
+        def refuse(exchange: object, now: float) -> None:
             raise LimitExceeded("too far")
 
-        there.bus.turns.admit = refuse
+        monkeypatch.setattr(there.bus.interlock, "check", refuse)
         for start in (there.device.run, there.device.start_project):
             with pytest.raises(LimitExceeded, match="too far"):
                 start(1)

@@ -13,7 +13,6 @@ from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, Side
-from tests.conftest import Figures, Rounds
 from tests.faults.test_stepper_single_faults import ask
 from tests.support.lines import BYTE, Mischief
 from tests.support.rigs.stepper import MOTIONS, FalseWord, Rig
@@ -98,8 +97,7 @@ def test_an_echo_that_nobody_has_tested_for_is_found_by_what_comes_of_it(piece: 
     assert all(told[-10:])
 
 
-@pytest.mark.parametrize("deaf", [True, False])
-@pytest.mark.parametrize("piece", [1, 11])
+@pytest.mark.parametrize(("piece", "deaf"), [(1, False), (11, False), (11, True)])
 def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learned(
     piece: int, deaf: bool
 ) -> None:
@@ -114,52 +112,6 @@ def test_an_echo_that_begins_and_ends_in_mid_session_forges_nothing_and_is_learn
         assert rig.dump()
         assert ask(rig, "stop_motor"), "learned"
         assert rig.bus.echoes is (line.mode == FULL)
-
-
-@pytest.mark.parametrize("pace", [True, False])
-@pytest.mark.parametrize("name", ["stop_motor", "start_project", "set_output"])
-def test_six_bytes_of_an_echo_at_the_very_deadline_wait_for_the_rest_of_it(name: str, pace: bool) -> None:
-    """The deadline is somewhere in this sweep, which goes by thirds of a byte."""
-    for step in range(160, 250):
-        line = Echoing(LATE, pace=pace, deaf=True)
-        line.lateness = 0.15 + step * BYTE / 3
-        rig = rig_on(line, opened=False)
-        assert not ask(rig, name), f"{name} was acknowledged by an echo {line.lateness:.4f} s late"
-        assert line.echoes
-
-
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("pace", [True, False])
-def test_l8_echoes_that_come_and_go_forge_nothing(pace: bool, rounds: Rounds, figures: Figures) -> None:
-    """With requests that are not heard and replies that are lost; every acknowledgement is held against what was."""
-    total = rounds(100_000, 1_500)
-    line = Echoing(OFF, pace=pace)
-    line.share = 0.05
-    rig = rig_on(line, opened=True)
-    for number in range(total):
-        if number % 23 == 0:
-            line.mode = line.random.choice((OFF, FULL, LATE, SIX) if pace else (OFF, FULL, LATE))
-            line.piece = line.random.choice((1, 11))
-        rig.anything()
-    share = sum(rig.right.values()) / rig.calls
-    what = f"L8 echoes in full, late or in part, on and off; {'at 9600 baud' if pace else 'on a link without a rate'}"
-    faults = line.echoes + line.count
-    figures(what, family="stepper", exchanges=rig.calls, faults=faults, succeeded=f"{share:.2%}")
-    assert line.echoes > total / 2
-    assert line.count > total / 50
-
-
-def test_l8_six_bytes_of_an_echo_come_too_soon_on_a_line_of_its_own_baud(
-    rounds: Rounds, figures: Figures
-) -> None:
-    """A reply cannot be there before the request has left, so on a real serial port even this forges nothing."""
-    total = rounds(10_000) // 10
-    line = Echoing(SIX, deaf=True)
-    rig = rig_on(line, opened=True)
-    believed = sum(rig.anything() for _ in range(total))
-    assert believed == 0
-    figures("L8 six bytes echoed by nobody, at 9600 baud", family="stepper", exchanges=total, wrong=believed)
-    assert line.echoes > total
 
 
 def forged(rig: Rig, name: str) -> bool:

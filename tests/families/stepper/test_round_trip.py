@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Data
 from motorbus.families.stepper import Controller, wire
 from motorbus.families.stepper.driver.writing import Difference, Planned, Written

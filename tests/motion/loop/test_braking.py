@@ -29,11 +29,10 @@ def speed(loop: Loop, name: str) -> float:
     return 0.0 if way is None else way.velocity
 
 
-@pytest.mark.parametrize("ahead", [False, True])
 @pytest.mark.parametrize("jerk", [None, 100.0])
-def test_leaving_brakes_whoever_is_under_way(jerk: float | None, ahead: bool) -> None:
+def test_leaving_brakes_whoever_is_under_way(jerk: float | None) -> None:
     with machine(arm="1-2", exit="leave") as (made, sims), Robot.of(made) as robot:
-        with suppress(ZeroDivisionError), robot.loop(RATE, jerk=jerk, ahead=ahead) as loop:
+        with suppress(ZeroDivisionError), robot.loop(RATE, jerk=jerk) as loop:
             loop.goal.update({"a1": 2.0, "a2": 0.0})
             state = cycles(loop, 60)
             raise ZeroDivisionError
@@ -80,14 +79,13 @@ def test_leaving_visits_the_other_buses_when_one_is_gone() -> None:
         robot.buses["arm"].link.plug()  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("ahead", [False, True])
 @pytest.mark.parametrize("most", ["8 deg", "12 deg", "15 deg"])
-def test_braking_looks_where_the_axis_is(most: str, ahead: bool) -> None:
+def test_braking_looks_where_the_axis_is(most: str) -> None:
     with (
         machine(arm="1-2", exit="leave", axes={"a1": {"max_step": most}}) as (made, _),
         Robot.of(made) as robot,
     ):
-        with robot.loop(RATE, ahead=ahead) as loop:
+        with robot.loop(RATE) as loop:
             loop.goal.update({"a1": 2.0, "a2": 2.0})
             cycles(loop, 70)
             assert speed(loop, "a1") == pytest.approx(QUICK)

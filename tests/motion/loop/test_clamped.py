@@ -19,26 +19,22 @@ from tests.support.machines import machine
 
 HIGH = radians(150)
 STEP = radians(90) / RATE
-BOTH = pytest.mark.parametrize("ahead", [False, True])
 
 
 @contextmanager
-def clamping(
-    *, direct: bool = False, ahead: bool = False, **made: Any
-) -> Iterator[tuple[Loop, list[object], Any]]:
+def clamping(*, direct: bool = False, **made: Any) -> Iterator[tuple[Loop, list[object], Any]]:
     """A loop that clamps, what it told, and its simulations."""
     told: list[object] = []
     with (
         machine(**made) as (found, sims),
         Robot.of(found, report=told.append) as robot,
-        robot.loop(RATE, policy="clamp", direct=direct, ahead=ahead) as loop,
+        robot.loop(RATE, policy="clamp", direct=direct) as loop,
     ):
         yield loop, told, sims
 
 
-@BOTH
-def test_a_goal_beyond_the_limits_goes_to_the_limit_and_is_told(ahead: bool) -> None:
-    with clamping(arm="1-2", ahead=ahead) as (loop, told, _):
+def test_a_goal_beyond_the_limits_goes_to_the_limit_and_is_told() -> None:
+    with clamping(arm="1-2") as (loop, told, _):
         loop.goal.update({"a1": 9.0, "a2": 0.2})
         state = cycles(loop, 260)
         assert state.position == pytest.approx({"a1": HIGH, "a2": 0.2}, abs=0.02)
@@ -60,9 +56,8 @@ def test_of_many_only_the_first_and_one_in_half_a_second_is_told() -> None:
 
 @pytest.mark.parametrize("goal", [nan, inf, -inf])
 @pytest.mark.parametrize("direct", [False, True])
-@BOTH
-def test_what_is_no_number_is_refused_all_the_same(goal: float, direct: bool, ahead: bool) -> None:
-    with clamping(arm="1", direct=direct, ahead=ahead) as (loop, told, _sims):
+def test_what_is_no_number_is_refused_all_the_same(goal: float, direct: bool) -> None:
+    with clamping(arm="1", direct=direct) as (loop, told, _sims):
         loop.goal["a1"] = 0.0
         cycles(loop, 3)
         loop.goal["a1"] = goal
@@ -72,9 +67,8 @@ def test_what_is_no_number_is_refused_all_the_same(goal: float, direct: bool, ah
         assert cycles(loop, 5).position["a1"] == pytest.approx(0.0, abs=0.01)
 
 
-@BOTH
-def test_a_direct_goal_goes_as_far_as_its_axis_can_in_that_time(ahead: bool) -> None:
-    with clamping(arm="1", direct=True, ahead=ahead) as (loop, told, _):
+def test_a_direct_goal_goes_as_far_as_its_axis_can_in_that_time() -> None:
+    with clamping(arm="1", direct=True) as (loop, told, _):
         loop.goal["a1"] = 0.0
         cycles(loop, 3)
         loop.goal["a1"] = 0.5
@@ -89,10 +83,9 @@ def test_a_direct_goal_goes_as_far_as_its_axis_can_in_that_time(ahead: bool) -> 
         assert loop.statistics.clamped == {"a1": 1}
 
 
-@BOTH
-def test_a_direct_goal_keeps_to_the_step_from_where_it_is_measured(ahead: bool) -> None:
+def test_a_direct_goal_keeps_to_the_step_from_where_it_is_measured() -> None:
     careful = {"a1": {"max_step": "0.5 deg"}}
-    with clamping(arm="1", direct=True, ahead=ahead, axes=careful) as (loop, told, _):
+    with clamping(arm="1", direct=True, axes=careful) as (loop, told, _):
         loop.goal["a1"] = 0.0
         cycles(loop, 3)
         loop.goal["a1"] = 0.1
@@ -101,9 +94,8 @@ def test_a_direct_goal_keeps_to_the_step_from_where_it_is_measured(ahead: bool) 
         assert [event.reason for event in told if isinstance(event, Clamped)] == ["step"]
 
 
-@BOTH
-def test_what_is_allowed_is_left_alone(ahead: bool) -> None:
-    with clamping(arm="1", direct=True, ahead=ahead) as (loop, told, _):
+def test_what_is_allowed_is_left_alone() -> None:
+    with clamping(arm="1", direct=True) as (loop, told, _):
         for number in range(50):
             loop.goal["a1"] = 0.9 * STEP * number
             next(loop)

@@ -36,17 +36,6 @@ def test_the_example_of_the_first_page() -> None:
         assert repr(state).startswith("<LoopState 200 at ")
 
 
-def test_a_loop_on_an_event_loop_is_never_ahead() -> None:
-    async def main() -> None:
-        with machine(arm="1") as (made, _):
-            async with AsyncRobot.of(made) as robot:
-                with pytest.raises(RequestError, match="a loop of an AsyncRobot cannot be a cycle ahead"):
-                    robot.loop(10, ahead=True)
-                assert isinstance(robot.loop(10, ahead=False), AsyncLoop)
-
-    asyncio.run(main())
-
-
 def test_the_same_on_an_event_loop_is_the_same() -> None:
     blocking, awaited = [], []
     with machine(arm="1-2", can="0x21") as (made, _), Robot.of(made) as robot, robot.loop(rate=100) as loop:

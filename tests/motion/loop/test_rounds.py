@@ -351,7 +351,7 @@ def test_a_loop_is_told_of_a_loss_that_somebody_else_saw_and_gives_no_goal_of_be
             link.plug()
             robot["a2"].position()
             sims["arm"].line = Heard()
-            with pytest.raises(LinkLost, match="since this was begun"):
+            with pytest.raises(LinkLost, match="after this procedure began"):
                 next(loop)
             cycles(loop, 10)
             assert not ordered(sims["arm"].line)

@@ -37,6 +37,14 @@ def doubtful(**made: Any) -> Iterator[tuple[Loop, Doubtful, Any]]:
         yield loop, line, (robot, sims)
 
 
+def packets(data: bytes) -> Iterator[bytes]:
+    """The packets of one write: goals may leave with the next request."""
+    while data:
+        size = data[3] + 4
+        yield data[:size]
+        data = data[size:]
+
+
 def ordered(line: Doubtful) -> list[set[int]]:
     """Whom each packet of goals that was sent since this was asked last orders."""
     found = []
@@ -44,9 +52,11 @@ def ordered(line: Doubtful) -> list[set[int]]:
         if isinstance(data, CanFrame):
             if data.data[0] in (0x22, 0x2B, 0x23):
                 found.append({data.id & 0x7F})
-        elif data[4] == 0x83:  # SYNC WRITE: head of 7 bytes, then id and goal of each
-            size = data[6] + 1
-            found.append(set(data[7:-1:size]))
+            continue
+        for frame in packets(data):
+            if frame[4] == 0x83:  # SYNC WRITE: head of 7 bytes, then id and goal of each
+                size = frame[6] + 1
+                found.append(set(frame[7:-1:size]))
     line.sent.clear()
     return found
 

@@ -14,8 +14,6 @@ from tests.motion.loop.test_rounds import RATE, cycles, looping
 from tests.safety.test_canary import Drops
 from tests.support.machines import Heard, machine
 
-BOTH = pytest.mark.parametrize("ahead", [False, True])
-
 
 def polls(line: Heard) -> list[int]:
     """Whom the polls ask that were sent since this was asked last: each is a READ of one servo of its own."""
@@ -29,9 +27,8 @@ def listening(sims: Any) -> Heard:
     return line
 
 
-@BOTH
-def test_who_is_led_is_asked_four_times_a_second_one_at_a_time(ahead: bool) -> None:
-    with looping(arm="1-3", how={"ahead": ahead}) as (_, loop, sims):
+def test_who_is_led_is_asked_four_times_a_second_one_at_a_time() -> None:
+    with looping(arm="1-3") as (_, loop, sims):
         loop.goal.update({"a1": 0.1, "a2": 0.1})
         cycles(loop, 2)
         line = listening(sims)
@@ -56,17 +53,15 @@ def test_it_can_be_left_out() -> None:
         assert polls(line) == []
 
 
-@BOTH
-def test_where_nobody_is_led_nobody_is_asked(ahead: bool) -> None:
-    with looping(arm="1-2", how={"ahead": ahead}) as (_, loop, sims):
+def test_where_nobody_is_led_nobody_is_asked() -> None:
+    with looping(arm="1-2") as (_, loop, sims):
         line = listening(sims)
         cycles(loop, int(RATE))
         assert polls(line) == []
 
 
-@BOTH
-def test_a_poll_goes_where_the_wire_is_free_and_no_cycle_begins_later_for_it(ahead: bool) -> None:
-    with looping(arm="1-2", rate=200.0, how={"ahead": ahead}) as (_, loop, sims):
+def test_a_poll_goes_where_the_wire_is_free_and_no_cycle_begins_later_for_it() -> None:
+    with looping(arm="1-2", rate=200.0) as (_, loop, sims):
         loop.goal.update(dict.fromkeys(loop.axes, 0.1))
         cycles(loop, 2)
         line = listening(sims)
@@ -116,9 +111,8 @@ def test_a_device_that_restarts_is_a_fault_and_no_goal_of_it_leaves_any_more(nam
         assert device.memory["goal_position"] == written
 
 
-@BOTH
-def test_who_is_too_hot_is_told_to_stay_and_is_led_no_more(ahead: bool) -> None:
-    with looping(arm="1-2", exit="leave", how={"ahead": ahead}) as (_, loop, sims):
+def test_who_is_too_hot_is_told_to_stay_and_is_led_no_more() -> None:
+    with looping(arm="1-2", exit="leave") as (_, loop, sims):
         loop.goal.update(dict.fromkeys(loop.axes, 2.0))
         cycles(loop, 60)
         sims["arm"][2].temperature = 68
@@ -142,9 +136,8 @@ def test_what_watching_finds_while_leaving_keeps_nobody_from_braking() -> None:
         assert not robot["a1"].under_way
 
 
-@BOTH
-def test_a_silent_poll_is_forgiven(ahead: bool) -> None:
-    with looping(arm="1", exit="leave", how={"ahead": ahead}) as (_, loop, sims):
+def test_a_silent_poll_is_forgiven() -> None:
+    with looping(arm="1", exit="leave") as (_, loop, sims):
         loop.goal["a1"] = 0.1
         cycles(loop, 5)
         deaf = sims["arm"].line = Deaf()

@@ -23,7 +23,7 @@ from motorbus.families.feetech import driver
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.core.operation import Operation
 
 NAME: Final = "feetech"

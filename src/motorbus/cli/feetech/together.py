@@ -15,7 +15,7 @@ from motorbus.families.feetech.driver.motion import move_block, stops, way
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.core.operation import Operation
 

@@ -12,7 +12,7 @@ from motorbus.families.kst.table import PROFILES, current, temperature, text
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.core.entry import Entry
     from motorbus.core.family import Family
     from motorbus.core.operation import CanFrame

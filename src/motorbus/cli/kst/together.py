@@ -15,7 +15,7 @@ from motorbus.families.kst.driver.motion import TOLERANCE, counts, goal_of, send
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.core.operation import Goal, Operation
 

@@ -23,7 +23,7 @@ from motorbus.families.stepper.driver.editing import refuse_while_lent
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.core.operation import Operation, Runnable
 

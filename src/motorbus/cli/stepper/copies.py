@@ -24,7 +24,7 @@ from motorbus.families.stepper.driver import writing
 from motorbus.families.stepper.program.backups import Backup
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
 
 BackupFile = Annotated[Path, Parameter(name="FILE", help="The backup: TOML, with each dump as it came.")]

@@ -25,7 +25,7 @@ from motorbus.families.stepper.driver.goals import of_move
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
 
 _JOG = """With the speed of step 1 of project 1, and endless for the controller: this

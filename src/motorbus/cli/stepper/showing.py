@@ -16,7 +16,7 @@ from motorbus.families.stepper import Program
 from motorbus.families.stepper.driver import running, writing
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
 
 PROJECT: Final = 2

@@ -14,7 +14,7 @@ from motorbus.cli.target import face
 from motorbus.families.stepper.driver import writing
 
 if TYPE_CHECKING:
-    from motorbus.bus.pump import Bus
+    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
     from motorbus.families.stepper import Program
 

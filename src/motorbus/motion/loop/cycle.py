@@ -10,10 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.bus import blocking
-from motorbus.bus.face import BusFace
-from motorbus.bus.pump import Bus
-from motorbus.bus.volley import volley
+from motorbus.bus.base import BaseBus
+from motorbus.bus.blocking import Bus
 from motorbus.core.family import Positions, Quality, Train
 from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
 from motorbus.errors import (
@@ -54,7 +52,7 @@ class Part:
 
     def __init__(
         self,
-        bus: BusFace,
+        bus: BaseBus,
         origin: float,
         places: Sequence[Place],
         train: Train,
@@ -174,10 +172,7 @@ class Part:
         """
         self.await_slot(bus, moment)
         wanted = (*orders, *self.reads)
-        if isinstance(bus, blocking.Bus):
-            told = bus.exchange(wanted, LOST)
-        else:
-            told = volley(bus, wanted, LOST, together=self.exactly)
+        told = bus.exchange(wanted, LOST)
         self.ended = self.link.now() - self.origin
         return told
 
@@ -383,7 +378,7 @@ def _begun(train: Train, command: Command, watch: Watch | None) -> Operation[lis
         raise
 
 
-def train_of(bus: BusFace, axes: Sequence[AxisVerbs]) -> Operation[Train]:
+def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> Operation[Train]:
     """These axes of one bus, ready to be asked and told in a loop; nothing is written."""
     train: Train = yield from axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
     return train

@@ -43,31 +43,6 @@ def as_number(name: str, goal: object) -> float:
     )
 
 
-def not_ahead(buses: Sequence[str]) -> RequestError:
-    """The error for a loop that cannot be a cycle ahead on these buses."""
-    return RequestError(
-        "this loop cannot be a cycle ahead",
-        expected="axes of one serial bus",
-        cause=f"these are on {', '.join(buses)}: "
-        + (
-            "each bus waits for itself"
-            if len(buses) > 1
-            else "there the answers of several are awaited at once"
-        ),
-        advice="leave ahead out, or make a loop of its own for the axes of one serial bus; nothing was ordered",
-    )
-
-
-def never_ahead() -> RequestError:
-    """The error for a loop on an event loop that is to be a cycle ahead."""
-    return RequestError(
-        "a loop of an AsyncRobot cannot be a cycle ahead",
-        expected="ahead=True for a loop of a Robot, which blocks",
-        cause="an event loop wakes up too late to have the next cycle on the wire in time",
-        advice="leave ahead out, or use a Robot in a thread of its own; nothing was sent",
-    )
-
-
 def stopped(names: Sequence[str]) -> Interrupted:
     """The error for axes that somebody else has stopped, let go or told to move while they were led."""
     return Interrupted(

@@ -29,15 +29,13 @@ from collections.abc import Callable, Coroutine, Generator, Iterable, Iterator, 
 from contextlib import contextmanager
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.verbs import Said
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
-from motorbus.motion.loop.ahead import RoundsAhead
-from motorbus.motion.loop.errors import never_ahead, not_ahead
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
@@ -99,9 +97,8 @@ class LoopFace:
         exactly: bool = False,
         policy: Policy = "reject",
         watch: bool = True,
-        ahead: bool = False,
     ) -> None:
-        self._rounds = (RoundsAhead if ahead else Rounds)(
+        self._rounds = Rounds(
             body, rate, axes, direct=direct, jerk=jerk, exactly=exactly, policy=policy, watch=watch
         )
         self.goal = Goals(self._rounds)
@@ -156,9 +153,6 @@ class Loop(LoopFace):
         buses = [part.bus for part in self._rounds.parts.values()]
         if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
             self._rounds.only = buses[0]
-        elif isinstance(self._rounds, RoundsAhead):
-            self._rounds.refuse()
-            raise not_ahead(list(self._rounds.parts))
         return self
 
     def __iter__(self) -> Self:
@@ -222,7 +216,6 @@ def blocking_loop(
     jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
-    ahead: bool = False,
 ) -> Loop:
     """A control loop of `rate` (Hz) over these axes, for a `with` and a `for` in it; see `motorbus.motion.loop`.
 
@@ -234,14 +227,9 @@ def blocking_loop(
     While axes are led, each is asked now and then how it fares, where the wire is free for that; `watch=False` leaves
     that out.
 
-    With `ahead` the loop is one cycle ahead of what it tells: while the body of the `for` is at work, the next cycle is
-    on the wire already, so the wire need not wait for the program, and a goal leaves a cycle later than it would. What
-    keeps a cycle from leaving is raised in its own round: the reading before it is told first. That is for a loop near
-    the limit of its wire, and for the axes of one serial bus.
-
     Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
     """
-    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch, "ahead": ahead}
+    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
     return Loop(robot, robot.conductor, rate, axes, **how)
 
 
@@ -254,11 +242,8 @@ def awaiting_loop(
     jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
-    ahead: bool = False,
 ) -> AsyncLoop:
-    """The same for an `async with` and an `async for` in it; see `blocking_loop`. None of these can be `ahead`."""
-    if ahead:
-        raise never_ahead()
+    """The same for an `async with` and an `async for` in it; see `blocking_loop`."""
     how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
     return AsyncLoop(robot, robot.conductor, rate, axes, **how)
 

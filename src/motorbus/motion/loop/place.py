@@ -44,8 +44,7 @@ class Place:
     cannot be believed. `asked` is the goal that was set and `sent` the position that was ordered last; None: none.
     `begun` is true once it has got torque here, and until then `claim` is the command over it from when its goal was
     set. `endures` is in how many cycles in a row it may be silent and is ordered all the same, `left` in how many it
-    was not ordered. What is brought within its limits is put into `clamps`. With a `lag` a goal is made by a reading
-    so many cycles older.
+    was not ordered. What is brought within its limits is put into `clamps`.
     """
 
     __slots__ = (
@@ -89,7 +88,6 @@ class Place:
         direct: bool,
         jerk: float | None,
         policy: Policy = "reject",
-        lag: int = 0,
     ) -> None:
         spec = axis.spec
         found = limits.bounds(spec, device)
@@ -109,7 +107,7 @@ class Place:
         self._direct: Final = direct
         self._jerk: Final = jerk
         self._policy: Final = policy
-        self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1 - lag))
+        self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1))
         self._follower: Follower | None = None
         self._passed: float | None = None
         self.position = 0.0

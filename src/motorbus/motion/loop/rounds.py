@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from motorbus.bus.pump import Bus
+from motorbus.bus.blocking import Bus
 from motorbus.core.operation import Exchange, Operation, Report
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
@@ -42,11 +42,8 @@ class Rounds:
     """The work of one loop over a machine; `exactly` as `Part` says.
 
     `places` and `statistics` are there once it has been entered; `only` is set by a blocking loop on the only bus there
-    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop. A goal is made
-    by readings that are `lag` cycles older than the last ones when it leaves.
+    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop.
     """
-
-    lag = 0
 
     def __init__(
         self,
@@ -146,7 +143,7 @@ class Rounds:
         return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
 
     def _place(self, axis: AxisVerbs, device: Device) -> Place:
-        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy, self.lag)
+        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy)
         place.clamps = self._clamps
         return place
 

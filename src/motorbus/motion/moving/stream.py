@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil, floor, inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.family import Positions, Train
 from motorbus.core.operation import Operation, Pause, Progress, Report, Together
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused, RequestError
@@ -96,7 +96,7 @@ class Grid(NamedTuple):
         return min(max(slot + 1, ceil(since / self.period - 1e-6)), self.last)
 
 
-def rate_for(bus: BusFace, train: Train, angles: Mapping[int, float], asked: float | None = None) -> float:
+def rate_for(bus: BaseBus, train: Train, angles: Mapping[int, float], asked: float | None = None) -> float:
     """Hz at which the axes of a train are led; where nobody has asked for one see `USUAL` and `SHARE`.
 
     `angles` are goals that they could be told, by id (rad): for counting, each is as long as any other. Raises
@@ -185,7 +185,7 @@ class Stream:
         self._places: dict[int, float] = {}
         self._cycles = self._skipped = self._lost = 0
 
-    def lead(self, bus: BusFace) -> float:
+    def lead(self, bus: BaseBus) -> float:
         """s before the start at which the first goals must leave, so that they have arrived then."""
         return sum(bus.family.air_time(one, bus.rate) for one in self._train.goals(self._goals(0.0)))
 

@@ -19,7 +19,7 @@ from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard, untold
 
 if TYPE_CHECKING:
-    from motorbus.bus.face import BusFace
+    from motorbus.bus.base import BaseBus
     from motorbus.core.family import Readdressed
     from motorbus.motion.body import Body
     from motorbus.motion.capabilities import AxisVerbs
@@ -41,7 +41,7 @@ def fence(body: Body) -> None:
             gate.guards[axis.spec.node] = guard(axis)
 
 
-def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
+def enclose(bus: BaseBus, axes: Mapping[str, AxisSpec]) -> None:
     """The same over the devices of a bus that is open by itself: these axes of a machine file are on it.
 
     Nothing is sent. Who they are is asked when the first of them is ordered to a place.
@@ -57,12 +57,12 @@ def enclose(bus: BusFace, axes: Mapping[str, AxisSpec]) -> None:
         bus.interlock.guards[spec.node] = _guard(name, spec, ask)
 
 
-def _watched(bus: BusFace, gate: Gate) -> None:
+def _watched(bus: BaseBus, gate: Gate) -> None:
     bus.attach(gate)
     bus.readdressed = partial(follow, bus, gate)
 
 
-def follow(bus: BusFace, gate: Gate, event: Readdressed) -> None:
+def follow(bus: BaseBus, gate: Gate, event: Readdressed) -> None:
     """A device is about to answer to another id: its guard holds, and its fault counts, under that one as well.
 
     An id that the machine file has bounds for keeps those. Where nobody knows which device it is, it may be any: the
@@ -76,13 +76,13 @@ def follow(bus: BusFace, gate: Gate, event: Readdressed) -> None:
             gate.faults.setdefault(event.new, gate.faults[node])
 
 
-def _moved(bus: BusFace, guard: Guard, node: int) -> Guard:
+def _moved(bus: BaseBus, guard: Guard, node: int) -> Guard:
     """The guard of a device that has another id now."""
     ask = None if guard.track is None else _asking(bus, node)
     return Guard(guard.name, guard.bounds, measures=ask is not None, ask=ask, show=guard.show)
 
 
-def _asking(bus: BusFace, node: int) -> Callable[[], Runnable[Any]] | None:
+def _asking(bus: BaseBus, node: int) -> Callable[[], Runnable[Any]] | None:
     """What asks a device of this bus where it is; None where devices of its family do not tell."""
     device = bus.family.devices.blocking(bus, node)
     position = getattr(type(device), "position", None)

@@ -54,7 +54,6 @@ class Gate:
         self._flocks: Final = Flocks()
         self._stops: Stops = _none
         self._seen: Seen = {}
-        self._tell: Callable[[], None] = _nothing
         self._now: Callable[[], float] = _never
         self._answer: Answer | None = None
         self._places: Mapping[int, float] = {}
@@ -65,12 +64,9 @@ class Gate:
         now: Callable[[], float],
         stops: Stops | None = None,
         accepted: Stops | None = None,
-        tell: Callable[[], None] | None = None,
     ) -> None:
         """Look there for what nodes have told of their positions; `now` gives the time on the link's clock (s), `stops`
-        how many stops have left for a node, `accepted` how many it has accepted. `tell` is called before anybody looks,
-        to have there what was heard last."""
-        self._tell = tell or self._tell
+        how many stops have left for a node, `accepted` how many it has accepted."""
         self._seen, self._now, self._stops = seen, now, stops or self._stops
         self.turning.accepted = accepted or self.turning.accepted
 
@@ -107,7 +103,6 @@ class Gate:
             return []
         if not self.guards or exchange.rank is Rank.STOP:
             return []
-        self._tell()
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
         if not everyone and self._are_known(goals, now):
@@ -146,7 +141,6 @@ class Gate:
             return False
         if not self.guards:
             return not self.attended
-        self._tell()
         goals, now = exchange.goals, self._now()
         flock = self._flocks.of(exchange.aim, self.guards)
         if flock is not None and flock.are_fine(goals, self._seen, self._told_by, now):
@@ -177,7 +171,6 @@ class Gate:
 
     def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
         """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
-        self._tell()
         if (
             obeyed
             and goals
@@ -358,10 +351,6 @@ def _paced(node: int, goals: Iterable[Goal]) -> bool:
 def _none(_: int) -> int:
     """The stops of a gate that was not told where they are counted."""
     return 0
-
-
-def _nothing() -> None:
-    """What is to be told to a gate that knows all."""
 
 
 def _never() -> float:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING, Final
 
-from motorbus.bus.face import BusFace
+from motorbus.bus.base import BaseBus
 from motorbus.core.family import Health
 from motorbus.core.operation import Exchange, Operation, Pause, Report, outcome
 from motorbus.errors import Faulted, MotorbusError, NoReply, Overloaded, WireError
@@ -41,7 +41,7 @@ class Watch:
     `fault` is the last error that was raised for a device that has restarted or let go.
     """
 
-    def __init__(self, bus: BusFace, axes: Iterable[AxisVerbs]) -> None:
+    def __init__(self, bus: BaseBus, axes: Iterable[AxisVerbs]) -> None:
         self._bus: Final = bus
         self._axes: Final = {axis.spec.node: axis for axis in axes if "health" in axis.able}
         self._strains: Final[dict[int, Strain | None]] = {}
