@@ -109,7 +109,7 @@ class Motorbus:
         self.bus.run(self.rows(prepared))
 
     def cycle(self, prepared: list[float]) -> Any:
-        return self.bus.volley(self.goals(prepared), self.kept)[1]
+        return self.bus.exchange((self.goals(prepared), self.kept))[1]
 
     def prepare(self, counts: list[int]) -> list[Any]:
         if self.kept is None:

@@ -67,8 +67,8 @@ import sys, motorbus
 with motorbus.open(sys.argv[1]) as bus:
     servo = motorbus.feetech.Servo(bus, 1)
     servo.position()
-    print("ready", flush=True)
     try:
+        print("ready", flush=True)
         while True:
             servo.position()
     finally:

@@ -19,7 +19,7 @@ AXES = {name: {"low": "-60 deg", "high": "60 deg", "max_step": "15 deg"} for nam
 SYNC_WRITE = 0x83
 WAYS: dict[str, Callable[[Any, Any, Any], object]] = {
     "alone": lambda bus, order, nodes: bus.run(order),
-    "with a read": lambda bus, order, nodes: bus.volley(order, sync_read_positions(nodes)),
+    "with a read": lambda bus, order, nodes: bus.exchange((order, sync_read_positions(nodes))),
 }
 
 

@@ -10,11 +10,14 @@ from math import inf
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
+from motorbus.bus.jobs import RequestJob
+from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.core.operation import Runnable
-from motorbus.errors import MotorbusError
+from motorbus.core.operation import UNLIKE, Exchange, Runnable
+from motorbus.errors import LinkError, MotorbusError
 from motorbus.link.memory import MemoryLink
 
 T = TypeVar("T")
@@ -31,12 +34,58 @@ class AsyncBus(BaseBus):
     _loop: asyncio.AbstractEventLoop | None = None
     _descriptor: int | None = None
     _timer: asyncio.TimerHandle | None = None
+    _direct: tuple[Prepared, Attempt, asyncio.Future[Any]] | None = None
+    """The prepared request in flight that no other request has met, and what gets its value."""
 
     async def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
         """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
+        if isinstance(procedure, Exchange) and not procedure.effect and not self.link.virtual:
+            return await self._transact(procedure)  # type: ignore[no-any-return]
         part = _Part(self, procedure, report, asyncio.Event())
         await _run_parts([part])
         return part.tree.result()
+
+    async def _transact(self, request: Exchange[Any]) -> Any:
+        """Carry out one request that changes nothing."""
+        loop = asyncio.get_running_loop()
+        future: asyncio.Future[Any] = loop.create_future()
+        job: RequestJob | None = None
+        with self.turn:
+            try:
+                prepared = self.prepare(request)
+                if prepared is not None:
+                    self._direct = prepared, self.write(prepared), future
+            except LinkError as error:
+                self._lost(error)
+                raise
+            if prepared is None:
+                job = self._job(request, future)
+                self.submit(job)
+                self.send()
+            self.watch()
+        try:
+            return await future
+        except asyncio.CancelledError:
+            if job is not None:
+                self.engine.cancel(job)
+            raise
+
+    def _job(self, request: Exchange[Any], future: asyncio.Future[Any]) -> RequestJob:
+        """A job whose end completes this future, from any thread."""
+        loop = future.get_loop()
+
+        def settle() -> None:
+            loop.call_soon_threadsafe(_complete, future, job)
+
+        job = RequestJob(request, settled=settle, losses=self.engine.losses)
+        return job
+
+    def send(self) -> None:
+        """As `BaseBus.send`; a prepared request in flight becomes an attempt like any other first."""
+        if self._direct is not None:
+            (prepared, _, future), self._direct = self._direct, None
+            self.adopt(prepared, (), self._job(prepared.exchange, future))
+        super().send()
 
     def watch(self) -> None:
         """Have `_look` called when data has come, or at the next deadline."""
@@ -54,17 +103,51 @@ class AsyncBus(BaseBus):
             seconds = min(seconds, IDLE)
         elif descriptor is None and not (self.engine.idle and not self.engine.listeners):
             seconds = min(seconds, LOOK)
+        if seconds == inf:
+            return
+        moment = loop.time() + max(0.0, seconds)
         if self._timer is not None:
+            if self._timer.when() <= moment:  # it looks again then
+                return
             self._timer.cancel()
-            self._timer = None
-        if seconds < inf:
-            self._timer = loop.call_later(max(0.0, seconds), self._look)
+        self._timer = loop.call_at(moment, self._wake)
+
+    def _wake(self) -> None:
+        self._timer = None
+        self._look()
 
     def _look(self) -> None:
         with self.turn:
-            self.receive(-inf)
+            if self._direct is not None:
+                self._look_for_reply(*self._direct)
+            else:
+                self.receive(-inf)
+                self.send()
+            if not self.engine.idle or self.engine.listeners:
+                self.watch()
+
+    def _look_for_reply(self, prepared: Prepared, attempt: Attempt, future: asyncio.Future[Any]) -> None:
+        """Take what has come for a prepared request; what is not its complete reply goes the general path."""
+        try:
+            chunks = self.link.read(-inf)
+        except LinkError as error:
+            self._direct = None
+            self._lost(error)
+            _fail(future, self.engine.gone or error)
+            return
+        if not chunks and self.link.now() < attempt.deadline:
+            return
+        self._direct = None
+        try:
+            value = self.accept(prepared, chunks, attempt.deadline)
+        except Exception as error:
+            _fail(future, error)
+            return
+        if value is UNLIKE:
+            self.adopt(prepared, chunks, self._job(prepared.exchange, future))
             self.send()
-            self.watch()
+        elif not future.done():
+            future.set_result(value)
 
     def _unwatch(self) -> None:
         if self._timer is not None:
@@ -84,6 +167,18 @@ class AsyncBus(BaseBus):
 
     async def __aexit__(self, *exc: object) -> None:
         await self.close()
+
+
+def _complete(future: asyncio.Future[Any], job: RequestJob) -> None:
+    if job.error is not None:
+        _fail(future, job.error)
+    elif not future.done():
+        future.set_result(job.value)
+
+
+def _fail(future: asyncio.Future[Any], error: BaseException) -> None:
+    if not future.done():
+        future.set_exception(error)
 
 
 async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus, Any]:

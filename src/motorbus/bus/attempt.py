@@ -20,6 +20,7 @@ class Attempt:
     `job` is None for an attempt whose caller no longer waits. `excluded` are nodes of a group that this attempt does
     not wait for, or whose reply was damaged. `fault` is why the attempt failed, "" while it has not. `air` is its time
     on the wire, `competitors` the number of attempts on other lanes that its deadline allows for.
+    `ended`: it is not in flight any more.
     """
 
     __slots__ = (
@@ -28,6 +29,7 @@ class Attempt:
         "complete",
         "deadline",
         "echo_excluded",
+        "ended",
         "excluded",
         "fault",
         "is_probe",
@@ -61,6 +63,7 @@ class Attempt:
         self.surplus = False
         self.echo_excluded = False
         self.complete = False
+        self.ended = False
 
     def take(self, reply: Reply) -> bool:
         """Keep this reply if it is one of those expected."""

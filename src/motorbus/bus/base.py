@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import RateJob
+from motorbus.bus.jobs import RateJob, RequestJob
+from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import Reading
+from motorbus.bus.prepared import Prepared
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
@@ -20,7 +24,7 @@ from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import Exchange, Journal, Notice, Runnable
+from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Notice, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -175,6 +179,89 @@ class BaseBus:
     def _wait_without_link(self, until: float) -> None:
         if isinstance(self.link, Renewable) and self._reconnects:
             self.link.rest(min(until, self.link.now() + IDLE))
+
+    # -- prepared requests -------------------------------------------------------------------------------------
+
+    def prepare(self, request: Exchange[Any]) -> Prepared | None:
+        """The prepared form of this request if it may be sent at once, else None. The caller holds the turn."""
+        engine, link = self.engine, self.link
+        prepared: Prepared | None = request.course
+        if prepared is None or prepared.engine is not engine:
+            return None
+        if not engine.ready and not engine.check_ready():
+            return None
+        single = prepared.single
+        if single is not None and single.length == prepared.length:
+            prepared = prepared.alternate
+        if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
+            return None
+        if prepared.timing != engine.timing:
+            engine.measure(prepared)
+        if stale := link.read(-inf):  # it cannot answer what has not left
+            engine.feed(stale, link.now())
+            return None
+        return None if link.now() < engine.free_at else prepared
+
+    def write(self, prepared: Prepared, order: Exchange[Any] | None = None) -> Attempt:
+        """Write a prepared request; an `order` without reply goes in front of it. Raises what forbids the order."""
+        engine, now = self.engine, self.link.now()
+        attempt = prepared.attempt
+        if attempt.ended:
+            attempt = prepared.attempt = Attempt(prepared.exchange, None)
+        wire: Any = prepared.wire
+        attempt.sent_at = now
+        if order is not None:
+            wire, attempt.sent_at = self._write_order(order, now) + wire, engine.free_at
+        attempt.deadline = attempt.sent_at + prepared.budget
+        engine.in_flight[prepared.lane] = attempt
+        if engine.trace.subscriptions:
+            engine.trace.put(TraceRecord(now, "tx", prepared.wire))
+        self.link.write(wire)
+        return attempt
+
+    def _write_order(self, order: Exchange[Any], now: float) -> Any:
+        """Check and count an order that leaves with the next request; its data."""
+        engine = self.engine
+        engine.time = now
+        engine.check(RequestJob(order, losses=engine.losses))
+        engine.positions.sent(order)
+        engine.statistics.asked(order.replies)
+        engine.free_at = now + engine.air_time(order)
+        if engine.trace.subscriptions:
+            engine.trace.put(TraceRecord(now, "tx", order.request))
+        return order.request
+
+    def accept(self, prepared: Prepared, chunks: Sequence[Data], deadline: float) -> Any:
+        """The value if this is the complete reply to a prepared request, else UNLIKE."""
+        if len(chunks) != 1:
+            return UNLIKE
+        at = self.link.now()
+        if at > deadline:  # the host was late
+            at = deadline
+        value = prepared.decode(chunks[0], at)
+        if value is not UNLIKE:
+            engine = self.engine
+            if engine.trace.subscriptions:
+                engine.trace.put(TraceRecord(at, "rx", chunks[0]))
+            engine.accepted(prepared, chunks[0], at)
+        return value
+
+    def adopt(self, prepared: Prepared, chunks: Sequence[Data], job: RequestJob) -> None:
+        """The reply to a prepared request is in pieces, damaged or missing: its job goes the general path."""
+        engine, attempt = self.engine, prepared.attempt
+        prepared.attempt = Attempt(prepared.exchange, None)
+        job.policy = carry_out(engine, job.request)
+        job.policy.send(None)  # up to the attempt that is in flight
+        attempt.job = job
+        engine.adopt(attempt)
+        engine.feed(chunks, self.link.now(), attempt.sent_at)
+
+    def submit(self, job: RequestJob) -> None:
+        """Queue a request, and prepare it for the next time."""
+        request, engine = job.request, self.engine
+        if request.whole is not None and getattr(request.course, "engine", None) is not engine:
+            request.course = engine.prepare(request)
+        engine.submit(job, self.link.now())
 
     # -- observers ---------------------------------------------------------------------------------------------
 

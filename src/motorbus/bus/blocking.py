@@ -13,13 +13,11 @@ from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
 from motorbus.bus.jobs import RequestJob
-from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.bus.trace import TraceRecord
 from motorbus.core.entry import shown
-from motorbus.core.operation import UNLIKE, Data, Exchange, Runnable
+from motorbus.core.operation import UNLIKE, Exchange, Operation, Runnable, Together
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -38,60 +36,28 @@ class Bus(BaseBus):
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
-        if isinstance(procedure, Exchange) and not (
-            procedure.effect in GATED and self.required_reads(procedure)
-        ):
+        if isinstance(procedure, Exchange) and not self._needs_reads(procedure):
             return self.transact(procedure)  # type: ignore[no-any-return]
         return run_here(self, procedure, report)
 
     def transact(self, request: Exchange[Any]) -> Any:
         """Carry out one request."""
-        engine, link, turn = self.engine, self.link, self.turn
-        if link.virtual:
+        turn = self.turn
+        if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        stops = engine.positions.stops_for(request) if request.effect in GATED else None
+        stops = self.engine.positions.stops_for(request) if request.effect in GATED else None
         signals.depth += 1
         try:
             turn.acquire(request.rank)
             try:
-                prepared: Prepared | None = request.course
-                if prepared is None or prepared.engine is not engine:
-                    return self._carry_out(request, stops)
-                if not engine.ready and not engine.check_ready():
-                    return self._carry_out(request, stops)
-                single = prepared.single
-                if single is not None and single.length == prepared.length:
-                    prepared = prepared.alternate
-                if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
-                    return self._carry_out(request, stops)
-                if prepared.timing != engine.timing:
-                    engine.measure(prepared)
-                if stale := link.read(-inf):
-                    engine.feed(stale, link.now())
-                    return self._carry_out(request, stops)
-                now = link.now()
-                if now < engine.free_at:
-                    return self._carry_out(request, stops)
-                attempt = prepared.attempt
-                attempt.sent_at = now
-                attempt.deadline = deadline = now + prepared.budget
-                engine.in_flight[prepared.lane] = attempt
-                if engine.trace.subscriptions:
-                    engine.trace.put(TraceRecord(now, "tx", prepared.wire))
-                link.write(prepared.wire)
-                chunks = link.read(deadline)
-                if len(chunks) == 1:
-                    at = link.now()
-                    if at > deadline:  # the host was late
-                        at = deadline
-                    value = prepared.decode(chunks[0], at)
-                    if value is not UNLIKE:
-                        if engine.trace.subscriptions:
-                            engine.trace.put(TraceRecord(at, "rx", chunks[0]))
-                        engine.accepted(prepared, chunks[0], at)
-                        return value
-                return self._continue(prepared, chunks)
+                prepared = self.prepare(request)
+                if prepared is not None:
+                    return self._receive(prepared, self.write(prepared))
+                job = RequestJob(request, losses=self.engine.losses)
+                job.stops = stops
+                self.submit(job)
+                return self._finish(job)
             except LinkError as error:
                 self._lost(error)
                 raise
@@ -102,26 +68,14 @@ class Bus(BaseBus):
             if signals.pending is not None and not signals.depth:
                 signals.raise_pending()
 
-    def _carry_out(self, request: Exchange[Any], stops: int | None) -> Any:
-        """One request by the general path. The caller holds the turn."""
-        engine = self.engine
-        if request.whole is not None and getattr(request.course, "engine", None) is not engine:
-            request.course = engine.prepare(request)
-        job = RequestJob(request, losses=engine.losses)
-        job.stops = stops
-        engine.submit(job, self.link.now())
-        return self._finish(job)
-
-    def _continue(self, prepared: Prepared, chunks: Sequence[Data]) -> Any:
-        """The reply to a prepared request is in pieces, damaged or missing: go on by the general path."""
-        engine, attempt, request = self.engine, prepared.attempt, prepared.exchange
-        prepared.attempt = Attempt(request, None)
-        job = RequestJob(request, losses=engine.losses)
-        job.policy = carry_out(engine, request)
-        job.policy.send(None)  # up to the attempt that is in flight
-        attempt.job = job
-        engine.adopt(attempt)
-        engine.feed(chunks, self.link.now(), attempt.sent_at)
+    def _receive(self, prepared: Prepared, attempt: Attempt) -> Any:
+        """The value of a prepared request that was written."""
+        chunks = self.link.read(attempt.deadline)
+        value = self.accept(prepared, chunks, attempt.deadline)
+        if value is not UNLIKE:
+            return value
+        job = RequestJob(prepared.exchange, losses=self.engine.losses)
+        self.adopt(prepared, chunks, job)
         return self._finish(job)
 
     def _finish(self, job: RequestJob) -> Any:
@@ -136,89 +90,32 @@ class Bus(BaseBus):
                 self.receive(inf)
         return job.result()
 
-    def volley(self, *requests: Exchange[Any]) -> list[Any]:
-        """Carry out several requests in order, as a control loop does in every cycle; their values.
+    def start(self, requests: Sequence[Exchange[Any]]) -> Pending:
+        """Send a batch, as a control loop does in every cycle; `Pending.result` gives its values.
 
         A request without reply leaves in one write with the next one, where the bus is idle: goals out, positions in.
-        Raises the first error; requests behind it have not been sent then.
+        Any other batch is sent by `result`. The calling thread has the bus until then, and uses it for nothing else.
         """
-        return self.exchange(requests)
+        _check_requests(requests)
+        order = requests[0] if len(requests) == 2 and requests[0].replies == () else None
+        pending = Pending(self, requests)
+        if len(requests) == 1 + (order is not None) and not (order is not None and self._needs_reads(order)):
+            pending.begin(requests[-1], order)
+        return pending
 
     def exchange(
-        self, requests: Sequence[Exchange[Any]], forgiven: tuple[type[Exception], ...] = ()
+        self, requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...] = ()
     ) -> list[Any]:
-        """`volley`; an error of a `forgiven` type becomes the value of its request."""
-        _check_requests(requests)
-        if len(requests) == 2:
-            try:
-                value = self._burst(requests[0], requests[1])
-            except LinkError:
-                raise
-            except forgiven as error:
-                return [None, error]
-            if value is not UNLIKE:
-                return [None, value]
-        values: list[Any] = []
-        for request in requests:
-            try:
-                values.append(self.run(request))
-            except forgiven as error:
-                values.append(error)
+        """Carry out a batch, see `start`: the values of its requests.
+
+        An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
+        have not been sent.
+        """
+        values: list[Any] = exchange_on({self: requests}, tolerated)[self]
         return values
 
-    def _burst(self, order: Exchange[Any], question: Exchange[Any]) -> Any:
-        """Send an order without reply and a prepared request in one write; UNLIKE when nothing was sent."""
-        engine, link = self.engine, self.link
-        prepared: Prepared | None = question.course
-        if order.replies != () or prepared is None or prepared.engine is not engine:
-            return UNLIKE
-        if order.effect in GATED and self.required_reads(order):
-            return UNLIKE
-        with self.turn:
-            if not engine.ready and not engine.check_ready():
-                return UNLIKE
-            single = prepared.single
-            if single is not None and single.length == prepared.length:
-                prepared = prepared.alternate
-            now = link.now()
-            if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
-                return UNLIKE
-            if now < engine.free_at or link.read(-inf):
-                return UNLIKE
-            if prepared.timing != engine.timing:
-                engine.measure(prepared)
-            engine.time = now
-            engine.check(RequestJob(order, losses=engine.losses))
-            try:
-                return self._send_burst(order, prepared, now)
-            except LinkError as error:
-                self._lost(error)
-                raise
-
-    def _send_burst(self, order: Exchange[Any], prepared: Prepared, now: float) -> Any:
-        engine, link, attempt = self.engine, self.link, prepared.attempt
-        engine.positions.sent(order)
-        engine.statistics.asked(order.replies)
-        start = now + engine.air_time(order)
-        attempt.sent_at = start if engine.paced else now
-        attempt.deadline = deadline = start + prepared.budget
-        engine.free_at = start
-        engine.in_flight[prepared.lane] = attempt
-        wire: Any = order.request
-        if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", wire))
-            engine.trace.put(TraceRecord(now, "tx", prepared.wire))
-        link.write(wire + prepared.wire)
-        chunks = link.read(deadline)
-        if len(chunks) == 1:
-            at = min(link.now(), deadline)
-            value = prepared.decode(chunks[0], at)
-            if value is not UNLIKE:
-                if engine.trace.subscriptions:
-                    engine.trace.put(TraceRecord(at, "rx", chunks[0]))
-                engine.accepted(prepared, chunks[0], at)
-                return value
-        return self._continue(prepared, chunks)
+    def _needs_reads(self, request: Exchange[Any]) -> bool:
+        return request.effect in GATED and bool(self.required_reads(request))
 
     def defer_signals(self) -> None:
         """Raise signals at the end of a request only, until this bus is closed; see `motorbus.bus.interrupts`."""
@@ -240,12 +137,113 @@ class Bus(BaseBus):
         self.close()
 
 
+class Pending:
+    """A batch that was started; `sent` is false where `result` still has to send it."""
+
+    def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]]) -> None:
+        self.bus = bus
+        self.requests = requests
+        self._prepared: Prepared | None = None
+
+    @property
+    def sent(self) -> bool:
+        """The batch has left."""
+        return self._prepared is not None
+
+    def begin(self, request: Exchange[Any], order: Exchange[Any] | None) -> None:
+        """Write both if they may be sent at once."""
+        bus = self.bus
+        bus.check_thread()
+        bus.turn.acquire(request.rank)
+        try:
+            prepared = bus.prepare(request)
+            if prepared is not None:
+                bus.write(prepared, order)
+                self._prepared = prepared
+        except LinkError as error:
+            bus._lost(error)
+            raise
+        finally:
+            if self._prepared is None:
+                bus.turn.release()
+
+    def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
+        """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
+        prepared, self._prepared = self._prepared, None
+        bus = self.bus
+        if prepared is None:
+            return bus.run(carry_out_batch(self.requests, tolerated))
+        value: Any
+        try:
+            value = bus._receive(prepared, prepared.attempt)
+        except LinkError as error:
+            bus._lost(error)
+            raise
+        except tolerated as error:
+            value = error
+        finally:
+            bus.turn.release()
+        return [None, value][-len(self.requests) :]
+
+
+def carry_out_batch(
+    requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...]
+) -> Operation[list[Any]]:
+    """Carry out these requests: those on different lanes at the same time, others in order."""
+    if len({request.lane for request in requests}) > 1:
+        return (yield from Together([_tolerate(request, tolerated) for request in requests]))
+    values = []
+    for request in requests:
+        value = yield from _tolerate(request, tolerated)
+        values.append(value)
+    return values
+
+
+def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ...]) -> Operation[Any]:
+    try:
+        return (yield from request)
+    except tolerated as error:
+        return error
+
+
+def exchange_on(
+    batches: Mapping[Bus, Sequence[Exchange[Any]]], tolerated: tuple[type[Exception], ...] = ()
+) -> dict[BaseBus, Any]:
+    """Carry out a batch on each bus at the same time: the values of each, or on several buses its MotorbusError."""
+    with interrupts():
+        if len(batches) == 1:
+            ((bus, requests),) = batches.items()
+            return {bus: bus.start(requests).result(tolerated)}
+        found: dict[BaseBus, Any] = {}
+        pending: list[Pending] = []
+        for bus, requests in batches.items():
+            try:
+                pending.append(bus.start(requests))
+            except MotorbusError as error:
+                found[bus] = error
+        unsent = {one.bus: carry_out_batch(one.requests, tolerated) for one in pending if not one.sent}
+        try:
+            found |= run_on(unsent) if unsent else {}
+        finally:
+            for one in pending:
+                if one.sent:
+                    found[one.bus] = _value_or_error(one, tolerated)
+        return found
+
+
+def _value_or_error(pending: Pending, tolerated: tuple[type[Exception], ...]) -> Any:
+    try:
+        return pending.result(tolerated)
+    except MotorbusError as error:
+        return error
+
+
 def _check_requests(requests: Sequence[Any]) -> None:
     for one in requests:
         if not isinstance(one, Exchange):
             raise RequestError(
                 f"{shown(one)} is not a request",
-                expected="as bus.volley(write(goals), sync_read_positions(servos)): single requests, made before",
+                expected="as bus.exchange([write(goals), sync_read_positions(servos)]): single requests, made before",
                 advice="use run() for a procedure; nothing was sent",
             )
 

@@ -601,6 +601,7 @@ class Engine:
         self._continue(attempt)
 
     def _continue(self, attempt: Attempt) -> None:
+        attempt.ended = True
         if attempt.job is not None:
             self._resume(attempt.job, attempt)
 

@@ -164,18 +164,6 @@ class Part:
         self.ended = self.link.now() - self.origin
         return told
 
-    def at_once(self, bus: Bus, orders: Sequence[Exchange[Any]], moment: float) -> list[Any]:
-        """`cycle` on the only bus there is, where nothing is abreast; who waits `exactly` sends goals and the first
-        question in one write.
-
-        There is nothing to clean up, so an interruption is raised at once.
-        """
-        self.await_slot(bus, moment)
-        wanted = (*orders, *self.reads)
-        told = bus.exchange(wanted, LOST)
-        self.ended = self.link.now() - self.origin
-        return told
-
     def await_slot(self, bus: Bus, moment: float) -> None:
         """Look how those fare who are due, where there is time, and wait for this moment: a cycle has `began` then."""
         link, begins = self.link, moment + self.origin

@@ -150,9 +150,8 @@ class Loop(LoopFace):
 
     def __enter__(self) -> Self:
         _carried(self._rounds.entering(), self._conductor.run)
-        buses = [part.bus for part in self._rounds.parts.values()]
-        if len(buses) == 1 and isinstance(buses[0], Bus) and not self._rounds.parts_abreast:
-            self._rounds.only = buses[0]
+        buses = {name: part.bus for name, part in self._rounds.parts.items()}
+        self._rounds.buses = {name: bus for name, bus in buses.items() if isinstance(bus, Bus)}
         return self
 
     def __iter__(self) -> Self:

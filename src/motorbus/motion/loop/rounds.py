@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from motorbus.bus.blocking import Bus
+from motorbus.bus.blocking import Bus, exchange_on
 from motorbus.core.operation import Exchange, Operation, Report
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
@@ -31,6 +31,7 @@ from motorbus.motion.loop.errors import as_number, check_loop, silence, stopped
 from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
 from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState, state_of
+from motorbus.motion.moving.forgiving import LOST
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named
 
@@ -41,8 +42,8 @@ RELEASES: Final = (Interrupted, Faulted, Overloaded)
 class Rounds:
     """The work of one loop over a machine; `exactly` as `Part` says.
 
-    `places` and `statistics` are there once it has been entered; `only` is set by a blocking loop on the only bus there
-    is, where a round then carries its cycle out itself. `without` are the axes that cannot be in a loop.
+    `places` and `statistics` are there once it has been entered; `buses` are set by a blocking loop, which carries
+    its cycles out itself. `without` are the axes that cannot be in a loop.
     """
 
     def __init__(
@@ -88,17 +89,12 @@ class Rounds:
         self._fresh = False
         self._all: tuple[Place, ...] = ()
         self._one: Part | None = None
-        self.only: Bus | None = None
+        self.buses: dict[str, Bus] = {}
 
     @property
     def now(self) -> float:
         """Robot time (s), by the latest clock of its buses."""
         return self._one.now if self._one is not None else latest(self.parts.values())
-
-    @property
-    def parts_abreast(self) -> bool:
-        """Several exchanges of a bus may be in flight at once."""
-        return any(part.abreast for part in self.parts.values())
 
     # -- entering ------------------------------------------------------------------------------------------------------
 
@@ -212,20 +208,35 @@ class Rounds:
         moment = grid.take(now)
         self._stepped = grid.number
         orders = self._orders(periods)
-        if self.only is None:
+        if self.buses:
+            told = self._exchange(self.buses, orders, moment)
+        else:
             told = yield Abreast(
                 {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
             )
-        else:
-            told = self._at_once(self.only, orders, moment)
         return self._taken(told, moment, grid.number)
 
-    def _at_once(self, only: Bus, orders: Mapping[str, Any], moment: float) -> dict[str, Any]:
-        ((name, part),) = self.parts.items()
+    def _exchange(self, buses: Mapping[str, Bus], orders: Mapping[str, Any], moment: float) -> dict[str, Any]:
+        """Send orders and questions on all buses from this moment on, then take what comes; see `exchange_on`."""
+        found: dict[str, Any] = {}
+        batches: dict[Bus, Any] = {}
+        for name, bus in buses.items():
+            part = self.parts[name]
+            try:
+                part.await_slot(bus, moment)
+            except MotorbusError as error:
+                found[name] = error
+            else:
+                batches[bus] = (*orders[name], *part.reads)
         try:
-            return {name: part.at_once(only, orders[name], moment)}
-        except MotorbusError as failure:
-            return {name: failure}
+            values = exchange_on(batches, LOST)
+        except MotorbusError as error:
+            values = dict.fromkeys(batches, error)
+        for name, bus in buses.items():
+            if bus in values:
+                found[name] = values[bus]
+                self.parts[name].ended = self.parts[name].now
+        return {name: found[name] for name in buses}
 
     def _orders(self, periods: int) -> dict[str, Sequence[Exchange[Any]]]:
         try:
