@@ -60,7 +60,7 @@ class AsyncBus(BaseBus):
                 raise
             if prepared is None:
                 job = self._job(request, future)
-                self.submit(job)
+                self.engine.submit(job, self.link.now())
                 self.send()
             self.watch()
         try:

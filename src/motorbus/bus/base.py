@@ -200,7 +200,7 @@ class BaseBus:
         if stale := link.read(-inf):  # it cannot answer what has not left
             engine.feed(stale, link.now())
             return None
-        return None if link.now() < engine.free_at else prepared
+        return None if engine.paced and link.now() < engine.free_at else prepared
 
     def write(self, prepared: Prepared, order: Exchange[Any] | None = None) -> Attempt:
         """Write a prepared request; an `order` without reply goes in front of it. Raises what forbids the order."""
@@ -223,7 +223,7 @@ class BaseBus:
         """Check and count an order that leaves with the next request; its data."""
         engine = self.engine
         engine.time = now
-        engine.check(RequestJob(order, losses=engine.losses))
+        engine.check(order)
         engine.positions.sent(order)
         engine.statistics.asked(order.replies)
         engine.free_at = now + engine.air_time(order)
@@ -255,13 +255,6 @@ class BaseBus:
         attempt.job = job
         engine.adopt(attempt)
         engine.feed(chunks, self.link.now(), attempt.sent_at)
-
-    def submit(self, job: RequestJob) -> None:
-        """Queue a request, and prepare it for the next time."""
-        request, engine = job.request, self.engine
-        if request.whole is not None and getattr(request.course, "engine", None) is not engine:
-            request.course = engine.prepare(request)
-        engine.submit(job, self.link.now())
 
     # -- observers ---------------------------------------------------------------------------------------------
 

@@ -56,7 +56,7 @@ class Bus(BaseBus):
                     return self._receive(prepared, self.write(prepared))
                 job = RequestJob(request, losses=self.engine.losses)
                 job.stops = stops
-                self.submit(job)
+                self.engine.submit(job, self.link.now())
                 return self._finish(job)
             except LinkError as error:
                 self._lost(error)
@@ -97,10 +97,11 @@ class Bus(BaseBus):
         Any other batch is sent by `result`. The calling thread has the bus until then, and uses it for nothing else.
         """
         _check_requests(requests)
-        order = requests[0] if len(requests) == 2 and requests[0].replies == () else None
         pending = Pending(self, requests)
-        if len(requests) == 1 + (order is not None) and not (order is not None and self._needs_reads(order)):
-            pending.begin(requests[-1], order)
+        if len(requests) == 1:
+            pending.begin(requests[0], None)
+        elif len(requests) == 2 and requests[0].replies == () and not self._needs_reads(requests[0]):
+            pending.begin(requests[1], requests[0])
         return pending
 
     def exchange(
@@ -111,8 +112,7 @@ class Bus(BaseBus):
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
-        values: list[Any] = exchange_on({self: requests}, tolerated)[self]
-        return values
+        return self.start(requests).result(tolerated)
 
     def _needs_reads(self, request: Exchange[Any]) -> bool:
         return request.effect in GATED and bool(self.required_reads(request))
@@ -140,10 +140,13 @@ class Bus(BaseBus):
 class Pending:
     """A batch that was started; `sent` is false where `result` still has to send it."""
 
+    __slots__ = ("_prepared", "_signals", "bus", "requests")
+
     def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]]) -> None:
         self.bus = bus
         self.requests = requests
         self._prepared: Prepared | None = None
+        self._signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
 
     @property
     def sent(self) -> bool:
@@ -151,9 +154,11 @@ class Pending:
         return self._prepared is not None
 
     def begin(self, request: Exchange[Any], order: Exchange[Any] | None) -> None:
-        """Write both if they may be sent at once."""
+        """Write both if they may be sent at once. Signals are deferred until `result`."""
         bus = self.bus
-        bus.check_thread()
+        if bus.link.virtual:
+            bus.check_thread()
+        self._signals.depth += 1
         bus.turn.acquire(request.rank)
         try:
             prepared = bus.prepare(request)
@@ -165,7 +170,14 @@ class Pending:
             raise
         finally:
             if self._prepared is None:
-                bus.turn.release()
+                self._release()
+
+    def _release(self) -> None:
+        self.bus.turn.release()
+        signals = self._signals
+        signals.depth -= 1
+        if signals.pending is not None and not signals.depth:
+            signals.raise_pending()
 
     def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
         """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
@@ -182,8 +194,8 @@ class Pending:
         except tolerated as error:
             value = error
         finally:
-            bus.turn.release()
-        return [None, value][-len(self.requests) :]
+            self._release()
+        return [value] if len(self.requests) == 1 else [None, value]
 
 
 def carry_out_batch(
@@ -209,11 +221,8 @@ def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ...]) ->
 def exchange_on(
     batches: Mapping[Bus, Sequence[Exchange[Any]]], tolerated: tuple[type[Exception], ...] = ()
 ) -> dict[BaseBus, Any]:
-    """Carry out a batch on each bus at the same time: the values of each, or on several buses its MotorbusError."""
+    """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
     with interrupts():
-        if len(batches) == 1:
-            ((bus, requests),) = batches.items()
-            return {bus: bus.start(requests).result(tolerated)}
         found: dict[BaseBus, Any] = {}
         pending: list[Pending] = []
         for bus, requests in batches.items():

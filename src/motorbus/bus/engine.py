@@ -22,7 +22,7 @@ from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Wait
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED, LastPositions, is_stopped_by, moves
 from motorbus.bus.prepared import Prepared
-from motorbus.bus.statistics import Statistics, bucket_of
+from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.core.family import Family
@@ -173,6 +173,8 @@ class Engine:
                 return
             if job.priority is Rank.STOP:
                 self._stop_waiting(job.request)
+            if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
+                job.request.course = self.prepare(job.request)
             job.policy = carry_out(self, job.request)
             insort(self.queue, job)
         elif isinstance(job, ExclusiveJob) and self.exclusive is not None and self.exclusive is job.owner:
@@ -279,7 +281,7 @@ class Engine:
             if step.is_probe:
                 self._check_speaks(request)
             else:
-                self.check(job)
+                self.check(request, job)
         except MotorbusError as error:
             job.settle(error=error)
             return None
@@ -295,16 +297,15 @@ class Engine:
         dues = step.request.replies
         return self.sync.of(dues[0].node).quiet_until if step.is_probe and dues and dues is not ANY else -inf
 
-    def check(self, job: RequestJob) -> None:
-        """Raise the error for which this request must not leave now."""
-        request = job.request
+    def check(self, request: Exchange[Any], job: RequestJob | None = None) -> None:
+        """Raise the error for which this request must not leave now. `job`: it has waited in the queue."""
         self._check_speaks(request)
         if request.rank is Rank.STOP:
             return
         gated = request.effect in GATED
         if gated and self.latched:
             raise failures.latched(self.latched_by)
-        if moves(request):
+        if job is not None and moves(request):
             if job.stops is not None and self.positions.stops_for(request) != job.stops:
                 raise failures.stopped()
             if job.latches is not None and job.latches != self.latches:
@@ -644,10 +645,7 @@ class Engine:
             self.note_last(record)
         if single is not None:
             single.length, single.asked_at = prepared.length, sent_at
-        took = at - sent_at
-        if not record.low <= took < record.high:
-            record.bucket, record.low, record.high = bucket_of(took)
-        record.latency[record.bucket] += 1
+        record.latency[int(1e6 * (at - sent_at)).bit_length()] += 1
         record.data, record.at, record.source, record.kept = data, at, prepared, None
         record.orders = self.positions.orders
         if not record.counted:

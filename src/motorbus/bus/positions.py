@@ -38,7 +38,7 @@ class LastPositions(Mapping[int, Reading]):
         self.prepared: dict[int, Prepared] = {}
         """By node, the prepared request whose replies are newer than `_readings`."""
         self._readings: dict[int, tuple[Exchange[Any], Answer, int]] = {}
-        self._ordered: dict[int, int] = {}
+        self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
         self._stops: Counter[int | None] = Counter()  # None: stops for all nodes
         self._accepted: Counter[int] = Counter()
         self._acknowledged: dict[int, Answer] = {}  # the reply to the last order of a node
@@ -84,9 +84,14 @@ class LastPositions(Mapping[int, Reading]):
         found: dict[int, Answer | None] = dict.fromkeys(sorted(self.nodes))
         for node in self:
             _, answer, orders = self._reading(node)
-            if now - answer.at < FRESH and orders >= self._ordered.get(node, 0):
+            if now - answer.at < FRESH and orders >= self._last_order(node):
                 found[node] = answer
         return found
+
+    def _last_order(self, node: int) -> int:
+        """The number of the last order that this node was given; 0 for none."""
+        orders = tuple(self._ordered.items())  # the stop thread may ask while an order leaves
+        return max((number for nodes, number in orders if not nodes or node in nodes), default=0)
 
     def forget(self) -> None:
         """The devices may have restarted: no position or acknowledgement counts any more."""
@@ -113,10 +118,11 @@ class LastPositions(Mapping[int, Reading]):
     def moved(self, nodes: Iterable[int]) -> None:
         """These nodes (empty: all) got an order: their last position and acknowledgement no longer count."""
         self.orders += 1
-        for node in nodes or self.nodes:
-            self._ordered[node] = self.orders
-            self._acknowledged.pop(node, None)
-            self._stop_replies.pop(node, None)
+        ordered = tuple(nodes)
+        self._ordered[ordered] = self.orders
+        for replies in (self._acknowledged, self._stop_replies):
+            for node in (ordered or self.nodes) if replies else ():
+                replies.pop(node, None)
 
     def stop_count(self, node: int) -> int:
         """Number of stops sent to this node, those for all nodes included."""
@@ -184,7 +190,7 @@ def moves(exchange: Exchange[Any]) -> bool:
     """The request moves something or switches torque on."""
     if exchange.effect not in GATED or exchange.rank is Rank.STOP:
         return False
-    return not exchange.goals or not all(map(rests, exchange.goals))
+    return exchange.sure or not exchange.goals or not all(map(rests, exchange.goals))
 
 
 def addressed(exchange: Exchange[Any]) -> set[int]:

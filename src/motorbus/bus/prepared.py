@@ -25,19 +25,16 @@ class Prepared:
         "alternate",
         "at",
         "attempt",
-        "bucket",
         "budget",
         "counted",
         "data",
         "decode",
         "engine",
         "exchange",
-        "high",
         "kept",
         "lane",
         "latency",
         "length",
-        "low",
         "nodes",
         "orders",
         "record",
@@ -73,8 +70,6 @@ class Prepared:
         self.orders = 0
         self.kept: Answer | None = None
         self.latency = [0] * BUCKETS
-        self.low = self.high = 0.0
-        self.bucket = 0
         self.counted = False
 
     def answer(self) -> Answer:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from math import inf
 
 from motorbus.core.operation import ANY, Any_, Due
 
-BUCKETS = 24
+BUCKETS = 32
+"""Of latencies: the last one begins at 18 minutes, longer than any time-out."""
 
 
 @dataclass(slots=True)
@@ -69,7 +69,7 @@ class Statistics:
 
     def answered(self, dues: Iterable[Due], seconds: float) -> None:
         """A good reply of each of these, all of them after this time."""
-        bucket = bucket_of(seconds)[0]
+        bucket = bucket_of(seconds)
         nodes = self._nodes
         for due in dues:
             ledger = nodes[due.node]
@@ -84,8 +84,6 @@ class Statistics:
         return ledger
 
 
-def bucket_of(seconds: float) -> tuple[int, float, float]:
-    """The bucket of an answer that took so long, and from which time (s) to which it reaches."""
-    bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
-    low = 1e-6 * 2 ** (bucket - 1) if bucket else 0.0
-    return bucket, low, inf if bucket == BUCKETS - 1 else 1e-6 * 2**bucket
+def bucket_of(seconds: float) -> int:
+    """The bucket of a reply that took so long."""
+    return min(int(seconds * 1e6).bit_length(), BUCKETS - 1)

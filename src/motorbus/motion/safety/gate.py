@@ -96,13 +96,14 @@ class Gate:
 
         Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
         """
-        goals = exchange.goals
+        if not self.guards or exchange.rank is Rank.STOP:
+            return []
         if exchange.later is not None and exchange.later.begins:
             goals = _goals(self._waiting.of(exchange.later))
         elif exchange.effect is not Effect.MOTION:
             return []
-        if not self.guards or exchange.rank is Rank.STOP:
-            return []
+        else:
+            goals = exchange.goals
         found: dict[int, Runnable[Any]] = {}
         everyone, now = exchange.lane == EVERY_LANE, self._now()
         if not everyone and self._are_known(goals, now):
