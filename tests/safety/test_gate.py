@@ -141,23 +141,23 @@ def test_an_order_for_everyone_is_one_for_those_whom_it_does_not_name() -> None:
     with pytest.raises(LimitExceeded, match="elbow: this is 0.6 rad"):
         line.gate(order)
     line.now = 9.0
-    assert line.gate.look(order) == [QUESTION]
+    assert line.gate.required_reads(order) == [QUESTION]
 
 
 def test_it_says_what_must_be_asked_before_an_order_can_be_judged() -> None:
     line = Line()
     order = motion(place(0.1), Goal(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
-    assert line.gate.look(order) == [QUESTION]
-    assert line.gate.look(motion(place(0.1), rank=Rank.STOP)) == []
-    assert line.gate.look(motion(Goal(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
-    assert line.gate.look(Exchange(b"")) == []
+    assert line.gate.required_reads(order) == [QUESTION]
+    assert line.gate.required_reads(motion(place(0.1), rank=Rank.STOP)) == []
+    assert line.gate.required_reads(motion(Goal(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
+    assert line.gate.required_reads(Exchange(b"")) == []
     line.reads(0.0, 1.0)
-    assert line.gate.look(order) == []
+    assert line.gate.required_reads(order) == []
     line.reads(1.5, 1.001)
-    assert line.gate.look(order) == [QUESTION]
+    assert line.gate.required_reads(order) == [QUESTION]
     assert line.reason(place(0.1)) == "suspect"
     line.reads(1.5, 1.002)
-    assert line.gate.look(order) == []
+    assert line.gate.required_reads(order) == []
 
 
 def test_staying_is_always_allowed_and_a_number_it_must_be() -> None:
@@ -172,7 +172,7 @@ def test_staying_is_always_allowed_and_a_number_it_must_be() -> None:
 def test_a_goal_stays_because_it_is_marked_so_and_not_because_its_limits_leave_one_place() -> None:
     line = Line()
     only, on = Goal(1, "position", 7.0, 7.0, 7.0), torque_on(1)
-    assert line.gate.look(motion(only)) == [QUESTION]
+    assert line.gate.required_reads(motion(only)) == [QUESTION]
     assert line.reason(only) == "stale"
     line.reads(0.0, 1.0)
     assert line.reason(only) == "limits"

@@ -225,7 +225,7 @@ class BaseBus:
         engine.time = now
         engine.check(order)
         engine.positions.sent(order)
-        engine.statistics.asked(order.replies)
+        engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
         if engine.trace.subscriptions:
             engine.trace.put(TraceRecord(now, "tx", order.request))

@@ -11,13 +11,13 @@ from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus
-from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
+from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.entry import shown
-from motorbus.core.operation import UNLIKE, Exchange, Operation, Runnable, Together
+from motorbus.core.operation import UNLIKE, Exchange, Operation, Rank, Runnable, Together
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -90,29 +90,52 @@ class Bus(BaseBus):
                 self.receive(inf)
         return job.result()
 
-    def start(self, requests: Sequence[Exchange[Any]]) -> Pending:
-        """Send a batch, as a control loop does in every cycle; `Pending.result` gives its values.
-
-        A request without reply leaves in one write with the next one, where the bus is idle: goals out, positions in.
-        Any other batch is sent by `result`. The calling thread has the bus until then, and uses it for nothing else.
-        """
-        _check_requests(requests)
-        pending = Pending(self, requests)
-        if len(requests) == 1:
-            pending.begin(requests[0], None)
-        elif len(requests) == 2 and requests[0].replies == () and not self._needs_reads(requests[0]):
-            pending.begin(requests[1], requests[0])
-        return pending
-
     def exchange(
         self, requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...] = ()
     ) -> list[Any]:
-        """Carry out a batch, see `start`: the values of its requests.
+        """Carry out a batch, as a control loop does in every cycle: the values of its requests.
 
+        A request without reply leaves in one write with the next one, where the bus is idle: goals out, positions in.
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
         return self.start(requests).result(tolerated)
+
+    def start(self, requests: Sequence[Exchange[Any]]) -> Pending:
+        """Send a batch, see `exchange`; `Pending.result` gives its values.
+
+        A batch that cannot be sent at once is sent by `result`. Until then the calling thread has the bus, signals are
+        deferred, and the thread uses the bus for nothing else.
+        """
+        if self.link.virtual:
+            self.check_thread()
+        signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+        pending = Pending(self, requests, signals)
+        signals.depth += 1
+        self.turn.acquire(Rank.CONTROL)
+        try:
+            count = len(requests)
+            prepared = self.prepare(requests[-1]) if 1 <= count <= 2 else None
+            if prepared is None or (count == 2 and not self._may_join(requests[0])):
+                _check_requests(requests)
+            else:
+                self.write(prepared, requests[0] if count == 2 else None)
+                pending.prepared = prepared
+        except LinkError as error:
+            self._lost(error)
+            raise
+        finally:
+            if pending.prepared is None:
+                pending.release()
+        return pending
+
+    def _may_join(self, order: Exchange[Any]) -> bool:
+        """This order may leave in one write with the next request."""
+        if order.replies != ():
+            return False
+        return (
+            order.effect not in GATED or self._interlock is None or not self._interlock.required_reads(order)
+        )
 
     def _needs_reads(self, request: Exchange[Any]) -> bool:
         return request.effect in GATED and bool(self.required_reads(request))
@@ -138,51 +161,27 @@ class Bus(BaseBus):
 
 
 class Pending:
-    """A batch that was started; `sent` is false where `result` still has to send it."""
+    """A batch that was started. `prepared` is the request whose reply is awaited, None where nothing was sent yet."""
 
-    __slots__ = ("_prepared", "_signals", "bus", "requests")
+    __slots__ = ("bus", "prepared", "requests", "signals")
 
-    def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]]) -> None:
+    def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]], signals: Interrupts) -> None:
         self.bus = bus
         self.requests = requests
-        self._prepared: Prepared | None = None
-        self._signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
+        self.signals = signals
+        self.prepared: Prepared | None = None
 
-    @property
-    def sent(self) -> bool:
-        """The batch has left."""
-        return self._prepared is not None
-
-    def begin(self, request: Exchange[Any], order: Exchange[Any] | None) -> None:
-        """Write both if they may be sent at once. Signals are deferred until `result`."""
-        bus = self.bus
-        if bus.link.virtual:
-            bus.check_thread()
-        self._signals.depth += 1
-        bus.turn.acquire(request.rank)
-        try:
-            prepared = bus.prepare(request)
-            if prepared is not None:
-                bus.write(prepared, order)
-                self._prepared = prepared
-        except LinkError as error:
-            bus._lost(error)
-            raise
-        finally:
-            if self._prepared is None:
-                self._release()
-
-    def _release(self) -> None:
+    def release(self) -> None:
+        """Give the bus back; raise a signal that came meanwhile."""
         self.bus.turn.release()
-        signals = self._signals
+        signals = self.signals
         signals.depth -= 1
         if signals.pending is not None and not signals.depth:
             signals.raise_pending()
 
     def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
         """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
-        prepared, self._prepared = self._prepared, None
-        bus = self.bus
+        prepared, bus = self.prepared, self.bus
         if prepared is None:
             return bus.run(carry_out_batch(self.requests, tolerated))
         value: Any
@@ -194,7 +193,8 @@ class Pending:
         except tolerated as error:
             value = error
         finally:
-            self._release()
+            self.prepared = None
+            self.release()
         return [value] if len(self.requests) == 1 else [None, value]
 
 
@@ -230,12 +230,14 @@ def exchange_on(
                 pending.append(bus.start(requests))
             except MotorbusError as error:
                 found[bus] = error
-        unsent = {one.bus: carry_out_batch(one.requests, tolerated) for one in pending if not one.sent}
+        unsent = {
+            one.bus: carry_out_batch(one.requests, tolerated) for one in pending if one.prepared is None
+        }
         try:
             found |= run_on(unsent) if unsent else {}
         finally:
             for one in pending:
-                if one.sent:
+                if one.prepared is not None:
                     found[one.bus] = _value_or_error(one, tolerated)
         return found
 

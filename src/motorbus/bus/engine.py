@@ -299,7 +299,8 @@ class Engine:
 
     def check(self, request: Exchange[Any], job: RequestJob | None = None) -> None:
         """Raise the error for which this request must not leave now. `job`: it has waited in the queue."""
-        self._check_speaks(request)
+        if self.listening:
+            raise failures.listen_only(request)
         if request.rank is Rank.STOP:
             return
         gated = request.effect in GATED

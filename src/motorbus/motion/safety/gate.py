@@ -91,7 +91,7 @@ class Gate:
         """The error for a lease that is lost; None where it is not, or there is none."""
         return None if self.lease is None else self.lease.loss(self._now() - self.origin)
 
-    def look(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
+    def required_reads(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
         """What must be asked before this order can be judged: where those are whose position is not known well enough.
 
         Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
@@ -124,10 +124,6 @@ class Gate:
         if not (exchange.sure and self.passes(exchange)):
             self(exchange)
 
-    def required_reads(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
-        """The reads that must be carried out before this can be checked."""
-        return self.look(exchange)
-
     def stopped(self, nodes: Iterable[int]) -> None:
         """A stop of these nodes is about to leave; nothing is to be done for it here."""
 
@@ -136,8 +132,10 @@ class Gate:
         return not self.faults and (self.lease is None or self.lease.lets_move(self._now() - self.origin))
 
     def passes(self, exchange: Exchange[Any]) -> bool:
-        """Whether this may surely leave: then it is noted as given. Else nothing is, and whoever asks looks closely. It
-        is the quick way of the orders of a control loop, which says the same as `look` and a call of the gate."""
+        """Whether this may surely leave: then it is noted as given. Else nothing is, and the caller looks closely.
+
+        It is the quick way of the orders of a control loop, and agrees with `required_reads` and a call of the gate.
+        """
         if not exchange.sure or not self.lets_move():
             return False
         if not self.guards:
